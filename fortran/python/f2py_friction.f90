@@ -6,7 +6,7 @@ module hc_f2py_friction
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
-    normal_law_of, kernel_cache, state_at, address_of, unpack_state, numbers_of, n_number
+    normal_law_of, kernel_cache, take_state, state_at, unpack_state, numbers_of, n_number
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, load_target_t, n_load
   use hc_friction_law, only: friction_law_t
@@ -182,7 +182,7 @@ contains
     integer(c_int), intent(in) :: max_sweeps, max_cuts
     !> Number of nodes of the window
     integer(c_int), intent(in) :: n_node
-    !> Address of the state to go on from, which does not change, and of the new state, 0 if there is none
+    !> Handle of the state to go on from, which does not change, and of the new state, 0 if there is none
     integer(c_int64_t), intent(in) :: before
     integer(c_int64_t), intent(out) :: after
     !> Numbers of the new state
@@ -211,9 +211,13 @@ contains
     if (.not. allocated(error)) then
       call with_friction(slot, solver, error)
       if (.not. allocated(error)) then
-        state => state_at(before)
-        call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
-                     next, error, interpolated /= 0)
+        state => state_at(before, n_node)
+        if (associated(state)) then
+          call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
+                       next, error, interpolated /= 0)
+        else
+          call raise(error, status%bad_handle, 'the handle is stale: its state has been freed')
+        end if
         if (allocated(solver%guess)) deallocate (solver%guess)
       end if
       call leave(slot)
@@ -223,10 +227,10 @@ contains
     sweeps = next%sweeps
     cuts = next%cuts
     operator_applications = next%operator_applications
+    if (.not. allocated(error)) call take_state(next, after, error)
     if (allocated(error)) then
       deallocate (next)
     else
-      after = address_of(next)
       numbers = numbers_of(next)
       flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
     end if

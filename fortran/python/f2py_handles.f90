@@ -2,9 +2,10 @@
 !>
 !> A handle is a slot number with a generation count, so that a stale handle is
 !> an error and never another object. A handle in use by one thread is refused
-!> in another. The cache of spectra is here, too. No other module has state; this one is not part of the Fortran library.
+!> in another. States of contacts have handles of the same kind. The cache of spectra is here, too.
+!> No other module has state; this one is not part of the Fortran library.
 module hc_f2py_handles
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_intptr_t, c_loc, c_null_ptr, c_f_pointer
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_error, only: error_t, status, raise
   use hc_lock, only: lock, unlock, handle_table
@@ -27,7 +28,7 @@ module hc_f2py_handles
 
   public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
             normal_law_of
-  public :: state_at, address_of, unpack_state, unpack_numbers, numbers_of, n_number
+  public :: take_state, state_at, forget_state, unpack_state, unpack_numbers, numbers_of, n_number
 
   !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path,
   !> dissipated energy by area
@@ -53,6 +54,21 @@ module hc_f2py_handles
   end type slot_t
 
   type(slot_t), target :: slots(n_slot)
+
+  !> State of a handle.
+  type :: held_state_t
+    !> Odd while there is a state
+    integer(c_int64_t) :: generation = 0
+    type(contact_state_t), pointer :: state => null()
+    !> The free slot after this one, 0: none
+    integer :: next = 0
+  end type held_state_t
+
+  !> Slots of the table of states, which grows, at most.
+  integer(c_int64_t), parameter :: n_state = 2_c_int64_t**24
+  type(held_state_t), allocatable :: states(:)
+  !> First free slot, 0: none
+  integer :: free_state = 0
 
   !> Spectra of kernels that all problems share.
   type(kernel_cache_t), pointer :: kernel_cache => null()
@@ -261,21 +277,99 @@ contains
     end if
   end function normal_law_of
 
-  !> Return the state at an address.
-  function state_at(address) result(state)
-    !> Address, of `address_of`
-    integer(c_int64_t), intent(in) :: address
-    type(contact_state_t), pointer :: state
+  !> Give a state a handle.
+  subroutine take_state(state, handle, error)
+    !> The state
+    type(contact_state_t), pointer, intent(in) :: state
+    !> Its handle, 0 on failure
+    integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: slot
 
-    call c_f_pointer(transfer(int(address, c_intptr_t), c_null_ptr), state)
+    handle = 0
+    call lock(handle_table)
+    if (free_state == 0) call more_states()
+    slot = free_state
+    if (slot > 0) then
+      free_state = states(slot)%next
+      states(slot)%generation = states(slot)%generation + 1
+      states(slot)%state => state
+      handle = states(slot)%generation*n_state + slot - 1
+    end if
+    call unlock(handle_table)
+    if (slot == 0) call raise(error, status%resources, 'not enough memory for one more state of a contact: delete some')
+  end subroutine take_state
+
+  !> Double the table of states, if there is memory.
+  subroutine more_states()
+    type(held_state_t), allocatable :: grown(:)
+    integer :: n, i, stat
+
+    n = 0
+    if (allocated(states)) n = size(states)
+    if (2*n > n_state) return
+    allocate (grown(max(64, 2*n)), stat=stat)
+    if (stat /= 0) return
+    if (n > 0) grown(:n) = states
+    do i = n + 1, size(grown) - 1
+      grown(i)%next = i + 1
+    end do
+    call move_alloc(grown, states)
+    free_state = n + 1
+  end subroutine more_states
+
+  !> Return the state of a handle; none if the handle is stale, or the state has another number of nodes.
+  function state_at(handle, n_node) result(state)
+    !> Handle, of `take_state`
+    integer(c_int64_t), intent(in) :: handle
+    !> Number of nodes of the window; absent: any
+    integer(c_int), intent(in), optional :: n_node
+    type(contact_state_t), pointer :: state
+    integer :: slot
+
+    state => null()
+    call lock(handle_table)
+    slot = slot_of(handle)
+    if (slot > 0) state => states(slot)%state
+    call unlock(handle_table)
+    if (.not. (associated(state) .and. present(n_node))) return
+    if (size(state%pressure) /= n_node) state => null()
   end function state_at
 
-  !> Return the address of a state.
-  integer(c_int64_t) function address_of(state)
-    type(contact_state_t), intent(in), target :: state
+  !> Return the state of a handle, which is stale from now on; none if it was.
+  function forget_state(handle) result(state)
+    !> Handle, of `take_state`
+    integer(c_int64_t), intent(in) :: handle
+    type(contact_state_t), pointer :: state
+    integer :: slot
 
-    address_of = transfer(c_loc(state), 0_c_intptr_t)
-  end function address_of
+    state => null()
+    call lock(handle_table)
+    slot = slot_of(handle)
+    if (slot > 0) then
+      state => states(slot)%state
+      states(slot)%state => null()
+      states(slot)%generation = states(slot)%generation + 1
+      states(slot)%next = free_state
+      free_state = slot
+    end if
+    call unlock(handle_table)
+  end function forget_state
+
+  !> Return the slot of a handle of a state, 0 if it is stale.
+  integer function slot_of(handle) result(slot)
+    integer(c_int64_t), intent(in) :: handle
+
+    slot = 0
+    if (handle < n_state .or. .not. allocated(states)) return
+    slot = int(modulo(handle, n_state)) + 1
+    if (slot > size(states)) then
+      slot = 0
+    else if (states(slot)%generation /= handle/n_state .or. .not. associated(states(slot)%state)) then
+      slot = 0
+    end if
+  end function slot_of
 
   !> Unpack a state from its arrays.
   subroutine unpack_state(lattice, fields, numbers, state)

@@ -5,8 +5,9 @@
 module hc_f2py_states
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_intptr_t, c_loc
   use hc_precision, only: wp
+  use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t
-  use hc_f2py_handles, only: state_at, address_of, unpack_numbers
+  use hc_f2py_handles, only: take_state, state_at, forget_state, unpack_numbers
   implicit none
   private
 
@@ -16,20 +17,21 @@ contains
 
   !> Make a state of arrays that Python holds, to go on from.
   subroutine hold_state(n_col, n_row, pressure, traction_x, traction_y, gap, displacement_x, displacement_y, slip, density, &
-                        numbers, address)
+                        numbers, handle)
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: n_col, n_row
     !> Its fields but for the slip increment
     real(c_double), intent(in) :: pressure(n_col*n_row), traction_x(n_col*n_row), traction_y(n_col*n_row), gap(n_col*n_row), &
                                   displacement_x(n_col*n_row), displacement_y(n_col*n_row), slip(n_col*n_row), &
                                   density(n_col*n_row), numbers(13)
-    !> Address of the state, or 0: there is no memory for it
-    integer(c_int64_t), intent(out) :: address
+    !> Handle of the state, or 0: there is no memory for it
+    integer(c_int64_t), intent(out) :: handle
     type(contact_state_t), pointer :: state
+    type(error_t), allocatable :: error
     integer :: n(2), stat
 
     n = [n_col, n_row]
-    address = 0
+    handle = 0
     allocate (state)
     allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%traction(n(1), n(2), 2), &
               state%relative_displacement(n(1), n(2), 2), state%accumulated_slip(n(1), n(2)), &
@@ -47,27 +49,30 @@ contains
     state%accumulated_slip = reshape(slip, n)
     state%dissipation_density = reshape(density, n)
     call unpack_numbers(numbers, state)
-    address = address_of(state)
+    call take_state(state, handle, error)
+    if (handle == 0) deallocate (state)
   end subroutine hold_state
 
-  !> Return the addresses of the fields of a state, 0 of one that is missing.
-  subroutine state_places(address, places)
-    !> Address of the state
-    integer(c_int64_t), intent(in) :: address
+  !> Return the addresses of the fields of a state, 0 of one that is missing; of a stale handle all are.
+  subroutine state_places(handle, places)
+    !> Handle of the state
+    integer(c_int64_t), intent(in) :: handle
     !> Addresses of the fields
     integer(c_int64_t), intent(out) :: places(10)
     type(contact_state_t), pointer :: state
 
-    state => state_at(address)
+    places = 0
+    state => state_at(handle)
+    if (.not. associated(state)) return
     places = [place(state%pressure), places_of_both(state%traction), place(state%gap), &
               places_of_both(state%relative_displacement), places_of_both(state%slip_increment), place(state%accumulated_slip), &
               place(state%dissipation_density)]
   end subroutine state_places
 
   !> Return the zones of a state, and free them: no step goes on from them.
-  subroutine take_zones(address, n_node, zone)
-    !> Address of the state
-    integer(c_int64_t), intent(in) :: address
+  subroutine take_zones(handle, n_node, zone)
+    !> Handle of the state
+    integer(c_int64_t), intent(in) :: handle
     !> Number of nodes of the window
     integer(c_int), intent(in) :: n_node
     !> Zone of each node
@@ -75,20 +80,21 @@ contains
     type(contact_state_t), pointer :: state
 
     zone = 0
-    state => state_at(address)
+    state => state_at(handle, n_node)
+    if (.not. associated(state)) return
     if (.not. allocated(state%zone)) return
     zone = reshape(state%zone, [n_node])
     deallocate (state%zone)
   end subroutine take_zones
 
-  !> Free a state.
-  subroutine free_state(address)
-    !> Address of the state
-    integer(c_int64_t), intent(in) :: address
+  !> Free a state; a stale handle is ignored.
+  subroutine free_state(handle)
+    !> Handle of the state
+    integer(c_int64_t), intent(in) :: handle
     type(contact_state_t), pointer :: state
 
-    state => state_at(address)
-    deallocate (state)
+    state => forget_state(handle)
+    if (associated(state)) deallocate (state)
   end subroutine free_state
 
   !> Return the address of a field.

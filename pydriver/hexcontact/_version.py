@@ -1,3 +1,3 @@
-"""The version, as in meson.build."""
+"""The version; meson.build reads it from here."""
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"

@@ -59,6 +59,14 @@ class DeckError(HexcontactError, ValueError):
         self.faults = tuple(faults)
 
 
+class NotInResult(DeckError):
+    """A result does not have what is asked for: fields that were not kept, zones without friction."""
+
+
+class NoSuchStep(DeckError, IndexError):
+    """There is no load step of this number."""
+
+
 class KernelFolderWarning(UserWarning):
     """Spectra of kernels cannot be stored in a folder or read from it; results do not change."""
 

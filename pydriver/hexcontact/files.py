@@ -7,11 +7,15 @@ import contextlib
 import errno
 import os
 import stat
-from collections.abc import Iterator
+import traceback
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, TypeVar
 
 from ._version import __version__
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
+
+_T = TypeVar("_T")
 
 LARGEST_TEXT = 1 << 25  # bytes; 100,000 load steps of six loads each fit
 MADE_BY = f"made by hexcontact {__version__}"  # in pictures and pages
@@ -36,6 +40,8 @@ def text_of(path: str | Path, expected: str) -> str:
         If there is no such file, it is a folder or a device, too large, or not UTF-8.
     """
     fault = ""
+    if "\0" in str(path):
+        raise DeckError(f"{path}: cannot be read (embedded null byte); expected {expected}")
     try:
         with open(path, "rb", opener=_opened) as file:
             if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -55,8 +61,10 @@ def text_of(path: str | Path, expected: str) -> str:
             fault = "is UTF-16 text; save it as UTF-8"
         elif content.startswith(_HDF5):
             fault = "is a netCDF file, such as a result; hexcontact info shows it"
-    except (OSError, ValueError) as error:
-        fault = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+    except OSError as error:
+        fault = f"cannot be read ({error.strerror or error})"
+        if error.errno in LACKING:
+            raise ResourceError(f"{path}: {fault}") from None
     raise DeckError(f"{path}: {fault}; expected {expected}")
 
 
@@ -97,7 +105,11 @@ def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
 
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
-    """Raise one sentence for any exception by a damaged or foreign file, or a device."""
+    """Raise one sentence for an exception by a damaged or foreign file, or a device.
+
+    Below the package damage takes any form. What the package itself trips over is a defect of it, unless a
+    value is missing or wrong.
+    """
     require_ordinary(path, kind)
     try:
         yield
@@ -105,7 +117,9 @@ def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
         raise
     except PermissionError as error:
         raise DeckError(f"{path} cannot be read: {error.strerror}") from error
-    except Exception as error:  # damage takes any form: every library below has its own exceptions
+    except Exception as error:
+        if is_defect(error):
+            raise
         if isinstance(error, OSError) and error.errno in LACKING:
             raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
         fault = f"is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
@@ -114,11 +128,39 @@ def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
         raise DeckError(f"{path} {fault}") from error
 
 
+def is_defect(error: Exception) -> bool:
+    """Test whether the package itself tripped while it read a file, and not over a missing or wrong value."""
+    if isinstance(error, OSError | ValueError | KeyError):
+        return False
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    return bool(frames) and str(frames[-1].f_globals.get("__name__")).partition(".")[0] == __package__
+
+
+def require_kinds(values: Any, **kinds: type) -> None:
+    """Raise ValueError unless what was read is a table that has entries of these kinds."""
+    if not isinstance(values, dict):
+        raise ValueError("it holds no table")
+    for name, kind in kinds.items():
+        if not isinstance(values[name], kind):
+            raise ValueError(f"its {name} is not what it should be")
+
+
+def made(kind: Callable[..., _T], values: Any) -> _T:
+    """Return an object of the entries of a table that was read; ValueError if they are not its own."""
+    require_kinds(values)
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise ValueError(str(error)) from None
+
+
 # --- writing ------------------------------------------------------------------------------------------------
 
 
-def require_replaceable(path: Path) -> None:
-    """Refuse to replace a picture or page that hexcontact has not made; an empty file may be replaced.
+def require_replaceable(path: Path, begins: str = "") -> None:
+    """Refuse to replace a picture, page or table that hexcontact has not made; an empty file may be replaced.
+
+    A file of hexcontact has its mark, or, if that is given, begins with some text.
 
     Raises
     ------
@@ -130,7 +172,9 @@ def require_replaceable(path: Path) -> None:
     with contextlib.suppress(OSError), path.open("rb") as file:
         head = file.read(_ENDS)
         file.seek(max(0, path.stat().st_size - _ENDS))
-        if _MARK in head or _MARK in file.read(_ENDS):
+        if begins and head.startswith(begins.encode()):
+            return
+        if not begins and (_MARK in head or _MARK in file.read(_ENDS)):
             return
     raise DeckError(f"{path} is there and was not made by hexcontact; delete it or choose another name")
 

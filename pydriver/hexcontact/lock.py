@@ -104,6 +104,14 @@ def holder_of(text: bytes) -> dict[str, Any] | None:
     return {} if text.startswith(b'{"process": ') and len(text) <= _LONGEST else None
 
 
+def begun(path: Path) -> float | None:
+    """Return when the run that left a lock began (s since 1970), inf if it died at once; None without one."""
+    if not names_a_run(path):
+        return None
+    began = (holder_of(path.read_bytes()) or {}).get("time")
+    return float(began) if isinstance(began, int | float) else math.inf
+
+
 def names_a_run(path: Path) -> bool:
     """Test whether a run has written this lock, or created it: it is blank for a moment."""
     with contextlib.suppress(OSError):
@@ -140,13 +148,18 @@ def _is_running(holder: dict[str, Any] | None) -> bool:
     """Test whether the process that wrote the lock runs on this machine, not a later one of its number."""
     import psutil
 
-    if not holder or holder.get("host") != os.uname().nodename:
+    number = holder.get("process") if holder else None
+    if not holder or holder.get("host") != os.uname().nodename or type(number) is not int or number < 1:
         return False
     try:
-        began = psutil.Process(int(holder.get("process", -1))).create_time()
-    except (psutil.NoSuchProcess, ValueError, TypeError):
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
         return False
-    except psutil.Error:
+    except PermissionError:  # of another user
+        pass
+    try:
+        began = psutil.Process(number).create_time()
+    except (psutil.Error, OSError):  # as without /proc
         return True
     return bool(began < float(holder.get("time", math.inf)) + _CLOCKS)
 

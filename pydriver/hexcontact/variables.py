@@ -166,6 +166,7 @@ VARIABLES: dict[str, Variable] = {
     "y": Variable(_PLANE, "m", "y coordinate of the node"),
     # nodes
     "initial_gap": Variable(_PLANE, "m", "gap of the undeformed surfaces at first touch"),
+    "nodal_friction_coefficient": Variable(_PLANE, "1", "coefficient of friction at the node", least=0.0),
     "pressure": _node(
         "Pa", "contact pressure", padding=0.0, symbol="p", title="Pressure", least=0.0, core="fields"
     ),
@@ -388,9 +389,13 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
 
 # Parameters of a case with a compliant interface.
 INTERFACE = ("interface_coefficient", "interface_exponent", "interface_tangential_stiffness")
+SHEAR_LIMIT = "shear_limit"  # parameter of a case with a bound of the shear traction
 TRACTIONS = ("pressure", "traction_x", "traction_y")
 EDGES = ("gap", "zone")  # fields that, with the tractions, tell where the edges of contact and stick are
 FIELDS = names_where(lambda v: v.is_field)
+FIXED = tuple(name for name in names_where(lambda v: v.dims == _PLANE) if name not in ("x", "y"))
+"""Fields with one value at every node for all steps."""
+NODAL_FRICTION = "nodal_friction_coefficient"
 FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
 _HELD = names_where(lambda v: v.core in ("fields", "zone"))
 STATE = {False: tuple(name for name in _HELD if not VARIABLES[name].frictional), True: _HELD}

@@ -16,13 +16,14 @@ WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)
 def made_step(index: int, lattice: Lattice = WINDOW) -> Step:
     """Return a step with numbers of its own."""
     rng = np.random.default_rng(index)
+    load, pressure = 10.0 * (index + 1), rng.random(lattice.shape)
     fields = {
         "initial_gap": 1e-6 * (lattice.rows[:, None] ** 2 + lattice.cols[None, :] ** 2),
-        "pressure": rng.random(lattice.shape),
+        "pressure": pressure * (load / (pressure.sum() * lattice.cell_area)),
         "gap": rng.random(lattice.shape),
         "zone": rng.integers(0, 3, lattice.shape).astype("i1"),
     }
-    history = {"normal_load": 10.0 * (index + 1), "seconds": 0.5, "label": f"pressé {index}", "segment": 1}
+    history = {"normal_load": load, "seconds": 0.5, "label": f"pressé {index}", "segment": 1}
     return Step(index, lattice, fields, history)
 
 

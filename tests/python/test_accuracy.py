@@ -221,6 +221,23 @@ def test_what_is_refused(keys: dict[str, Any], message: str) -> None:
         made(**keys)
 
 
+@pytest.mark.parametrize("nodes", [4, 5, 6, 8])
+def test_the_fewest_nodes_that_are_not_refused_are_enough(nodes: int) -> None:
+    """`max_nodes` is refused before the run, or the run has its three lattices."""
+
+    def limited(most: int) -> Case:
+        return made(nodes_in_radius=nodes, accuracy={"target": 1e-5, "max_nodes": most})
+
+    with pytest.raises(DeckError, match=r"accuracy\.max_nodes = 100: expected at least \d+,") as refused:
+        limited(100)
+    needed = int(re.findall(r"at least (\d+),", str(refused.value))[0])
+    with pytest.raises(DeckError, match=f"expected at least {needed},"):
+        limited(needed - 1)
+    with pytest.warns(AccuracyWarning, match="max_nodes"):
+        result = limited(needed).run()
+    assert result.lattice.size == needed
+
+
 def test_gap_of_an_array_cannot_be_refined() -> None:
     lattice = made().lattice
     gap = made().initial_gap(lattice)[0]

@@ -57,6 +57,14 @@ def test_another_layout_is_refused_with_its_number(out: Path) -> None:
         open_result(out)
 
 
+@pytest.mark.parametrize("place", ["journal.fault_of_record", "netcdf.fault_of_result", "journal.made"])
+def test_a_defect_of_the_reader_is_no_damage(out: Path, place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(out, count=3 if "netcdf" in place else 2)
+    monkeypatch.setattr(f"hexcontact.result.{place}", None)
+    with pytest.raises(TypeError, match="'NoneType' object is not callable"):
+        open_result(out)
+
+
 def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
     written(out)
     whole = out.read_bytes()
@@ -248,6 +256,48 @@ def test_values_that_no_step_has_are_refused(out: Path, story: str) -> None:
     assert fault({"gap": outside}, {}) == ""
     assert fault({"pressure": fields["pressure"] * 2}, {}) == "pressure does not fit to max_pressure"
     assert fault({"zone": 0 * fields["zone"]}, {}) == "zone does not fit to contact_area"
+
+
+@pytest.fixture(scope="module")
+def sheared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("sheared") / "out.nc"
+    body = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    loads = [{"normal_load": 31.5}, {"tangential_load_x": 2.0, "torque": 1e-5}]
+    sphere = {**body, "surface": {"shape": "sphere", "radius": 1e-3}}
+    Case(body_1=sphere, body_2=body, nodes_in_radius=5, friction_coefficient=0.2, loads=loads).run(str(file))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("nothing", ""),
+        ("normal_load", "normal_load is not the resultant of the tractions in step 1"),
+        ("tractions", "tangential_load_x is not the resultant of the tractions in step 2"),
+        ("torque", "torque is not the resultant of the tractions in step 2"),
+        ("deck", "its deck is no TOML: "),
+    ],
+)
+def test_loads_that_are_not_those_of_the_fields_are_refused(
+    sheared: Path, out: Path, name: str, fault: str
+) -> None:
+    """In a result without a seal, which another program has written again."""
+    out.write_bytes(sheared.read_bytes())
+    with netCDF4.Dataset(out, "a") as file:
+        if name == "nothing":
+            file.remark = "another attribute"
+        elif name == "tractions":
+            x, y = (file[f"traction_{axis}"][:] for axis in "xy")
+            file["traction_x"][:], file["traction_y"][:] = y, x
+        elif name == "deck":
+            file.deck = "load ="
+        else:
+            file[name][:] = 1.0 if name == "normal_load" else -file[name][:]
+    if not fault:
+        assert open_result(out).complete
+        return
+    with pytest.raises(DeckError, match=f"out.nc is damaged: {fault}"):
+        open_result(out)
 
 
 def test_every_bound_of_the_table_is_looked_at() -> None:

@@ -243,3 +243,33 @@ def test_a_file_in_the_way_of_the_folder_stays(folder: Path) -> None:
     code, _, err = export(folder / "sheared.nc", "--vtk", "-o", folder / "pressed.nc")
     assert code == 2 and re.search(r"pressed\.nc is a file", err)
     assert (folder / "pressed.nc").read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("--csv",), "sheared_history.csv"),
+        (("--csv", "-s", "4"), "sheared_0004.csv"),
+        (("--vtk",), "sheared.pvd"),
+        (("--vtk",), "sheared_0005.vtu"),
+        (("--ugrid",), "sheared_ugrid.nc"),
+    ],
+)
+@pytest.mark.parametrize("of", ["text", "netcdf"])
+def test_files_of_others_are_not_replaced(
+    folder: Path, tmp_path: Path, words: tuple[str, ...], name: str, of: str
+) -> None:
+    target = tmp_path / name
+    if of == "text":
+        target.write_text("step,mine\n")
+    else:
+        xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(target)
+    content = target.read_bytes()
+    code, out, err = export(folder / "sheared.nc", *words, "-o", tmp_path)
+    assert (code, out) == (2, "")
+    assert f"{name} is there and was not made by hexcontact; delete it or choose another name" in err
+    assert target.read_bytes() == content
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    target.write_text("")
+    for _ in range(2):  # an empty file, and that of the first export
+        assert export(folder / "sheared.nc", *words, "-o", tmp_path)[0] == 0

@@ -21,13 +21,21 @@ from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import report, tables
 from hexcontact.cli.app import app
-from hexcontact.core import calls, contact, friction, influence, memory
+from hexcontact.core import _core, calls, contact, friction, influence, memory
+from hexcontact.core.calls import HeldState
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
-from hexcontact.errors import ConvergenceError, DeckError, KernelFolderWarning, PathWarning, ResourceError
+from hexcontact.errors import (
+    ConvergenceError,
+    DeckError,
+    HexcontactError,
+    KernelFolderWarning,
+    PathWarning,
+    ResourceError,
+)
 from hexcontact.problem import overview
 from hexcontact.problem.loads import LoadStep, Target
 from hexcontact.result import history
@@ -390,6 +398,33 @@ def test_a_record_holds_the_state_bit_for_bit(tmp_path: Path) -> None:
             window.carried(state_of(records[number - 1]), records[number - 1].lattice) if number else None
         )
         same(window.advance(before, target, target.values(begun)), state_of(step))
+
+
+def test_a_state_behind_a_stale_handle_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not a pointer to wherever an integer leads."""
+    lattice = Lattice(0.1, -3, -3, 7, 7)
+    pair, gap = ElasticPair(1.0, 0.0, 1.0), 0.5 * (lattice.x**2 + lattice.y**2)
+    problem = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
+    for handle in (0, 1, 7, -5, 2**24, 2**24 + 3_000_000, 2**62):
+        with pytest.raises(DeckError, match="the handle is stale: its state has been freed"):
+            HeldState(handle, lattice.shape)
+    states = [problem._held(problem.virgin()) for _ in range(200)]
+    assert len({state.handle for state in states}) == 200
+    loads = ["force"] * 3 + ["displacement"], (0.003, 0.0, 0.0, 0.0)
+    monkeypatch.setattr(problem, "_held", lambda state: states[0])
+    assert problem.advance(problem.virgin(), *loads).converged
+    for _ in range(2):  # a stale handle is ignored
+        _core.hc_f2py_states.free_state(states[0].handle)
+    assert not any(_core.hc_f2py_states.take_zones(states[0].handle, lattice.size))
+    other = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
+    assert other.advance(other.virgin(), *loads).converged  # in the slot that is free again
+    with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
+        problem.advance(problem.virgin(), *loads)
+    small = Lattice(0.1, -1, -1, 3, 3)
+    held = HeldState.copied(small.shape, [np.zeros(small.size)] * 8, [0.0] * 12)
+    monkeypatch.setattr(problem, "_held", lambda state: held)
+    with pytest.raises(HexcontactError, match="stale"):
+        problem.advance(problem.virgin(), *loads)
 
 
 def test_a_step_without_friction_holds_no_such_state() -> None:

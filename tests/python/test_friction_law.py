@@ -7,7 +7,7 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
-from hexcontact import Case, DeckError, resume
+from hexcontact import Case, DeckError, open_result, resume
 from hexcontact.cli.app import app
 from hexcontact.deck.formula import Formula
 from hexcontact.surfaces import Sphere
@@ -105,6 +105,39 @@ def test_ways_agree(tmp_path):
     _, expected, p = fields(formula.run())
     for other, near in zip(others, (1e-9, 1e-9, 1e-3, 1e-3), strict=True):
         np.testing.assert_allclose(fields(other.run())[1], expected, atol=near * p.max())
+
+
+GRID = np.linspace(-1e-3, 1e-3, 41)
+MAP = xarray.DataArray(mu_of(GRID)[:, None] + 0 * GRID, coords={"x": GRID, "y": GRID}, dims=("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "limit"),
+    [(FORMULA, None), (lambda x, y: 0.2 + 0.1 * (x > 0), None), (MAP, None), (FORMULA, 2e8), (0.3, 2e8)],
+    ids=["formula", "function", "map", "limited_formula", "limited"],
+)
+def test_a_step_and_its_result_show_the_same_tractions(coefficient, limit, tmp_path):
+    """The law is evaluated once, at the nodes; between them run, file and result agree to the bit."""
+    file, steps = tmp_path / "sheared.nc", []
+    loads = [{"normal_load": 100.0}, {"tangential_load_x": 15.0, "steps": 2}]
+    problem = case(coefficient, shear_limit=limit, loads=loads)
+    run = problem.run(str(file), on_step=lambda step: steps.append(step))
+    x = np.linspace(-3e-4, 3e-4, 101)
+    for result in (run, open_result(file)):
+        for step in steps:
+            assert result.traction_field(step.number).sheared
+            for name in ("pressure", "traction_x", "traction_y"):
+                assert (step.at(name, x, 0.1 * x) == result.at(name, x, 0.1 * x, step=step.number)).all()
+        law = problem.friction_law(result.lattice).coefficient
+        assert (result["nodal_friction_coefficient"] == law).all()
+        assert result.dataset.attrs.get("shear_limit") == limit
+
+
+def test_full_slip_between_the_nodes_is_friction_times_pressure():
+    result = case(lambda x, y: 0.2 + 0.1 * (x > 0)).run()
+    x = np.linspace(2.5, 3.5, 9) * result.lattice.spacing  # where the coefficient is 0.3
+    p, q = (result.at(name, x, 0.0) for name in ("pressure", "traction_x"))
+    np.testing.assert_allclose(q, 0.3 * p, rtol=1e-12)
 
 
 def test_shear_limit():

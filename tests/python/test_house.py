@@ -1,6 +1,7 @@
 """Rules of the house that can be read off the sources: kinds, silence, layers, links, versions."""
 
 import ast
+import dataclasses
 import os
 import re
 import subprocess
@@ -14,6 +15,11 @@ import typer.main
 
 import hexcontact
 from hexcontact.cli.app import app
+from hexcontact.core.lattice import Lattice
+from hexcontact.result import journal, trials
+from hexcontact.result.layout import Metadata
+from hexcontact.study.collect import STUDY_VERSION
+from hexcontact.variables import SCHEMA_VERSION
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "fortran").rglob("*.f90"))
@@ -116,10 +122,41 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_version_is_the_same_everywhere() -> None:
-    build = re.search(r"version: '([^']+)'", (ROOT / "meson.build").read_text())
-    assert build
-    assert hexcontact.__version__ == build.group(1)
-    assert f"## [{build.group(1)}]" in (ROOT / "CHANGELOG.md").read_text()
+    """The build reads that of the package; the changelog has it, or collects what comes into it."""
+    headings = re.findall(r"^## \[(.+)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert hexcontact.__version__ == headings[0] or headings[0] == "Unreleased"
+    assert hexcontact.__version__ not in headings[1:]
+    if "site-packages" in hexcontact.__file__:
+        assert metadata.version("hexcontact") == hexcontact.__version__
+
+
+FORMATS: dict[str, dict[str, object]] = {  # by the version that first wrote them; a change is a new line
+    "0.4.0": {
+        **{"result": 1, "journal": 2, "lattices": 2, "study": 1},
+        "record": "index lattice history control fields companion",
+        "metadata": "title deck fields every planned_steps parameters run created version resumed deck_file",
+        "growth": "run of planned_steps kept added checksum",
+        "window": "spacing row_first col_first n_row n_col origin",
+        "solution": "level copy spacing origin nodes histories",
+    }
+}
+
+
+def test_a_changed_format_has_a_version_of_its_own() -> None:
+    present = {
+        **{"result": SCHEMA_VERSION, "journal": journal.VERSION, "lattices": trials.VERSION},
+        "study": STUDY_VERSION,
+        "record": " ".join(journal._PARTS),
+        "metadata": " ".join(field.name for field in dataclasses.fields(Metadata)),
+        "growth": " ".join(journal.Growth._fields),
+        "window": " ".join(field.name for field in dataclasses.fields(Lattice)),
+        "solution": " ".join(trials.Solution._fields),
+    }
+    newest = [*FORMATS][-1]
+    assert present == FORMATS[newest], "raise the version, and add a line to FORMATS"
+    order = [tuple(map(int, version.split("."))) for version in (*FORMATS, hexcontact.__version__)]
+    assert order == sorted(order)
+    assert len(set(order[:-1])) == len(FORMATS)
 
 
 def test_every_dependency_has_its_reason() -> None:

@@ -1,16 +1,23 @@
 """Memory that is not there: an error with a sentence, no end of the process; finished steps are kept."""
 
+import contextlib
+import errno
+import os
 import resource
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from commands import ENVIRONMENT
 from numpy.testing import assert_array_equal
 
-from hexcontact import open_result
+from hexcontact import Case, ResourceError, open_result
+from hexcontact.cli import guard
 from hexcontact.core import memory
+from hexcontact.lock import _is_running
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="limits and sizes are those of Linux"
@@ -133,3 +140,63 @@ def test_what_cannot_be_had_is_not_claimed() -> None:
     memory.claim(100 * MB)
     with pytest.raises(OSError, match="Cannot allocate memory"):
         memory.claim(2**46)
+
+
+def test_a_machine_that_hides_its_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without /proc the memory of the machine is the bound, and a lock is held if its process lives."""
+
+    def hidden(path: str) -> bytes:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
+
+    monkeypatch.setattr(memory, "_read", hidden)
+    monkeypatch.setattr(psutil, "PROCFS_PATH", str(tmp_path))
+    assert memory.resident() > MB
+    assert memory.available() > 100 * MB
+    with memory_limit(8_000 * MB):
+        assert memory.available() < 8_000 * MB
+    (tmp_path / "deck.toml").write_text(DECK)
+    assert len(Case.from_toml(tmp_path / "deck.toml").run(tmp_path / "out.nc")) == 3
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    here = os.uname().nodename
+    for number, runs in ((os.getpid(), True), (ended.pid, False), (-1, False), ("1", False), (2**70, False)):
+        assert _is_running({"process": number, "host": here}) == runs
+
+
+@contextlib.contextmanager
+def memory_limit(size: int) -> Iterator[None]:
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def test_files_that_cannot_be_opened_for_want_of_descriptors(tmp_path: Path) -> None:
+    """A sentence and the code of lacking resources, whatever is opened when there are too few."""
+    (tmp_path / "deck.toml").write_text(DECK)
+    code = f"import sys; sys.path[:] = {sys.path!r}; from hexcontact.cli.app import main; main()"
+    for most in (5, 6, 8):
+        done = subprocess.run(
+            [sys.executable, "-S", "-c", code, "run", "deck.toml", "--overwrite", "-o", "out.nc"],
+            cwd=tmp_path, env=ENV, text=True, capture_output=True, check=False,
+            preexec_fn=lambda most=most: resource.setrlimit(resource.RLIMIT_NOFILE, (most, most)),
+        )  # fmt: skip
+        assert "Traceback" not in done.stderr
+        if done.returncode:
+            assert done.returncode == 4
+            assert "Too many open files" in done.stderr
+
+
+def test_a_library_that_finds_no_descriptor(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def refuse(*arguments: object) -> int:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    sentence = "_core.so: cannot open shared object file: Error 24"
+    report = guard._report_of(ImportError(sentence, path="_core.so"))
+    assert report == guard.Report("_core.so: Too many open files", 4)
+    (tmp_path / "deck.toml").write_text(DECK)
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(ResourceError, match=r"deck\.toml: cannot be read \(Too many open files\)"):
+        Case.from_toml(tmp_path / "deck.toml")

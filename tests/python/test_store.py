@@ -26,6 +26,7 @@ from fuzz.file_made import WINDOW, made_step, read_record, written
 from numpy.testing import assert_array_equal
 
 from hexcontact import lock as lock_module
+from hexcontact import resume
 from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lock import Lock
 from hexcontact.result import journal as journal_module
@@ -285,6 +286,29 @@ FOREIGN = {
     "a list of lattices": "lattices/trials.json",
     "a step of a lattice": "lattices/1_0.nc.d/000001.npz",
 }
+
+
+@pytest.mark.parametrize("left", ["lock", "blank"])
+def test_a_run_killed_while_it_replaces_an_output_is_not_that_output(out: Path, left: str) -> None:
+    """Killed before its first step: the old output is complete, but not the run that is asked for."""
+    written(out)
+    os.utime(out, (0.0, 1e9))
+    holder = {"process": 2**30, "host": os.uname().nodename, "time": 1e9 + 60.0}
+    journal_of(out).mkdir()
+    (journal_of(out) / "lock").write_text(json.dumps(holder) if left == "lock" else "")
+    for call in (lambda: Store.reopened(out), lambda: resume(out)):
+        with pytest.raises(
+            DeckError, match=r"out\.nc ended before its first .*; run it again with --overwrite"
+        ):
+            call()
+        assert open_result(out).complete
+        journal_of(out).mkdir(exist_ok=True)
+        (journal_of(out) / "lock").write_text(json.dumps(holder) if left == "lock" else "")
+    os.utime(out, (0.0, 1e9 + 90.0))  # it was killed while it deleted its journal
+    if left == "lock":
+        store, last = Store.reopened(out)
+        assert last is None
+        store.close()
 
 
 @pytest.mark.parametrize("overwrite", [False, True])

@@ -450,6 +450,7 @@ nodelist = "n[1-3],m7"
         ('array = "1-9"', "slurm.array = "),
         ("time = [1, 2]", "slurm.time = [1, 2]: expected text, a number, or true or false"),
         ('comment = ""', "slurm.comment = "),
+        ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected one value, without commas"),
     ],
 )
 def test_options_of_a_script_are_checked(folder: Path, options: str, sentence: str) -> None:

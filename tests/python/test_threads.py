@@ -19,6 +19,7 @@ from numpy.testing import assert_array_equal
 
 from hexcontact import (
     Case,
+    DeckError,
     FlexibilityOperator,
     FrictionalContact,
     Lattice,
@@ -98,6 +99,28 @@ def test_two_sessions_in_two_threads_do_not_feel_each_other() -> None:
     alone = [driven(load) for load in (10.0, 18.0)]
     with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(driven, (10.0, 18.0))) == alone
+
+
+def test_a_session_refuses_a_second_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also while the first one waits in a step; later the session goes on."""
+    session, begun, go_on = fretting().start(), threading.Event(), threading.Event()
+    solve = session._next_step
+
+    def waiting(*arguments: object) -> object:
+        begun.set()
+        assert go_on.wait(60.0)
+        return solve(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(session, "_next_step", waiting)
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(session.advance, normal_load=100.0)
+        assert begun.wait(60.0)
+        for call in (lambda: next(session), lambda: session.advance(normal_load=1.0), session.back):
+            with pytest.raises(DeckError, match="the session is at work in another thread; call it from one"):
+                call()
+        go_on.set()
+        assert first.result().normal_load == pytest.approx(100.0)
+    assert session.advance(normal_load=50.0).normal_load == pytest.approx(50.0)
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, reals
 from ..core.analytic import at_points, flat
+from ..errors import DeckError
 from .frictionless import Given, driven_by, require_positive
 
 
@@ -74,11 +75,11 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
     if tensor.shape != (2, 2) or not np.allclose(
         tensor, tensor.T, rtol=0.0, atol=1e-12 * np.abs(tensor).max()
     ):
-        raise ValueError("hessian is not a symmetric 2x2 tensor")
+        raise DeckError("hessian is not a symmetric 2x2 tensor")
     name, value = driven_by(given, with_radius=False)
     contact, code, message = flat.hertz(effective_modulus, tensor, name == "normal_load", value)
     if code:
-        raise ValueError(message.decode().strip())
+        raise DeckError(message.decode().strip())
     return EllipticContact(effective_modulus, *contact[1:].tolist())
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, reals
 from ..core.analytic import at_points, flat
+from ..errors import DeckError
 from .frictionless import AxisymmetricContact
 
 
@@ -56,7 +57,7 @@ class MindlinContact:
         """Return loads (N) up to the sliding load; ValueError for others."""
         loads = reals(load, "load")
         if np.any(np.abs(loads / self.sliding_load) > 1.0):
-            raise ValueError("the tangential load is larger than mu P")
+            raise DeckError("the tangential load is larger than mu P")
         return loads
 
     def stick_radius(self, load: ArrayLike) -> Array:
@@ -128,7 +129,7 @@ class SuperposedContact:
         """Return the contact under P*, the stick zone of a first loading to Q (N); None where all slides."""
         left = self.normal_load - abs(load) / self.friction_coefficient
         if left < -1e-9 * self.normal_load:
-            raise ValueError("the tangential load is larger than mu P")
+            raise DeckError("the tangential load is larger than mu P")
         return self.pressed(left) if left > 1e-9 * self.normal_load else None
 
     def stick_radius(self, load: float) -> float:
@@ -192,7 +193,7 @@ class LubkinTorsion:
     def stick_radius(self, torque: float) -> float:
         """Return the stick radius (m) under a first torque (N m) below the sliding torque."""
         if not 0.0 <= torque < self.sliding_torque:
-            raise ValueError("the torque is not between 0 and the sliding torque 3 pi mu P a/16")
+            raise DeckError("the torque is not between 0 and the sliding torque 3 pi mu P a/16")
         return float(flat.lubkin_stick_radius(astuple(self), torque))
 
 
@@ -214,7 +215,7 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
         (kappa, chi); both 1 for beta = 0.
     """
     if abs(beta) > 0.5:
-        raise ValueError(f"beta is {beta!r}; expected a number in [-1/2, 1/2]")
+        raise DeckError(f"beta is {beta!r}; expected a number in [-1/2, 1/2]")
     kappa, chi = flat.no_slip(beta)
     return float(kappa), float(chi)
 
@@ -265,7 +266,7 @@ class PlaneCattaneo:
     def stick_half_width(self, load: float) -> float:
         """Return half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
         if abs(load) / (self.friction_coefficient * self.normal_load) > 1.0:
-            raise ValueError("the tangential load is larger than mu P'")
+            raise DeckError("the tangential load is larger than mu P'")
         return float(flat.plane_stick_half_width(astuple(self), load))
 
     def traction(self, x: ArrayLike, load: float) -> Array:
@@ -301,8 +302,8 @@ def _stick_ratio(
     procedure: Callable[[float, float], float], beta: float, friction_coefficient: float
 ) -> float:
     if beta == 0.0 or not friction_coefficient > 0.0:
-        raise ValueError("beta must not be 0 and the friction coefficient must be positive")
+        raise DeckError("beta must not be 0 and the friction coefficient must be positive")
     ratio = float(procedure(beta, friction_coefficient))
     if math.isnan(ratio):
-        raise ValueError("the stick ratio for this beta and friction coefficient is too close to 0 or 1")
+        raise DeckError("the stick ratio for this beta and friction coefficient is too close to 0 or 1")
     return ratio

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, number, reals
 from ..core.analytic import at_points
 from ..core.analytic import axisymmetric as flat
+from ..errors import DeckError
 
 Profile = Callable[[Array], Array]
 
@@ -78,7 +79,7 @@ def require_positive(**values: float) -> None:
     """Refuse values, given by their names, that are not positive numbers."""
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} is {value!r}; expected a positive number")
+            raise DeckError(f"{name} is {value!r}; expected a positive number")
 
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
@@ -121,7 +122,7 @@ def power_law(
     require_positive(effective_modulus=effective_modulus, coefficient=coefficient)
     n = float(exponent)
     if not (np.isfinite(n) and n >= 1.0):
-        raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
+        raise DeckError(f"exponent is {exponent!r}; expected a number of at least 1")
     name, value = driven_by(given)
     return _contact(_POWER_LAW, (effective_modulus, coefficient, n), name, value)
 
@@ -232,7 +233,7 @@ def rounded_punch(
     require_positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
     name, value = driven_by(given)
     if name == "contact_radius" and value <= flat_radius:
-        raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {flat_radius!r}")
+        raise DeckError(f"contact_radius is {value!r}; expected more than the flat radius {flat_radius!r}")
     body = effective_modulus, flat_radius, edge_radius
     return _contact(_ROUNDED_PUNCH, body, name, value)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
+from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
 from .elliptic import EllipticContact, hertz_ellipse
 
@@ -93,7 +94,7 @@ class QuadraticGap:
         hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
         try:
             hertz_ellipse(float(modulus), hessian, normal_load=1.0)
-        except ValueError:  # a line contact
+        except DeckError:  # a line contact
             return None
         lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
         return cls(float(modulus), hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])))

@@ -8,7 +8,6 @@ the case. The pressure is that of a contact without friction if there is none, i
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
+from ..deck.recorded import recorded
 from ..deck.surfaces import Surface
-from ..deck.tables import Deck
+from ..errors import DeckError
 from . import friction
 from .frictionless import AxisymmetricContact, cone, flat_punch, power_law, rounded_punch
 from .hertz_gap import (
@@ -178,10 +178,12 @@ _SHAPES = {
 def _only_surface(dataset: xarray.Dataset) -> Surface | None:
     """Return the only surface of the deck that is not flat; None without one."""
     try:
-        deck = tomllib.loads(str(dataset.attrs.get("deck", "")))
-        bodies = Deck.checked(deck)[0]["body"]
-    except (ValueError, KeyError):  # no deck, or parts from Python
+        tables, gap_given = recorded(str(dataset.attrs.get("deck", "")), "body")
+    except DeckError:  # a surface of a later version
         return None
+    if gap_given or not tables:
+        return None
+    bodies = tables["body"]
     curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s is not None]
     return curved[0] if len(curved) == 1 else None
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..solve import interruption
-from .guard import COMMANDS, standard_streams, warn_plainly
+from .guard import COMMANDS, Content, guarded, standard_streams, warn_plainly
 from .options import plain
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def main() -> None:
     warn_plainly()
     try:
         with standard_streams():
-            _called(sys.argv[1:])
+            guarded(_called)(sys.argv[1:])
             raise SystemExit(0)
     finally:
         # The process ends, and its memory with it: the interpreter need not look for garbage once more.
@@ -54,7 +54,7 @@ def main() -> None:
         gc.freeze()
 
 
-def _called(words: Sequence[str]) -> None:
+def _called(words: Sequence[str]) -> Content:
     """Call the sub-command that the words of a command line name."""
     _import_commands(next((word for word in words if not word.startswith("-")), ""))
     command = COMMANDS.get(words[0]) if words else None
@@ -63,6 +63,7 @@ def _called(words: Sequence[str]) -> None:
         command.function(**given)
     else:
         _whole()()
+    return None
 
 
 def _import_commands(name: str = "") -> None:

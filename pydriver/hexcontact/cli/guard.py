@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 # of the loader, of threads and of the netCDF library
 _NO_MEMORY = ("failed to map segment", "can't start new thread", "Memory allocation (malloc) failure")
+_NO_FILE = f": Error {errno.EMFILE}"  # of the loader
 Content = Mapping[str, Any] | None
 """The object that a command prints with ``--json``; None without it."""
 
@@ -91,6 +92,8 @@ def _report_of(error: BaseException) -> Report | None:
         return Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
         return Report("the machine has not enough memory for this", ResourceError.exit_code)
+    if isinstance(error, ImportError) and _NO_FILE in str(error):
+        return Report(f"{error.path or error.name}: {os.strerror(errno.EMFILE)}", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""
         kind = ResourceError if error.errno in LACKING else DeckError

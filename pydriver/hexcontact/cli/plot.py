@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
-from ..errors import DeckError
+from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
 from .guard import command, print_output
@@ -151,7 +151,7 @@ def point_of(text: str) -> tuple[float, float]:
     """Return a point (m) from text such as "10um,0um"."""
     try:
         x, y = (to_si(_number_or_text(part), LENGTH) for part in text.split(","))
-    except (UnitError, ValueError) as error:
+    except ValueError as error:
         raise DeckError(f"--through {text}: expected two lengths such as 10um,0um{_because(error)}") from None
     return x, y
 
@@ -218,7 +218,7 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     about = f"{what} of {named}" if named else what
     try:
         figure = entry.draw(*shown, **arguments)
-    except (IndexError, ValueError) as error:  # such as no such step, nothing in contact
+    except DeckError as error:  # such as no such step, nothing in contact
         raise DeckError(f"cannot draw {about}: {error}") from error
     return _save(figure, about, picture)
 
@@ -250,9 +250,9 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
         arguments = _arguments(entry, 1, own)
         try:
             figure = entry.draw(result, **arguments)
-        except IndexError as error:
+        except NoSuchStep as error:
             raise DeckError(f"cannot draw {what} of {result.path}: {error}") from error
-        except ValueError as error:
+        except DeckError as error:
             lines.append(f"left out: {what} ({error})")
             continue
         lines.append(f"written: {_save(figure, what, first.with_stem(f'{first.stem}_{what}'))}")

@@ -21,7 +21,7 @@ import numpy as np
 
 from .._version import __version__
 from ..deck.below import Fatigue, Stress
-from ..errors import DeckError
+from ..errors import DeckError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
 from ..interior.tables import read_table, tables_of
@@ -212,7 +212,7 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
         if kind in kinds:
             try:
                 canvas, data = draw(result), io.BytesIO()
-            except ValueError:  # fields that were not kept, tables of points alone
+            except NotInResult:  # fields that were not kept, tables of points alone
                 continue
             canvas.savefig(data, format="png", dpi=160)
             yield title, base64.b64encode(data.getvalue()).decode()

@@ -72,8 +72,8 @@ def export(
     steps = None if step is None else steps_of(step, labels_of(result))
     # first what may be refused
     written = write.histories_to_csv(result, folder, stem) if histories else []
-    written += [write.to_vtk(result, folder, stem, steps, source)] if vtk else []
     written += write.volumes_to_vtk(result, folder, stem) if vtk else []
+    written += [write.to_vtk(result, folder, stem, steps, source)] if vtk else []
     written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps, source)] if ugrid else []
     written += write.to_csv(result, folder, stem, steps, source) if csv else []
     print_output("\n".join(f"written: {path}" for path in written))

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import HexcontactError
+from ..errors import DeckError, HexcontactError
 from ..result.history import (
     contact_size,
     cycles,
@@ -94,6 +94,8 @@ class Summary(NamedTuple):
         The case, if it is known; without it there is no comparison with Hertz.
     result : Result or None
         The result, if it was read from a file.
+    fault : str
+        Reason why its deck is not understood; empty if it is, or has parts from Python.
     """
 
     title: str
@@ -101,6 +103,7 @@ class Summary(NamedTuple):
     parameters: Mapping[str, Any]
     case: Problem | None
     result: Result | None = None
+    fault: str = ""
 
     @classmethod
     def of_run(cls, case: Problem, histories: Sequence[History], refined: Result | None) -> Summary:
@@ -114,12 +117,14 @@ class Summary(NamedTuple):
     def of_result(cls, result: Result) -> Summary:
         """Summarize a file."""
         histories, attributes = histories_of(result), result.dataset.attrs
-        return cls(result.case_title, histories, attributes, _recorded_case(result.deck), result)
+        case, fault = _recorded_case(result.deck)
+        return cls(result.case_title, histories, attributes, case, result, fault)
 
     @property
     def remarks(self) -> list[str]:
         """Sentences about doubtful steps."""
-        return remarks(self.histories, self.parameters)
+        found = remarks(self.histories, self.parameters)
+        return [*found, f"not compared with Hertz: {self.fault}"] if self.fault else found
 
     @property
     def hertz(self) -> list[tuple[str, float, float, str]]:
@@ -206,14 +211,19 @@ def fields_of(result: Result) -> list[str]:
     return [str(name) for name, values in result.dataset.data_vars.items() if values.ndim == 3]
 
 
-def _recorded_case(deck: str) -> Problem | None:
-    """Return the case of the deck in a result; None if parts of it were made in Python."""
+def _recorded_case(deck: str) -> tuple[Problem | None, str]:
+    """Return the case of the deck in a result, or why there is none; no reason if parts are from Python."""
+    from ..deck.recorded import given_in_python
+    from ..deck.toml import parse_toml
     from ..problem.problem import Problem
 
+    name = "deck of the result"
     try:
-        return Problem.from_text(deck) if deck else None
-    except HexcontactError:
-        return None
+        if not deck or given_in_python(parse_toml(deck, name)):
+            return None, ""
+        return Problem.from_text(deck, name), ""
+    except HexcontactError as error:  # of a later version, or of an earlier one that allowed more
+        return None, str(error).splitlines()[0]
 
 
 # --- the history ----------------------------------------------------------------------------------
@@ -301,7 +311,7 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
     try:
         hessian = np.sum([np.zeros((2, 2)), *curvatures], axis=0)
         hertz = hertz_ellipse(case.pair.effective_modulus, hessian, normal_load=load)
-    except ValueError:  # contact along a line or all over, or a gap given in Python
+    except DeckError:  # contact along a line or all over, or a gap given in Python
         return []
     radius = math.sqrt(hertz.semi_major * hertz.semi_minor)
     known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (hertz.approach, "m")}

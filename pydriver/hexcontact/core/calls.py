@@ -47,7 +47,7 @@ class Handle:
         kernel_cache.warn_of_faults()
 
     def _solve(self, procedure: Callable[..., Any], *arguments: Any, held: Any = None) -> Any:
-        """Call a solver; `held` makes an object of its first result, an address, before any warning."""
+        """Call a solver; `held` makes an object of its first result, a handle, before any warning."""
         try:
             first, *others = called(procedure, self._handle, *arguments)
             return [held(first) if held else first, *others]
@@ -60,26 +60,28 @@ class HeldState:
 
     Parameters
     ----------
-    address : int
-        Address of the state.
+    handle : int
+        Handle of the state.
     shape : tuple of int
         Rows and columns of its window.
     """
 
-    def __init__(self, address: int, shape: tuple[int, int]) -> None:
-        self.address, self._shape = address, shape
+    def __init__(self, handle: int, shape: tuple[int, int]) -> None:
+        self.handle, self._shape = handle, shape
         self._places = dict(
-            zip(CORE["fields"], _core.hc_f2py_states.state_places(address).tolist(), strict=True)
+            zip(CORE["fields"], _core.hc_f2py_states.state_places(handle).tolist(), strict=True)
         )
+        if not self._places["pressure"]:
+            raise DeckError("the handle is stale: its state has been freed")
         self._recorded: tuple[Any, ...] = ()
         # at the end of the process arrays may still be in use
-        weakref.finalize(self, _core.hc_f2py_states.free_state, address).atexit = False
+        weakref.finalize(self, _core.hc_f2py_states.free_state, handle).atexit = False
 
     @classmethod
     def copied(cls, shape: tuple[int, int], fields: Sequence[Array], numbers: Sequence[float]) -> HeldState:
         """Return a copy of a state: its fields but for the slip of the step, and its numbers."""
-        if address := _core.hc_f2py_states.hold_state(shape[1], shape[0], *fields, numbers):
-            return cls(address, shape)
+        if handle := _core.hc_f2py_states.hold_state(shape[1], shape[0], *fields, numbers):
+            return cls(handle, shape)
         raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
 
     @staticmethod
@@ -97,7 +99,7 @@ class HeldState:
 
     def take_zones(self) -> NDArray[np.int8]:
         """Return the zones, which the core then forgets."""
-        zones: NDArray[Any] = _core.hc_f2py_states.take_zones(self.address, math.prod(self._shape))
+        zones: NDArray[Any] = _core.hc_f2py_states.take_zones(self.handle, math.prod(self._shape))
         return zones.astype(np.int8).reshape(self._shape)
 
     def record(self, gap: Array, numbers: list[float]) -> None:

@@ -301,8 +301,8 @@ class FrictionalContact(Contact):
             _api.advance_friction,
             *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
             *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
-            *(self.lattice.size, before.address),
-            held=lambda address: HeldState(address, self.lattice.shape),
+            *(self.lattice.size, before.handle),
+            held=lambda handle: HeldState(handle, self.lattice.shape),
         )
         numbers = new_numbers.tolist()
         arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}

@@ -36,10 +36,19 @@ def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/pro
 def resident() -> int:
     """Return the resident memory (bytes) of this process, with the interpreter and all libraries."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE
+        return int(_read("/proc/self/statm").split()[1]) * mmap.PAGESIZE
+    return _taken("rss")
+
+
+def _taken(name: str) -> int:
+    """Return a number of bytes of this process by psutil, else its largest resident memory so far."""
+    import resource
+
     import psutil
 
-    return int(psutil.Process().memory_info().rss)
+    with contextlib.suppress(psutil.Error, OSError):  # without /proc
+        return int(getattr(psutil.Process().memory_info(), name, 0))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def cores() -> int:
@@ -101,7 +110,9 @@ def _left_on_machine() -> int:
         return int(_read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
     import psutil
 
-    return int(psutil.virtual_memory().available)
+    with contextlib.suppress(psutil.Error, OSError):
+        return int(psutil.virtual_memory().available)
+    return os.sysconf("SC_PHYS_PAGES") * mmap.PAGESIZE  # without /proc, which would tell how much is taken
 
 
 def _left_in_limits() -> Iterator[int]:
@@ -111,8 +122,6 @@ def _left_in_limits() -> Iterator[int]:
     allowed = {name: resource.getrlimit(getattr(resource, name))[0] for name in ("RLIMIT_AS", "RLIMIT_DATA")}
     if set(allowed.values()) == {resource.RLIM_INFINITY}:
         return
-    import psutil
-
     try:
         claim(_LOADING + WRITING)
     except OSError:
@@ -121,11 +130,10 @@ def _left_in_limits() -> Iterator[int]:
     import netCDF4  # noqa: F401  # which every run needs
 
     spare = WRITING + _THREAD * (threading.active_count() == 1)
-    taken = psutil.Process().memory_info()
-    used = {"RLIMIT_AS": taken.vms, "RLIMIT_DATA": getattr(taken, "data", 0)}
+    used = {"RLIMIT_AS": "vms", "RLIMIT_DATA": "data"}
     for name, limit in allowed.items():
         if limit != resource.RLIM_INFINITY:
-            yield max(0, limit - used[name] - spare)
+            yield max(0, limit - _taken(used[name]) - spare)
 
 
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
@@ -160,13 +168,21 @@ def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, 
 
 def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
     """Return limit less usage, without the file cache, which the kernel frees on demand."""
+    allowed = _number_in(limit)
+    if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is what no machine has
+        return None
     try:
-        allowed = int(_read(limit))  # "max" is no limit, nor is what no machine has
-        if allowed > _NO_LIMIT:
-            return None
-        used, known = int(_read(usage)), _read(statistics).split()
-        freed = dict(zip(known[::2], known[1::2], strict=True)).get(cache, 0)
-        return max(0, allowed - used + int(freed))
+        used, known = _number_in(usage), _read(statistics).split()
+    except OSError:
+        return None
+    freed = dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0)
+    return None if used is None else max(0, allowed - used + int(freed))
+
+
+def _number_in(path: str | Path) -> int | None:
+    """Return the number in a file of the kernel; None if there is none."""
+    try:
+        return int(_read(path))
     except (OSError, ValueError):
         return None
 

@@ -234,23 +234,6 @@ class Friction(Table):
     )
 
 
-def shear_limits(friction: Friction, x: Array, y: Array) -> tuple[Array | float, float] | None:
-    """Return coefficient and bound (Pa) of the shear traction at points; None if the deck does not tell."""
-    mu: Any = friction.coefficient
-    source = mu.source if isinstance(mu, NodalCoefficient) else None
-    if isinstance(source, tuple):
-        from scipy.interpolate import RectBivariateSpline
-
-        along, across, values = source
-        rows, cols = np.argsort(along), np.argsort(across)
-        mu = RectBivariateSpline(along[rows], across[cols], values[np.ix_(rows, cols)], kx=1, ky=1).ev(x, y)
-    elif callable(source):
-        mu = np.asarray(source(x, y), dtype=float)
-    if isinstance(mu, NodalCoefficient | TwoCoefficients) or not np.isfinite(mu).all():
-        return None
-    return mu, math.inf if friction.shear_limit is None else friction.shear_limit
-
-
 def coulomb(friction: Friction | None, interface: Interface | None) -> float | None:
     """Return the coefficient of friction; NaN if it is not the whole law; None without friction."""
     if friction is None:

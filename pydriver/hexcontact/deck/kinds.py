@@ -270,10 +270,11 @@ class HeightFormula(Text):
     def _parse(self, value: object) -> str:
         text = super()._parse(value)
         try:
-            if not set(Formula(text).names) <= {"x", "y"}:
-                raise ValueError("a formula of x and y alone")
+            formula = Formula(text)
         except ValueError as error:
             refuse(f"expected {self.expected}; it is not {error}")
+        if not set(formula.names) <= {"x", "y"}:
+            refuse(f"expected {self.expected}; it is not a formula of x and y alone")
         return text
 
 

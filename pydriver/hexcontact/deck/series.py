@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic_core import PydanticCustomError
 
 from ..errors import DeckError
-from ..files import require_ordinary, text_of
+from ..files import is_defect, require_ordinary, text_of
 from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
@@ -499,6 +499,8 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
     except DeckError:
         raise
     except Exception as error:  # of any type if the file is damaged
+        if is_defect(error):
+            raise
         raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
     return columns, list(range(1, count + 1))
 

@@ -14,7 +14,7 @@ from ..core.edges import TractionField
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
-from ..errors import DeckError, PathWarning
+from ..errors import DeckError, NotInResult, PathWarning
 from ..variables import EDGES, INTERFACE, TRACTIONS
 from .extremes import with_places
 from .fatigue import SLIPS, histories, parameters_below, tabulated
@@ -214,14 +214,14 @@ class BelowSurface(ABC):
             return {}
         try:
             return self._fields(EDGES, number)
-        except DeckError:
+        except NotInResult:
             return {}
 
     def _change_over(self, numbers: Sequence[int]) -> float | None:
         """Return the largest change of a traction over a cycle in the largest pressure; None if not kept."""
         try:
             start = nodal_tractions(self._loaded([numbers[0] - 1]))[0] if numbers[0] > 1 else np.zeros(())
-        except DeckError:
+        except NotInResult:
             return None
         [end] = nodal_tractions(self._loaded([numbers[-1]]))
         return float(abs(end - start).max() / max(end[0].max(), np.finfo(float).tiny))

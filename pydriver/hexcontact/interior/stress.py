@@ -7,7 +7,6 @@ the result, of which z points into body 1. Stress is positive in tension.
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +19,9 @@ from ..core.contact import ElasticPair
 from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
-from ..deck.tables import Body, Deck
-from ..errors import DeckError
+from ..deck.recorded import recorded
+from ..deck.tables import Body
+from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
 from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS
 from . import fields
@@ -67,15 +67,16 @@ def bodies_of(deck: str) -> Bodies:
     Raises
     ------
     DeckError
-        If they touch all over, and not on the window only.
+        If they touch all over, and not on the window only, or this version does not know a key of theirs.
     """
-    try:
-        tables = Deck.checked(tomllib.loads(deck))[0]
-        bodies = tables["body"]
-    except (ValueError, KeyError):
+    tables, gap_given = recorded(deck, "body", "interface")
+    if not tables:
         return ()
-    if tables.get("interface") and bodies.separation.flat:
-        raise DeckError("there is no stress to compute below the window of a full contact, which has no end")
+    bodies = tables["body"]
+    if tables["interface"] and not gap_given and bodies.separation.flat:
+        raise NotInResult(
+            "there is no stress to compute below the window of a full contact, which has no end"
+        )
     return bodies.body_1, bodies.body_2
 
 
@@ -90,10 +91,10 @@ def material(bodies: Bodies, body: int) -> tuple[float, float]:
     if integer(body, "body") not in (1, 2):
         raise DeckError(f"body = {body}: expected 1 or 2")
     if not bodies:
-        raise DeckError("the result does not say what the bodies are made of")
+        raise NotInResult("the result does not say what the bodies are made of")
     one = bodies[body - 1]
     if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
-        raise DeckError(f"body {body} is rigid: there is no stress to compute in it")
+        raise NotInResult(f"body {body} is rigid: there is no stress to compute in it")
     return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
 
@@ -139,7 +140,7 @@ def tractions(
     if (source or source_of(steps)) == "nodes":
         return at_nodes, "nodes"
     if missing := [name for name in EDGES if any(name not in step for step in steps)]:
-        raise DeckError(
+        raise NotInResult(
             f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
         )
     law = _friction_of(at_nodes[0, 0], friction)

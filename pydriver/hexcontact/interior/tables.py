@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deck.below import Criteria, Fatigue, Stress
-from ..deck.tables import Deck
+from ..deck.recorded import recorded
 from ..errors import DeckError
 from ..files import replacing
 from ..text import quantity
@@ -26,11 +25,14 @@ STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
 
 
 def tables_of(deck: str) -> dict[str, Stress | Fatigue]:
-    """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one."""
-    try:
-        tables = Deck.checked(tomllib.loads(deck))[0]
-    except ValueError:
-        return {}
+    """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one.
+
+    Raises
+    ------
+    DeckError
+        If one has a key or a value that this version does not know.
+    """
+    tables = recorded(deck, "stress", "fatigue").tables
     found: dict[str, Stress | Fatigue] = {}
     for kind in ("stress", "fatigue"):
         for number, table in enumerate(tables.get(kind, []), 1):

@@ -11,6 +11,7 @@ from matplotlib.tri import Triangulation
 
 from ..arrays import Mask
 from ..core import estimators
+from ..errors import NotInResult
 from ..result.history import ROUND
 from ..result.mesh import triangles
 from ..result.raster import SLIP, STICK
@@ -58,7 +59,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
     """
     view = StepView.of(result, step)
     if not view.contact.any():
-        raise ValueError("no node is in contact")
+        raise NotInResult("no node is in contact")
     part = Part.around([view], 1.2)
     width, height = part.size()
     canvas, axes = drawing(ax, max(width, 4.6), height + 0.6, equal=True)

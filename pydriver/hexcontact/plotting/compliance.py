@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
 from ..analytic.shear import CIRCULAR
+from ..errors import NotInResult
 from ..result.view import Results, as_list, dataset_of
 from .history import values_of, vectors_of
 from .registry import SEVERAL_RUNS, figure
@@ -37,22 +38,24 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
     friction = float(attributes.get("friction_coefficient", np.nan))
     frictional = attributes.get("algorithm") in ("static", "incremental") and 0.0 < friction < np.inf
     if not frictional or gap is None:
-        raise ValueError("the tangential compliance is that of spheres with friction")
+        raise NotInResult("the tangential compliance is that of spheres with friction")
     normal = values_of(dataset, "normal_load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     step = int(np.argmax(np.hypot(*load) > 1e-6 * friction * normal))  # 0 also without a tangential load
     if step == 0 or abs(normal[step] - normal[step - 1]) > 1e-6 * normal[step]:
-        raise ValueError("the tangential compliance needs a load step of shear alone after those of pressing")
+        raise NotInResult(
+            "the tangential compliance needs a load step of shear alone after those of pressing"
+        )
     hertz = gap.contact(float(normal[step]))
     if hertz.semi_minor < CIRCULAR * hertz.semi_major:
-        raise ValueError("the tangential compliance is that of spheres with friction")
+        raise NotInResult("the tangential compliance is that of spheres with friction")
     gamma = float(attributes["tangential_compliance_ratio"])
     compliance = 4.0 / float(attributes["effective_modulus"]) * (1.0 + 0.5 * gamma)
     mindlin = MindlinContact(friction, float(normal[step]), hertz.semi_major, compliance)
     size = float(np.hypot(*load[:, step]))
     moved = float((shift[:, step] - shift[:, step - 1]) @ load[:, step]) / size
     if not size < mindlin.sliding_load:
-        raise ValueError("the first tangential load is as large as friction can carry")
+        raise NotInResult("the first tangential load is as large as friction can carry")
     return moved / float(mindlin.shift(size)), size / mindlin.sliding_load
 
 

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Array
 from ..deck.below import Fatigue
+from ..errors import NotInResult
 from ..interior.tables import of_cycle, tables_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of, title_of
@@ -57,7 +58,7 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     section = next((table for table in tables if table.plane), None)
     shown = [table for table in (surface, section) if table]
     if not shown:
-        raise ValueError("the deck has no table [[fatigue]] of the surface or a plane")
+        raise NotInResult("the deck has no table [[fatigue]] of the surface or a plane")
     name = shown[0].parameters[0]
     name = "ruiz_f2" if name == "ruiz" else name
     fields = [of_cycle(result, table) for table in shown]

@@ -14,6 +14,7 @@ from ..analytic.shear import ClosedForms
 from ..arrays import Array
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
+from ..errors import DeckError, NotInResult
 from ..result.history import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import dataset_of, title_of
@@ -141,11 +142,11 @@ def history(
     known = _known(dataset)
     wanted = [*(name for names in panels for name in names), *([over] if over != "step" else [])]
     if unknown := [name for name in wanted if name not in known]:
-        raise ValueError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
+        raise DeckError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
     panels = [names for names in panels if names != (over,)]
     if ax is not None:
         if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
-            raise ValueError("ax holds quantities of one unit; expected some in quantities")
+            raise DeckError("ax holds quantities of one unit; expected some in quantities")
         draw_history(ax, dataset, [name for names in panels for name in names], over)
         return drawing(ax, 0.0, 0.0)[0]
     columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
@@ -241,11 +242,11 @@ def loop(
     """
     dataset = dataset_of(result)
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
-        raise ValueError("a contact without friction has no tangential load")
+        raise NotInResult("a contact without friction has no tangential load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
     if direction is None:
-        raise ValueError("there is no tangential load in this result")
+        raise NotInResult("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
     canvas, axes = drawing(ax, 4.6, 3.8)
@@ -297,7 +298,7 @@ def torsion(
     """
     dataset = dataset_of(result)
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
-        raise ValueError("there is no torque in this result")
+        raise NotInResult("there is no torque in this result")
     canvas, axes = drawing(ax, 4.6, 3.8)
     _draw_loop(
         axes,
@@ -337,7 +338,7 @@ def _draw_loop(
     for number, color in zip(numbers, colors, strict=False):
         place = number if number < 0 else number - 1
         if number == 0 or not -len(found) <= place < len(found):
-            raise ValueError(f"there is no cycle {number}; the history has {len(found)}")
+            raise DeckError(f"there is no cycle {number}; the history has {len(found)}")
         first, last, area = found[place]
         steps = slice(first, last + 1)
         label = f"cycle {place % len(found) + 1}: {worded(area, 'J')}"

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from ..analytic.shear import ClosedForms, PartialSlip
 from ..arrays import Array
+from ..errors import DeckError
 from ..result.result import Result
 from ..result.view import Results, StepView, as_list, dataset_of, title_of
 from ..text import scaled
@@ -187,7 +188,7 @@ def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tup
         labels = [label.replace(", ", "\n") for label in labels]
     count, lines = len(labels), 1 + max(label.count("\n") for label in labels)
     if ax is not None and count > 1:
-        raise ValueError(f"ax holds the map of one load step, not of {count}")
+        raise DeckError(f"ax holds the map of one load step, not of {count}")
     if count == 1:
         figure, axes = drawing(ax, *part.size())
         part.show(axes)

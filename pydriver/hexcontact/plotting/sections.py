@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from ..analytic.shear import PartialSlip
 from ..arrays import Array
+from ..errors import DeckError, NotInResult
 from ..result.interpolate import Line, section_line
 from ..result.result import Result
 from ..result.view import StepView
@@ -97,7 +98,7 @@ class Cut:
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
         if through and not ((index > -1.0) & (index < lattice.shape[::-1])).all(axis=1).any():
-            raise ValueError(f"expected a line that crosses the window; it goes through {through} m")
+            raise DeckError(f"expected a line that crosses the window; it goes through {through} m")
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
         on_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
         at_nodes = on_nodes and nodes.size < _APART and len(views) == 1
@@ -111,7 +112,7 @@ class Cut:
     def hertz(self, view: StepView, place: Array) -> Array:
         """Return the pressure of Hertz (Pa) at distances from the start (m)."""
         if view.hertz is None:
-            raise ValueError("there is no Hertz solution for this gap")
+            raise NotInResult("there is no Hertz solution for this gap")
         x, y = self.line.points(place)
         return view.hertz.pressure(x - view.center[0], y - view.center[1])
 
@@ -339,7 +340,7 @@ def tractions(
     cut = Cut.of(views, angle, through)
     if ax is not None:
         if len(views) > 1:
-            raise ValueError(f"ax holds the tractions of one load step, not of {len(views)}")
+            raise DeckError(f"ax holds the tractions of one load step, not of {len(views)}")
         draw_shear(ax, views[0], exact[0], cut)
         return drawing(ax, 0.0, 0.0)[0]
     if len(views) > 1:

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
+from ..errors import NotInResult
 from ..interior.stress import LOADED, below, bodies_of
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
@@ -109,7 +110,7 @@ def trailing_edge(result: Result, depth: float | None = None, angle: float = 0.0
     """
     views = [StepView.of(result, number) for number in kept_steps(result)]
     if not views:
-        raise ValueError("the pressure was not kept (output.fields)")
+        raise NotInResult("the pressure was not kept (output.fields)")
     largest = max(views, key=lambda view: int(view.contact.sum()))
     cut = Cut.of([largest], angle, None)
     place = np.linspace(0.0, cut.line.length, 16 * _POINTS)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..errors import NotInResult
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled
 from .registry import figure
@@ -45,11 +46,11 @@ def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | N
     """
     dataset = dataset_of(result)
     if "wear_cycles" not in dataset or "worn_depth" not in dataset:
-        raise ValueError("the surfaces do not wear; a deck with [wear] is needed")
+        raise NotInResult("the surfaces do not wear; a deck with [wear] is needed")
     kept = np.isfinite(dataset["worn_depth"].values).any(axis=(1, 2))
     steps = np.flatnonzero((dataset["wear_cycles"].values >= 0.0) & kept)
     if not steps.size:
-        raise ValueError("no fields of cycles that wear the surfaces were kept")
+        raise NotInResult("no fields of cycles that wear the surfaces were kept")
     deepest = dataset["max_worn_depth"].values[steps]
     wanted = np.linspace(0.0, deepest[-1], min(_CURVES, steps.size))
     places = np.unique(np.abs(deepest[:, None] - wanted).argmin(axis=0))

@@ -83,14 +83,17 @@ class Gap:
         """Return the gap (m) at points of the plane."""
         assert not isinstance(self.source, np.ndarray)
         try:
-            gap = reals(self.source(x, y), "gap")
+            found = self.source(x, y)
+        except DeckError:
+            raise
         except (TypeError, ValueError) as error:
-            if isinstance(error, DeckError) or not _takes_numbers(self.source, x, y):
+            if not _takes_numbers(self.source, x, y):
                 raise
             raise DeckError(
                 "gap: expected a function of two arrays, x and y (m); this one takes numbers only: use "
                 "functions of numpy, or numpy.vectorize(gap)"
             ) from error
+        gap = reals(found, "gap")
         if gap.shape != np.shape(x):
             raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
         if (bad := np.isnan(gap)).any():

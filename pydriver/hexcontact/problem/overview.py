@@ -15,7 +15,7 @@ from ..deck.kinds import Quantity
 from ..deck.surfaces import Surface
 from ..deck.tables import Body, Bulk
 from ..text import Row, percent, quantity
-from ..variables import BULK_STRESS, INTERFACE, LOADS
+from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility
 from .estimates import work
 from .loads import LoadStep
@@ -31,6 +31,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "tangential_compliance_ratio": case.pair.gamma,
         "friction_coefficient": case.friction_coefficient,
         **({"friction_law": law_in_words(case)} if math.isnan(case.friction_coefficient) else {}),
+        **({SHEAR_LIMIT: law.shear_limit} if (law := case.deck.friction) and law.shear_limit else {}),
         **(dict(zip(INTERFACE, case.interface, strict=True)) if case.deck.interface else {}),
         "algorithm": case.solver.algorithm,
         "coupling": case.solver.coupling,

@@ -19,7 +19,7 @@ from ..core.lattice import Lattice
 from ..core.measures import bulk_strain
 from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
-from ..deck.interface import coulomb
+from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
 from ..deck.tables import BULK_STATES, Accuracy, Grid
@@ -156,7 +156,7 @@ class Problem:
         data = plain(given.data)
         if self._gap.given:
             # this shape is refused in a deck
-            data["body"]["1"]["surface"] = {"shape": "python"}
+            data["body"]["1"]["surface"] = {"shape": FROM_PYTHON}
         if self._friction.varies:
             data["friction"]["coefficient"] = self._friction.in_deck
         return given.remark + as_toml(data)
@@ -377,7 +377,9 @@ class Problem:
         if self.adaptive:
             sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]
-        third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
+        from .refinement import LEAST_LEVELS, Trial
+
+        third = Trial(LEAST_LEVELS - 1).case(self).lattice.size
         if third <= wanted.max_nodes:
             return []
         sentence = (

@@ -12,8 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.lattice import Lattice
 from ..deck.tables import BULK_STATES
-from ..variables import FIELDS, INTERFACE, LARGEST, NOT_KEPT, RESIDUALS, VARIABLES, names_where
+from ..variables import (
+    FIELDS,
+    FIXED,
+    INTERFACE,
+    LARGEST,
+    NOT_KEPT,
+    RESIDUALS,
+    SHEAR_LIMIT,
+    TRACTIONS,
+    VARIABLES,
+    names_where,
+)
 from .layout import Metadata, history_of, lattice_of
 from .step import Step
 
@@ -82,8 +94,7 @@ _LATER = {
     INTERFACE[0]: _is_positive,
     INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
     INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
-    "cycle_tolerance": _is_positive,
-    "wear_tolerance": _is_positive,
+    **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance", "wear_tolerance"), _is_positive),
     "entry": _one_of("implicit", "interpolated"),
     "bulk_state": _one_of(*BULK_STATES),
     **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
@@ -200,15 +211,35 @@ def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, 
 
 
 def fault_of_fields(dataset: xarray.Dataset) -> str:
-    """Return a fault of the fields of a result, which are read step by step; empty if there is none."""
+    """Return a fault of a result without a seal, whose fields are read step by step; else nothing."""
+    try:
+        tomllib.loads(str(dataset.attrs["deck"]))
+    except tomllib.TOMLDecodeError as error:
+        return f"its deck is no TOML: {error}"
+    lattice = lattice_of(dataset)
     numbers, every = dataset["step"].values, int(dataset.attrs["output_every"])
     for place, number in enumerate(numbers):
         step = dataset.isel(step=place)
         fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
         history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
         kept = number % every == 0 or number == numbers[-1]
-        if fault := _fault_of_values(fields, history, float(dataset.attrs["lattice_spacing"]), kept):
+        fault = _fault_of_values(fields, history, lattice.spacing, kept)
+        if fault := fault or (_fault_of_loads(fields, history, lattice) if kept else ""):
             return f"{fault} in step {number}"
+    return ""
+
+
+def _fault_of_loads(fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], lattice: Lattice) -> str:
+    """Return a load that is not the resultant of the tractions at the nodes; empty if there is none."""
+    p, q_x, q_y = (fields.get(name) for name in TRACTIONS)
+    parts = {} if p is None else {"normal_load": p}
+    if q_x is not None and q_y is not None:
+        parts |= {"tangential_load_x": q_x, "tangential_load_y": q_y}
+        parts["torque"] = np.array([lattice.x * q_y, -lattice.y * q_x])
+    for name, values in parts.items():
+        size = abs(values).sum() * lattice.cell_area
+        if name in history and abs(values.sum() * lattice.cell_area - history[name]) > _CLOSE * size:
+            return f"{name} is not the resultant of the tractions"
     return ""
 
 
@@ -310,7 +341,7 @@ def _fault_of_control(step: Step) -> str:
 
 def _fault_of_step(step: Step) -> str:
     for name, values in step.fields.items():
-        if name not in FIELDS and name != "initial_gap":
+        if name not in FIELDS and name not in FIXED:
             return f"{name} is no field"
         if values.shape != step.lattice.shape:
             return f"{name} has the shape {values.shape}, not {step.lattice.shape}"

@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._version import __version__
 from ..deck.below import Fatigue
-from ..errors import DeckError
-from ..files import replacing
+from ..errors import DeckError, NoSuchStep
+from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.stress import TENSOR
 from ..interior.tables import as_volume, computed, tables_of
 from ..text import escaped, visible
-from ..variables import CONVENTIONS, FIELDS, VARIABLES, VECTORS
+from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh
 from .interpolate import is_kept, with_shown
+from .netcdf import is_mesh
 from .result import Result
 
 if TYPE_CHECKING:
@@ -49,7 +51,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
     if numbers is not None:
         try:
             wanted = [int(result.step(number)["step"]) for number in numbers]
-        except IndexError as error:
+        except NoSuchStep as error:
             raise DeckError(f"--step: {error}") from error
     kept = [number for number in wanted if any(is_kept(field) for _, field in _fields(result, number))]
     if not kept or (numbers is not None and len(kept) < len(wanted)):
@@ -147,10 +149,13 @@ def histories_to_csv(result: Result, folder: Path, stem: str) -> list[Path]:
         raise DeckError("--histories: expected a table [[fatigue]] in the deck, which says of which points")
     _make(folder)
     written = [folder / f"{stem}_{name}_histories.csv" for name in tables]
+    for target in written:
+        require_replaceable(target, "node_id,load_step,")
     for target, table in zip(written, tables.values(), strict=True):
         blocks = result.stress_histories(table.segment, table.steps, table.body, **table.where)
-        for number, block in enumerate(blocks):
-            block.to_csv(target, mode="a" if number else "w", header=not number, float_format="%.8g")
+        with replacing(target) as path:
+            for number, block in enumerate(blocks):
+                block.to_csv(path, mode="a", header=not number, float_format="%.8g")
     return written
 
 
@@ -159,10 +164,12 @@ def _series(folder: Path, stem: str, kind: str, pages: Mapping[int, str]) -> Pat
     steps = list(pages)
     width = max(4, len(str(steps[-1])))
     names = [f"{stem}_{number:0{width}d}.{kind}" for number in steps]
+    series = folder / f"{stem}.pvd"
+    for path in (series, *(folder / name for name in names)):
+        require_replaceable(path)
     for name, page in zip(names, pages.values(), strict=True):
         with replacing(folder / name) as path:
             path.write_text(page, encoding="utf-8")
-    series = folder / f"{stem}.pvd"
     sets = "".join(
         f'    <DataSet timestep="{number}" part="0" file="{escaped(name)}"/>\n'
         for number, name in zip(steps, names, strict=True)
@@ -170,6 +177,7 @@ def _series(folder: Path, stem: str, kind: str, pages: Mapping[int, str]) -> Pat
     with replacing(series) as path:
         path.write_text(
             '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
+            f"<!-- {MADE_BY} -->\n"
             f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n",
             encoding="utf-8",
         )
@@ -222,7 +230,7 @@ def _vts(result: Result, found: xarray.Dataset) -> str:
 def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
     """Return a file of VTK in XML about a load step."""
     title, source = result.case_title or "hexcontact", result.dataset.attrs["source"]
-    about = re.sub("-(?=-)", "- ", escaped(f"{title}, load step {number}; {source}; SI units"))
+    about = re.sub("-(?=-)", "- ", escaped(f"{title}, load step {number}; {source}; {MADE_BY}; SI units"))
     return (
         f'<?xml version="1.0"?>\n<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" '
         f'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<!-- {about} -->\n{grid}</VTKFile>\n'
@@ -232,8 +240,9 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
 def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
     """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
     fields = dict(_fields(result, number, source))
-    if "initial_gap" in result.dataset:
-        yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
+    for name in FIXED:
+        if name in result.dataset:
+            yield name, result.dataset[name].values.ravel(), VARIABLES[name].unit
     for vector, parts in VECTORS.items():
         if all(part in fields for part in parts):
             columns = [fields.pop(part).ravel() for part in parts]
@@ -295,15 +304,18 @@ def to_ugrid(
 
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
+    if target.is_file() and target.stat().st_size and not is_mesh(target):
+        raise DeckError(f"{target} is there and was not made by hexcontact; delete it or choose another name")
     with replacing(target) as path, netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs
         named = {name: known[name] for name in ("title", "source", "history") if name in known}
-        file.setncatts({"Conventions": CONVENTIONS, **named})
+        about = {"content": "fields on a mesh", "hexcontact_version": __version__}
+        file.setncatts({"Conventions": CONVENTIONS, **about, **named})
         file.createDimension("step", len(steps))
         mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
-        names = [name for name in ("initial_gap", *FIELDS) if name in result.dataset]
+        names = [name for name in (*FIXED, *FIELDS) if name in result.dataset]
         columns = {}
         for name in names:
             variable = VARIABLES[name]
@@ -311,7 +323,7 @@ def to_ugrid(
             packed = {"zlib": True, "complevel": 1, "fill_value": fill}
             dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
             column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
-            if name == "initial_gap":
+            if name in FIXED:
                 column[...] = result.dataset[name].values.ravel()
             else:
                 columns[name] = column
@@ -360,17 +372,20 @@ def to_csv(
 
     steps = [] if numbers is None else kept_steps(result, numbers)
     _make(folder)
-    written = [folder / f"{stem}_history.csv"]
+    written = [folder / f"{stem}_history.csv", *(folder / f"{stem}_{number:04d}.csv" for number in steps)]
+    history = result.history.rename(columns=_with_unit).map(_cell)
+    require_replaceable(written[0], ",".join([str(history.index.name), *history.columns[:2]]))
+    for target in written[1:]:
+        require_replaceable(target, "row,col,x [m],")
     with replacing(written[0]) as path:
-        result.history.rename(columns=_with_unit).map(_cell).to_csv(path)
-    for number in steps:
+        history.to_csv(path)
+    for number, target in zip(steps, written[1:], strict=True):
         rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
         columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
         table = pd.DataFrame(
             {k: v.ravel() for k, v in (columns | dict(_fields(result, number, source))).items()}
         )
-        written.append(folder / f"{stem}_{number:04d}.csv")
-        with replacing(written[-1]) as path:
+        with replacing(target) as path:
             table.rename(columns=_with_unit).to_csv(path, index=False)
     return written
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array
+from ..errors import NotInResult
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
 from .history import step_rows
@@ -64,7 +65,7 @@ def _pictures(dataset: xarray.Dataset) -> Iterable[str]:
     """Yield maps of the last step: pressure, and zones of a contact with friction."""
     try:
         view = StepView(dataset, -1)
-    except ValueError:  # not kept
+    except NotInResult:  # the pressure was not kept
         return
     if not view.contact.any():
         return

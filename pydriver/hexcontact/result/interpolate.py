@@ -8,7 +8,6 @@ and stick, which lie between the nodes, unless the source "nodes" is asked for.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
@@ -21,11 +20,9 @@ from ..core.edges import ContactEdges, Limits, TractionField
 from ..core.interpolation import crossings, linear, nearest, section_ends
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
-from ..deck.interface import shear_limits
-from ..deck.tables import Deck
-from ..errors import DeckError
+from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
-from ..variables import EDGES, NOT_KEPT, TRACTIONS, VARIABLES
+from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
@@ -102,13 +99,13 @@ def traction_field(
     zero = np.zeros(lattice.shape)
     kept = {name: np.asarray(values) for name, values in fields.items() if is_kept(np.asarray(values))}
     if "pressure" not in kept:
-        raise DeckError("the pressure was not kept (output.fields, output.every)")
+        raise NotInResult("the pressure was not kept (output.fields, output.every)")
     tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
     if source == "nodes" or (source is None and not (sharp and "gap" in kept)):
         return TractionField.of_nodes(tractions, lattice.basis, lattice.start)
     if not sharp or "gap" not in kept:
         why = "there are none with a compliant interface" if not sharp else "the gap was not kept"
-        raise DeckError(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
+        raise NotInResult(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
     zone = kept.get("zone")
     contact = tractions[0] > 0.0 if zone is None else zone > 0
     sheared = zone is not None and all(name in kept for name in TRACTIONS)
@@ -126,11 +123,12 @@ def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = No
     for name in ("pressure", "gap") if source == "edges" else ("pressure",):
         if name not in fields or not is_kept(fields[name]):
             at = int(step["step"])
-            raise DeckError(f"the {name} of step {at} was not kept (output.fields, output.every)")
-    from ..analytic.hertz_gap import is_compliant
+            raise NotInResult(f"the {name} of step {at} was not kept (output.fields, output.every)")
+    from ..analytic.hertz_gap import friction_of, is_compliant
 
-    limits = limits_of(step.attrs, lattice) if "traction_x" in fields else None
-    return traction_field(lattice, fields, limits, source, not is_compliant(step.attrs))
+    known = step.attrs
+    limits = limits_of(friction_of(known), step, float(known.get(SHEAR_LIMIT, math.inf)))
+    return traction_field(lattice, fields, limits, source, not is_compliant(known))
 
 
 def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
@@ -142,18 +140,16 @@ def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None
     return step.assign({name: step[name].copy(data=found[name]) for name in names})
 
 
-def limits_of(attributes: Mapping[Any, Any], lattice: Lattice) -> Limits | None:
-    """Return coefficient of friction and bound (Pa) at the nodes of a result; None if they are unknown."""
-    from ..analytic.hertz_gap import friction_of
+def limits_of(friction: float, fields: Mapping[Any, ArrayLike], bound: float) -> Limits | None:
+    """Return coefficient of friction at the nodes and bound (Pa) of the shear traction; None if unknown.
 
-    mu = friction_of(attributes)
-    if not math.isnan(mu):
-        return (mu, math.inf) if 0.0 < mu < math.inf else None
-    try:
-        friction = Deck.checked(tomllib.loads(str(attributes.get("deck", ""))))[0].get("friction")
-    except ValueError:
+    The coefficient is one number, or NaN if it is among the fields of a step: it varies, or has a bound.
+    """
+    if not math.isnan(friction):
+        return (friction, bound) if 0.0 < friction < math.inf else None
+    if NODAL_FRICTION not in fields:  # of another law
         return None
-    return shear_limits(friction, lattice.x, lattice.y) if friction else None
+    return np.nan_to_num(np.asarray(fields[NODAL_FRICTION])), bound  # NaN where no step had a node
 
 
 class PressureField:
@@ -280,16 +276,17 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
     for name in names:
         if name not in fields:
             known = name in VARIABLES and VARIABLES[name].is_field
-            what = "was not kept (output.fields)" if known else "is no field"
             hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
-            raise DeckError(f"{name} {what}{hint}")
+            if known:
+                raise NotInResult(f"{name} was not kept (output.fields){hint}")
+            raise DeckError(f"{name} is no field{hint}")
     found = {name: np.asarray(fields[name]) for name in names or fields}
     kept = {name: values for name, values in found.items() if is_kept(values)}
     for name in names:
         if name not in kept:
-            raise DeckError(f"{name} of step {step} was not kept (output.every)")
+            raise NotInResult(f"{name} of step {step} was not kept (output.every)")
     if not names and not any(VARIABLES[name].is_field for name in kept):
-        raise DeckError(f"no field of step {step} was kept (output.fields, output.every)")
+        raise NotInResult(f"no field of step {step} was kept (output.fields, output.every)")
     return kept
 
 

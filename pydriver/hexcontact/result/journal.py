@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
-from ..files import beginning, reading
+from ..files import beginning, made, reading, require_kinds
 from ..variables import VARIABLES
 from .check import fault_of_record, fault_of_sequence
 from .layout import Metadata, assemble
@@ -46,6 +46,12 @@ _KIND = "a record of a journal"
 _LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _NO_FOLLOWER = "{} does not belong to the records before it: {}"
 _FIELDS, _COMPANION = "fields", "companion"  # parts with fields: of the step, of a second solution
+_PARTS = {
+    "index": int,
+    **dict.fromkeys(("lattice", "history", "control"), dict),
+    _FIELDS: list,
+    _COMPANION: list,
+}
 
 
 def journal_of(path: Path) -> Path:
@@ -143,7 +149,7 @@ class Journal:
 
     def remove(self) -> None:
         """Delete all `files`, but not the lock."""
-        for path in self.records:
+        for path in reversed(self.records):  # what is left if it is killed is the beginning of a run
             path.unlink(missing_ok=True)
         self.tidy()
 
@@ -355,7 +361,7 @@ def read_step(
         else:
             members = {f"{_FIELDS}_{number}.npy": names for number, names in enumerate(known[_FIELDS])}
             fields = Stored(path, file, members)
-        lattice = Lattice(**known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
+        lattice = made(Lattice, known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
         step = Step(
             *(known["index"], lattice, fields, known["history"]),
             companion=_fields(file, _COMPANION, known) if companion else {},
@@ -411,16 +417,19 @@ def _record(folder: Path, number: int) -> Path:
 def _known(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     """Return the text of a record."""
     known: dict[str, Any] = json.loads(_array(archive, _ABOUT).tobytes())
+    require_kinds(known)
     if known["journal_version"] != VERSION:
         raise DeckError(
             f"{path} was kept by hexcontact {known['hexcontact_version']}, whose journal has the "
             f"layout {known['journal_version']}; this version reads layout {VERSION}"
         )
+    require_kinds(known, **_PARTS)
+    require_kinds(known["lattice"], origin=list)
     return known
 
 
 def _about(known: Mapping[str, Any]) -> Metadata | Growth:
-    return Growth(**known["growth"]) if "growth" in known else Metadata.from_plain(known["metadata"])
+    return made(Growth, known["growth"]) if "growth" in known else Metadata.from_plain(known["metadata"])
 
 
 def _fields(archive: zipfile.ZipFile, part: str, known: Mapping[str, Any]) -> dict[str, NDArray[Any]]:

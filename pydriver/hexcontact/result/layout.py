@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..core.lattice import Lattice
+from ..errors import NoSuchStep
+from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
-from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES, Variable
+from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
 
 if TYPE_CHECKING:
@@ -101,8 +103,9 @@ class Metadata:
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
         """Return the metadata of what `dataclasses.asdict` gave, after JSON."""
+        require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
-        return cls(**{**values, **tuples})
+        return made(cls, {**values, **tuples})
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
@@ -233,12 +236,15 @@ class Layout:
             return values
         return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
 
-    def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
-        """Return the initial gap on the whole window: the `known` part, completed by `step`."""
-        if known is None:
-            return self.padded("initial_gap", step)
-        unknown = np.isnan(known)
-        return np.where(unknown, self.padded("initial_gap", step), known) if unknown.any() else known
+    def complete_fixed(self, known: dict[str, NDArray[Any]], step: Step) -> None:
+        """Complete the `known` part of the fields of all steps, on the whole window, by those of `step`."""
+        for name in FIXED:
+            if name in self.variables and name in step.fields:
+                before = known.get(name)
+                if before is None:
+                    known[name] = self.padded(name, step)
+                elif (unknown := np.isnan(before)).any():
+                    known[name] = np.where(unknown, self.padded(name, step), before)
 
 
 def _union(windows: Sequence[Lattice]) -> Lattice:
@@ -276,7 +282,7 @@ def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
         return dataset.isel(step=number)
     if number in numbers:
         return dataset.sel(step=number)
-    raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+    raise NoSuchStep(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
 
 
 def history_of(dataset: xarray.Dataset) -> list[str]:
@@ -317,17 +323,14 @@ def assemble(
     values = {
         name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
         for name in layout.fields
-        if name != "initial_gap"
+        if name not in FIXED
     }
-    gap = None
+    fixed: dict[str, NDArray[Any]] = {}
     for position, step in enumerate(steps):
         for name, array in values.items():
             array[position] = layout.field(name, position, step)
-        if "initial_gap" in step.fields:
-            gap = layout.initial_gap(gap, step)
-    if gap is not None:
-        values["initial_gap"] = gap
-    values |= layout.histories() | layout.coordinates() | layout.trials
+        layout.complete_fixed(fixed, step)
+    values |= fixed | layout.histories() | layout.coordinates() | layout.trials
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

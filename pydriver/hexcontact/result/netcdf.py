@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..errors import DeckError
 from ..files import reading
-from ..variables import SCHEMA_VERSION, VARIABLES
+from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
 from .layout import COORDINATES, Layout, Metadata
@@ -97,19 +97,18 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             for column, values in given:
                 column[...] = values
             mesh.write_mesh(file, layout.window)
-        gap_column = columns.pop("initial_gap", None)
-        gap: Any = None
+        fixed: dict[str, NDArray[Any]] = {}
+        of_all_steps = {name: columns.pop(name) for name in FIXED if name in columns}
         block: list[Step] = []
         for position, step in enumerate(steps):
             block.append(step)
             if len(block) == _block(layout) or position == len(layout.steps) - 1:
                 _write_block(columns, layout, position - len(block) + 1, block)
                 block.clear()
-            if gap_column is not None:
-                gap = layout.initial_gap(gap, step)
-        if gap_column is not None:
-            with _alone():
-                gap_column[...] = gap
+            layout.complete_fixed(fixed, step)
+        with _alone():
+            for name, column in of_all_steps.items():
+                column[...] = fixed[name]
 
 
 @functools.cache
@@ -233,6 +232,11 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
                 f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
                 "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
             )
+
+
+def is_mesh(path: Path) -> bool:
+    """Test whether a file has the fields of a result on a mesh, as `hexcontact.result.export` writes it."""
+    return {"content", "hexcontact_version"} <= _names_of_attributes(path)
 
 
 def stress_files(deck: str, output: Path) -> Iterable[Path]:

@@ -20,7 +20,16 @@ from ..core.lattice import Lattice
 from ..files import reading
 from ..text import did_you_mean
 from ..variables import EDGES, TRACTIONS
-from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line, traction_field
+from .interpolate import (
+    Line,
+    Point,
+    chosen_fields,
+    interpolate,
+    limits_of,
+    profile,
+    section_line,
+    traction_field,
+)
 
 if TYPE_CHECKING:
     from zipfile import ZipFile
@@ -117,9 +126,8 @@ class Step:
         Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
     sharp : bool
         Whether the bodies touch without a compliant layer, so that the contact has a sharp edge.
-    limits : tuple of array_like or None
-        Coefficient of friction and bound of the shear traction (Pa), where these are the law of friction;
-        None for a step read from a file.
+    shear_limit : float
+        Bound of the shear traction, Pa; inf: none.
     """
 
     index: int
@@ -134,7 +142,7 @@ class Step:
     bodies: Sequence[Any] = ()
     friction: float = 0.0
     sharp: bool = True
-    limits: Limits | None = None
+    shear_limit: float = math.inf
 
     def __post_init__(self) -> None:
         if isinstance(self.fields, Stored):
@@ -216,6 +224,11 @@ class Step:
         names = (*TRACTIONS, *EDGES)
         known = {name: self.fields[name] for name in names if name in self.fields}
         return traction_field(self.lattice, known, self.limits, source, self.sharp)
+
+    @property
+    def limits(self) -> Limits | None:
+        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
+        return limits_of(self.friction, self.fields, self.shear_limit)
 
     def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
         """Return a field at points of the plane; see `hexcontact.Result.at`."""

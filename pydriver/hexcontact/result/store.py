@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
-from ..lock import Lock, names_a_run
+from ..lock import Lock, begun, names_a_run
 from .journal import STOPPED, SUFFIX, Description, Journal, journal_of, read_step, write_record
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
@@ -152,10 +152,12 @@ class Store:
         store._at(path)
         if not store.folder.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(store.folder))
+        lock = store.folder / "lock"
         with store.writing("the journal", missing=True):
-            store._lock = Lock(store.folder / "lock", store.path)
+            began = begun(lock)
+            store._lock = Lock(lock, store.path)
         try:
-            return store, store._read_again()
+            return store, store._read_again(began)
         except BaseException:
             store.close()
             raise
@@ -181,8 +183,11 @@ class Store:
             if not os.access(self.path.parent, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    def _read_again(self) -> Step | None:
-        """Read all records, so that damage shows before the next step; return the last one."""
+    def _read_again(self, began: float | None) -> Step | None:
+        """Read all records, so that damage shows before the next step; return the last one.
+
+        The time at which the run `began` tells whether a complete output is its own if it left no records.
+        """
         journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
         left = trials.read()[0] if trials else None
         output = None
@@ -193,6 +198,11 @@ class Store:
             run = left.run if left else journal.run if journal else output.dataset.attrs.get("run")
             ours, steps, complete = output.dataset.attrs.get("run") == run, len(output), output.complete
             output.close()
+        if not (journal or trials) and output is not None and began and began > self.path.stat().st_mtime:
+            raise DeckError(
+                f"the run that would have replaced {self.path} ended before its first load step; run it "
+                "again with --overwrite (overwrite=True in Python)"
+            )
         if ours and complete:  # killed while it deleted the journal
             remove_all(self.folder)
             return None

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import DeckError
-from ..files import beginning, reading, replacing
+from ..files import beginning, made, reading, replacing, require_kinds
 from ..lock import names_a_run
 from .journal import Journal, journal_of
 from .layout import Metadata
@@ -91,6 +91,9 @@ class TrialFolder:
         path = self.ledger
         with reading(path, "a list of finished lattices"):
             about = json.loads(path.read_bytes())
+            require_kinds(about, solutions=list)
+            for solution in about["solutions"]:
+                require_kinds(solution, origin=list)
             if about["trials_version"] not in (1, VERSION):
                 raise DeckError(
                     f"{path} has the layout {about['trials_version']}; this version reads {VERSION}"
@@ -99,7 +102,7 @@ class TrialFolder:
             if about["trials_version"] == VERSION and digest != _digest(about):
                 raise DeckError(f"{path} is damaged: its content is not what was written (SHA-256)")
             found = [
-                Solution(**{**solution, "origin": tuple(solution["origin"])})
+                made(Solution, {**solution, "origin": tuple(solution["origin"])})
                 for solution in about["solutions"]
             ]
             return Metadata.from_plain(about["metadata"]), found

@@ -13,6 +13,7 @@ from ..analytic.hertz_gap import QuadraticGap, friction_of, is_worn, pressure_is
 from ..arrays import Array, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.interpolation import linear
+from ..errors import NotInResult
 from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
 from .interpolate import is_kept, tractions_of
@@ -134,15 +135,15 @@ class StepView:
         words = spelled(name)
         if name not in self.data:
             if self.friction == 0.0 and name in VARIABLES and VARIABLES[name].frictional:
-                raise ValueError(f"a contact without friction has no {words}")
+                raise NotInResult(f"a contact without friction has no {words}")
             if name in WORN and "wear_cycles" not in self.data:
-                raise ValueError("the surfaces do not wear; a deck with [wear] is needed")
-            raise ValueError(f"the {words} was not kept (output.fields)")
+                raise NotInResult("the surfaces do not wear; a deck with [wear] is needed")
+            raise NotInResult(f"the {words} was not kept (output.fields)")
         values = self.data[name].values
         if not is_kept(values):
-            raise ValueError(f"the {words} of step {self.number} was not kept (output.every)")
+            raise NotInResult(f"the {words} of step {self.number} was not kept (output.every)")
         if (abs(values) > LARGEST).any():  # of a changed file, whose sums would overflow
-            raise ValueError(f"the {words} holds numbers that no contact has")
+            raise NotInResult(f"the {words} holds numbers that no contact has")
         return np.asarray(values, dtype=float)
 
     @property
@@ -155,7 +156,7 @@ class StepView:
             If the contact has no friction, or the output lacks its zones.
         """
         if self.friction == 0.0:
-            raise ValueError("a contact without friction has no stick and slip zones")
+            raise NotInResult("a contact without friction has no stick and slip zones")
         return np.asarray(self.field("zone") == STICK)
 
     def edges(self, stride: int = 1) -> ContactEdges:

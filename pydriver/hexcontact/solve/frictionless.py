@@ -22,7 +22,6 @@ from ..core.friction import ContactState
 from ..core.lattice import Lattice
 from ..core.measures import measures
 from ..deck.below import cycle_of
-from ..deck.interface import coulomb
 from ..deck.units import readable
 from ..errors import DeckError
 from ..problem.checks import stage_of
@@ -31,7 +30,7 @@ from ..problem.problem import Problem
 from ..problem.window import grown, rim_sides
 from ..result.step import Step
 from ..text import listed
-from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_where
+from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, NODAL_FRICTION, STATE, WORN, names_where
 from .events import Listener
 
 # Fields that Python holds while a step is solved and measured. Without friction: initial gap, pressure, gap
@@ -323,6 +322,8 @@ class Window(ABC, Generic[S]):
         fields["gap"] = self._where_touching(solution.gap)
         if self.worn is not None:
             fields["worn_depth"] = self.worn
+        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
+            fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
         for body in (1, 2):
             wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
             if wanted:
@@ -348,9 +349,9 @@ class Window(ABC, Generic[S]):
             load_fraction=(target.index + 1) / len(self.case.load_steps),
             ramp_done=target.fraction,
             bodies=(self.case.body_1, self.case.body_2),
-            friction=coulomb(self.case.deck.friction, self.case.deck.interface) or 0.0,
+            friction=self.case.friction_coefficient,
             sharp=self.case.deck.interface is None,
-            limits=self.friction.limits if self.case.frictional else None,
+            shear_limit=self.friction.shear_limit,
         )
 
     def _where_touching(self, values: Array) -> Array:

@@ -156,8 +156,11 @@ def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     assert case.accuracy is not None
     try:
         finer = Trial(last.level + 1).case(case)
-        # a window that grew grows again
-        nodes = max(finer.lattice.size, math.ceil(RATIO**2 * last.nodes))
+        nodes = finer.lattice.size
+        if (
+            last.nodes > Trial(last.level, last.copy).case(case).lattice.size
+        ):  # a window that grew grows again
+            nodes = max(nodes, math.ceil(RATIO**2 * last.nodes))
         if nodes > case.accuracy.max_nodes:
             return (
                 f"the next lattice has about {nodes:,} nodes, more than "

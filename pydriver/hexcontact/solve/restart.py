@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from .._version import __version__
+from ..deck.recorded import given_in_python
+from ..deck.toml import parse_toml
 from ..errors import DeckError, HexcontactError
 from ..problem.problem import Problem
 from ..result.check import PHYSICS, physics
@@ -174,7 +175,8 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
             planned = output.dataset.attrs["planned_steps"] or "an open number of"
             raise DeckError(
                 f"{path} has {len(output)} of {planned} load steps, but its "
-                f"journal {journal_of(path)} is not there, which the next step would start from"
+                f"journal {journal_of(path)} is not there, which the next step would start from; run "
+                "it again with --overwrite (overwrite=True in Python)"
             )
     raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
 
@@ -195,8 +197,7 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
         return case
     if not metadata.deck:
         raise DeckError(f"the journal of {path} holds no deck")
-    surface = tomllib.loads(metadata.deck).get("body", {}).get("1", {}).get("surface", {})
-    if surface.get("shape") == "python":
+    if "surface" in given_in_python(parse_toml(metadata.deck, f"deck of {path}")):
         raise DeckError(
             f"the gap of {path} was given in Python; resume there: "
             f"hexcontact.resume({str(path)!r}, case=case)"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
+import threading
 import tomllib
 import weakref
 from collections import deque
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.tables import Load
@@ -33,8 +34,26 @@ if TYPE_CHECKING:
 
     from ..result.result import Result
 
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
 _AT_REST = frozenset(("tangential_load_x", "tangential_load_y", "twist"))  # zero unless they are given
 _FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
+
+
+def _one_at_a_time(call: Callable[Concatenate[Session, _P], _T]) -> Callable[Concatenate[Session, _P], _T]:
+    """Let a method of a session refuse to run while another thread is in one."""
+
+    @functools.wraps(call)
+    def alone(session: Session, *arguments: _P.args, **keywords: _P.kwargs) -> _T:
+        if not session._free.acquire(blocking=False):
+            raise DeckError("the session is at work in another thread; call it from one thread at a time")
+        try:
+            return call(session, *arguments, **keywords)
+        finally:
+            session._free.release()
+
+    return alone
 
 
 class Session:
@@ -91,6 +110,7 @@ class Session:
 
     def __init__(self, case: Problem, output: str | Path | None = None, overwrite: bool = False) -> None:
         self.case = case
+        self._free = threading.Lock()
         self._about = metadata_of(case)
         self._steps: list[Step] = []  # with an output only the last has its fields
         self._solving: Iterator[Step] | None = None  # yields the next load steps; None after a failure
@@ -145,7 +165,7 @@ class Session:
         _ = self.step
         if self._store is None:
             about = self._described(self._loads, len(self._steps)) if self._by_hand else self._about
-            return Result(partial(assemble, about, self.steps, self._whole))
+            return Result(functools.partial(assemble, about, self.steps, self._whole))
         return open_result(self._store.path)
 
     @property
@@ -159,6 +179,7 @@ class Session:
         """Return the session, an iterator that solves a step at a time."""
         return self
 
+    @_one_at_a_time
     def __next__(self) -> Step:
         """Solve the next load step of the case.
 
@@ -179,6 +200,7 @@ class Session:
         return self._next_step()
 
     @known_keywords
+    @_one_at_a_time
     def advance(
         self,
         *,
@@ -262,6 +284,7 @@ class Session:
         self._length, self._history = self._end, history
         return self.step
 
+    @_one_at_a_time
     def back(self, steps: int = 1) -> None:
         """Undo the last steps.
 

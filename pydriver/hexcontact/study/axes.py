@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic_core import PydanticCustomError
 
 from ..deck.formula import Formula
 from ..deck.interface import FrictionKind, NodalCoefficient, TwoCoefficients
@@ -120,7 +121,7 @@ def _kind(info: Any, values: Sequence[Any] = ()) -> Kind | None:
 def _read(kind: Kind, value: Any) -> Any:
     try:
         return kind.parse(value)
-    except ValueError:
+    except PydanticCustomError:
         return None
 
 
@@ -165,8 +166,8 @@ def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
     for value in entry.range:
         try:
             ends.append(float(kind.parse(value)))
-        except ValueError as error:
-            raise DeckError(f"{where} = {shown(value)}: {error}") from None
+        except PydanticCustomError as error:
+            raise DeckError(f"{where} = {shown(value)}: {error.message()}") from None
     low, high = ends
     if not (math.isfinite(low) and math.isfinite(high)) or low == high:
         raise DeckError(f"{where} = {shown(entry.range)}: expected two different, finite bounds")
@@ -229,21 +230,23 @@ def _is_number(deck: Table, key: str) -> bool:
 def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str, Any], study: str) -> Any:
     """Return the value of a formula in a case, as its deck holds it."""
     assert axis.formula is not None
-    numbers, place = {}, "expression"
-    try:
-        for name in axis.formula.names:
-            key, _ = _key_of(name, axes)
-            info, default = _field(deck, key)
-            value: Any = merged
-            for part in key.split("."):
-                value = value[int(part) - 1] if isinstance(value, list) else value.get(part, {})
-            kind = _kind(info)
-            place = f"expression: {key} = {shown(value)}"
+    numbers, where = {}, f"{study}: parameter {axis.key}: expression"
+    for name in axis.formula.names:
+        key, _ = _key_of(name, axes)
+        info, default = _field(deck, key)
+        value: Any = merged
+        for part in key.split("."):
+            value = value[int(part) - 1] if isinstance(value, list) else value.get(part, {})
+        kind = _kind(info)
+        try:
             numbers[name] = default if value == {} or kind is None else float(kind.parse(value))
-        place = "expression"
-        return axis.in_deck(axis.formula.value(numbers))
+        except PydanticCustomError as error:
+            raise DeckError(f"{where}: {key} = {shown(value)}: {error.message()}") from None
+    try:
+        found = axis.formula.value(numbers)
     except ValueError as error:
-        raise DeckError(f"{study}: parameter {axis.key}: {place}: {error}") from None
+        raise DeckError(f"{where}: {error}") from None
+    return axis.in_deck(found)
 
 
 def _latin_hypercube(file: StudyFile, axes: Sequence[Axis]) -> list[dict[str, Any]]:

@@ -36,6 +36,8 @@ class BatchOptions(OptionTable):
                 refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
             if isinstance(entry, str) and _text(entry) is None:
                 refuse_key(key, entry, 'expected text on one line, without " and \\')
+            if isinstance(entry, str) and "," in entry:  # such as variables of the environment for `export`
+                refuse_key(key, entry, "expected one value, without commas")
             if not isinstance(entry, str | int | float | datetime.time):
                 refuse_key(key, entry, "expected text, a number, or true or false")
         return options

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import netcdf_library
 from ..deck.below import Fatigue
 from ..errors import DeckError
 from ..files import replacing
@@ -291,11 +292,9 @@ def to_ugrid(
     DeckError
         If there is nothing to export.
     """
-    import netCDF4
-
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
-    with replacing(target) as path, netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as file:
+    with replacing(target) as path, netcdf_library.opened(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs
         named = {name: known[name] for name in ("title", "source", "history") if name in known}
         file.setncatts({"Conventions": CONVENTIONS, **named})

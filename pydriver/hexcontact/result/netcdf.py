@@ -11,8 +11,6 @@ import contextlib
 import functools
 import hashlib
 import os
-import sys
-import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +21,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..errors import DeckError
 from ..files import reading
+from ..netcdf_library import LOCK, close, opened, opened_by_xarray
 from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
@@ -43,16 +42,6 @@ _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes
 _HDF5 = b"\x89HDF\r\n\x1a\n\x02\x08\x08"  # version of the head, then sizes of addresses and lengths
 _END = slice(28, 36)  # in the head: the address where the file ends
-
-_netcdf = threading.Lock()  # the netCDF library is for one thread at a time
-
-
-@contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """Keep other threads out of the netCDF library, also those that read through xarray."""
-    backend = sys.modules.get("xarray.backends.netCDF4_")
-    with _netcdf, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
-        yield
 
 
 # --- writing --------------------------------------------------------------------------------------
@@ -78,7 +67,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         If the file cannot be written.
     """
     with _new_file(path) as file:
-        with _alone():
+        with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
             given = [
@@ -108,7 +97,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             if gap_column is not None:
                 gap = layout.initial_gap(gap, step)
         if gap_column is not None:
-            with _alone():
+            with LOCK:
                 gap_column[...] = gap
 
 
@@ -136,13 +125,12 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
-        with _alone():
+        with LOCK:
             file = file_type(path, "w", format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:
-            with _alone():
-                file.close()
+            close(file)
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
@@ -157,7 +145,7 @@ def _write_block(
     columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
 ) -> None:
     """Write the fields of load steps, of which `first` is the place of the first."""
-    with _alone():
+    with LOCK:
         for name, column in columns.items():
             values = [layout.field(name, first + place, step) for place, step in enumerate(steps)]
             block = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
@@ -245,9 +233,7 @@ def stress_files(deck: str, output: Path) -> Iterable[Path]:
 
 
 def _names_of_attributes(path: Path) -> set[str]:
-    import netCDF4
-
-    with contextlib.suppress(OSError, RuntimeError), _alone(), netCDF4.Dataset(path) as file:
+    with contextlib.suppress(OSError, RuntimeError), opened(path) as file:
         return set(file.ncattrs())
     return set()
 
@@ -265,11 +251,9 @@ def read_output(path: Path) -> Result:
     FileNotFoundError
         If it is missing.
     """
-    import netCDF4
-
     with reading(path):
         sealed = check_seal(path)
-    with reading(path), _alone(), netCDF4.Dataset(path) as file:
+    with reading(path), opened(path) as file:
         _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
         for name in COORDINATES:
             if 0 in file[name].shape:
@@ -278,12 +262,10 @@ def read_output(path: Path) -> Result:
             if fault := fault_of_dimensions(name, column.dimensions):
                 raise DeckError(f"{path} is damaged: {fault}")
     with reading(path):
-        import xarray
-
         from .result import Result
 
         # the mesh, for other programs, repeats rows and columns
-        dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
+        dataset = opened_by_xarray(path, drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:

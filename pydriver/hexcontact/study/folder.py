@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from .. import netcdf_library
 from .._version import __version__
 from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import replacing, require_ordinary, text_of
@@ -116,13 +117,11 @@ class StudyFolder:
 
     def done(self, case: PlannedCase) -> bool:
         """Return whether the file of a case exists, is complete, and holds this case."""
-        import netCDF4
-
         path = self.path(case)
         if not path.is_file():
             return False
         try:
-            with netCDF4.Dataset(path) as file:
+            with netcdf_library.opened(path) as file:
                 return bool(file.complete) and hash_of(file.deck) == case.hash
         except (OSError, AttributeError, RuntimeError):
             return False

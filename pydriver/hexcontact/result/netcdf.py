@@ -201,7 +201,7 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
 
 def is_ours(path: Path) -> bool:
     """Test whether a file is a result of any version, which may be damaged."""
-    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= _names_of_attributes(path)
+    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= attributes(path).keys()
 
 
 def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
@@ -216,26 +216,36 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
         if not overwrite and os.path.lexists(path):
             raise DeckError(f"{path} exists already; --overwrite (overwrite=True in Python) replaces it")
         ours = {"stress_of", "hexcontact_version"}
-        if os.path.lexists(path) and not (path.is_file() and ours <= _names_of_attributes(path)):
+        if os.path.lexists(path) and not (path.is_file() and ours <= attributes(path).keys()):
             raise DeckError(
                 f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
                 "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
             )
 
 
-def stress_files(deck: str, output: Path) -> Iterable[Path]:
-    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
+def stress_files(deck: str, output: Path) -> dict[str, Path]:
+    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]], by their names."""
     if not any(name in deck for name in _BELOW):
-        return ()
+        return {}
     from ..interior.tables import files_of
 
-    return files_of(deck, output).values()
+    return files_of(deck, output)
 
 
-def _names_of_attributes(path: Path) -> set[str]:
-    with contextlib.suppress(OSError, RuntimeError), opened(path) as file:
-        return set(file.ncattrs())
-    return set()
+def missing_stresses(output: Path) -> dict[str, Path]:
+    """Return those of the `stress_files` of a finished run that are not there, or are of another run."""
+    about = attributes(output)
+    files = stress_files(about.get("deck", ""), output)
+    return {name: path for name, path in files.items() if attributes(path).get("stress_of") != about["run"]}
+
+
+def attributes(path: Path) -> dict[str, Any]:
+    """Return the attributes of a file; none if it is missing, damaged or another file."""
+    if not path.is_file():  # a pipe would block
+        return {}
+    with contextlib.suppress(OSError, RuntimeError, AttributeError), opened(path) as file:
+        return {name: file.getncattr(name) for name in file.ncattrs()}
+    return {}
 
 
 def read_output(path: Path) -> Result:

@@ -201,7 +201,7 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
         raise DeckError(f"{target} is not a regular file; choose another name")
     if not target.parent.is_dir():
         raise DeckError(f"cannot write {target}: the folder {target.parent} does not exist")
-    temporary = temporary or target.with_name(f"{target.name}.{os.getpid()}.tmp")
+    temporary = temporary or temporary_of(target)
     make_anew(temporary)
     try:
         yield temporary
@@ -212,6 +212,11 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             temporary.unlink()
         raise
+
+
+def temporary_of(target: Path) -> Path:
+    """Return the name under which this process writes a file before it replaces `target`."""
+    return target.with_name(f"{target.name}.{os.getpid()}.tmp")
 
 
 def make_anew(path: Path) -> None:

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from commands import ENVIRONMENT
 from fuzz.file_made import read_record
 
 import hexcontact
-from hexcontact import Case, ConvergenceError, DeckError, ResourceError
+from hexcontact import Case, ConvergenceError, DeckError, ResourceError, resume
 from hexcontact.core import contact
 from hexcontact.result import store as store_module
 from hexcontact.result.journal import Journal, journal_of, write_record
@@ -548,3 +549,72 @@ def test_files_that_may_not_grow_stop_a_run_that_can_go_on(tmp_path: Path) -> No
     assert hexcontact_(tmp_path, "resume", "sphere.nc", "-q", limit=RECORD_KB).returncode == 4
     assert hexcontact_(tmp_path, "resume", "sphere.nc", "-q").returncode == 0
     same(tmp_path / "sphere.nc", tmp_path / "whole.nc")
+
+
+# --- tables below the surface -------------------------------------------------------------------------------
+
+TABLES = """
+[[stress]]
+name = "axis"
+line = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "1 mm"]]
+count = [3]
+[[stress]]
+name = "fine"
+line = [["0 mm", "0 mm", "1 um"], ["0.1 mm", "0 mm", "1 mm"]]
+count = [20000]
+"""
+FINE: dict[str, Any] = {"line": [[0.0, 0.0, 1e-6], [1e-4, 0.0, 1e-3]], "count": 20000, "step": [4]}
+
+
+def in_tables(folder: Path, *words: str) -> subprocess.Popen[str]:
+    """Start a run and return it while the second table is computed."""
+    command = [sys.executable, "-m", "hexcontact", *words]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+    while not (folder / "out_axis.nc").exists() and process.poll() is None:
+        time.sleep(0.01)
+    time.sleep(0.2)
+    assert process.poll() is None
+    assert (folder / "out.nc").exists()
+    return process
+
+
+@pytest.mark.parametrize(
+    ("sent", "code"),
+    [(signal.SIGINT, 130), (signal.SIGUSR1, 138), (signal.SIGTERM, 143), (signal.SIGKILL, -9)],
+)
+def test_tables_of_a_run_that_was_ended_are_filled_in(
+    tmp_path: Path, sent: signal.Signals, code: int
+) -> None:
+    (tmp_path / "deck.toml").write_text(DECK + TABLES)
+    with in_tables(tmp_path, "run", "deck.toml", "-q", "-o", "out.nc") as process:
+        process.send_signal(sent)
+        assert process.stderr
+        told = process.stderr.read()
+    assert process.returncode == code
+    if code > 0:
+        kept = "all load steps are in out.nc; to compute the table fine: hexcontact resume out.nc"
+        assert told == f"hexcontact: interrupted; {kept}\n"
+        (tmp_path / "out_axis.nc").unlink()
+        with in_tables(tmp_path, "resume", "out.nc", "-q") as process:  # ends there, too
+            process.send_signal(sent)
+        assert process.returncode == code
+    assert {path.name for path in tmp_path.iterdir()} == {"deck.toml", "out.nc", "out_axis.nc"}
+    if code < 0:
+        written = (tmp_path / "out_axis.nc").stat().st_mtime_ns
+        assert hexcontact_(tmp_path, "resume", "out.nc", "-q").returncode == 0
+        assert (tmp_path / "out_axis.nc").stat().st_mtime_ns == written
+        with xarray.open_dataset(tmp_path / "out_fine.nc") as found:
+            assert found.identical(open_result(tmp_path / "out.nc").stress(**FINE).assign_attrs(found.attrs))
+
+
+def test_tables_of_an_older_run_are_replaced_after_a_kill(tmp_path: Path) -> None:
+    """Of the same name, and left beside an output that --overwrite has replaced."""
+    table = TABLES.partition('[[stress]]\nname = "fine')[0]
+    (tmp_path / "deck.toml").write_text(DECK + table)
+    assert hexcontact_(tmp_path, "run", "deck.toml", "-q", "-o", "out.nc").returncode == 0
+    older = (tmp_path / "out_axis.nc").read_bytes()
+    assert hexcontact_(tmp_path, "run", "deck.toml", "-q", "-o", "out.nc", "--overwrite").returncode == 0
+    (tmp_path / "out_axis.nc").write_bytes(older)
+    resume(tmp_path / "out.nc")
+    with xarray.open_dataset(tmp_path / "out_axis.nc") as found:
+        assert found.attrs["stress_of"] == open_result(tmp_path / "out.nc").dataset.attrs["run"]

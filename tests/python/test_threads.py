@@ -3,6 +3,7 @@
 import operator
 import pickle
 import re
+import subprocess
 import sys
 import threading
 import time
@@ -17,11 +18,13 @@ import pytest
 from commands import wait_for
 from numpy.testing import assert_array_equal
 
+import hexcontact
 from hexcontact import (
     Case,
     DeckError,
     FlexibilityOperator,
     FrictionalContact,
+    HexcontactError,
     Lattice,
     NormalContact,
     Result,
@@ -31,6 +34,7 @@ from hexcontact import (
 from hexcontact.core import contact, friction
 from hexcontact.core.contact import ElasticPair, Method
 from hexcontact.deck.surfaces import Sphere
+from hexcontact.netcdf_library import LOCK
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -88,6 +92,35 @@ def test_cases_in_threads_have_the_answers_of_cases_in_turn(tmp_path: Path) -> N
             for name, result in found:
                 assert_same(result, serial[name])
             assert [name for name, _ in found] in ([*cases], [*cases][::-1])
+
+
+def test_files_in_threads_and_xarray_in_another(tmp_path: Path) -> None:
+    program = [sys.executable, Path(__file__).with_name("files_in_threads.py"), tmp_path, "ord", "8"]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr
+
+
+def test_only_one_module_opens_files_of_netcdf() -> None:
+    package = Path(hexcontact.__file__).parent
+    opens = re.compile(r"netCDF4\.Dataset\(|\b(open|load)_dataset\(|\.to_netcdf\(")
+    found = {p.name: len(opens.findall(p.read_text(encoding="utf-8"))) for p in package.rglob("*.py")}
+    assert {name for name, count in found.items() if count} == {"netcdf_library.py"}
+
+
+def test_a_lock_of_xarray_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    import xarray
+    import xarray.backends.netCDF4_ as backend
+
+    monkeypatch.delattr(backend, "NETCDF4_PYTHON_LOCK")
+    with pytest.raises(HexcontactError, match=re.escape(f"xarray {xarray.__version__} has no lock")):
+        LOCK.acquire()
+    monkeypatch.undo()
+    with LOCK, LOCK:
+        assert backend.NETCDF4_PYTHON_LOCK.locked()
+        taken = ThreadPoolExecutor(1).submit(LOCK.acquire, False)
+        assert not taken.result()
+    assert not backend.NETCDF4_PYTHON_LOCK.locked()
+    assert pickle.loads(pickle.dumps(LOCK)) is LOCK
 
 
 def test_two_sessions_in_two_threads_do_not_feel_each_other() -> None:

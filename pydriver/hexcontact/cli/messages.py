@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,13 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
-from ..files import require_replaceable
+from ..files import require_replaceable, temporary_of
+from ..result.netcdf import missing_stresses
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solving
 from ..solve.interruption import Interrupted, in_background
 from ..solve.progress import reporter
-from ..text import visible
+from ..text import listed, visible
 from . import json_output, tables
 from .guard import print_error, print_output
 from .options import LogLevel
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..result.step import Step
     from ..result.store import Store
+    from ..solve.events import Listener
 
 
 @dataclass(frozen=True)
@@ -123,24 +126,58 @@ def solved(
 ) -> list[Any]:
     """Solve a case into a store and return the histories of all its steps.
 
-    Signals end the process, unless the last step is finished: then the output is completed.
+    Signals end the process. If the last step is finished, the output is completed first.
     """
+    late: list[Interrupted] = []
 
     def ends(signaled: Interrupted) -> bool:
-        if store.has_all_steps:
-            return False
-        store.close(f"interrupted ({signaled.name})")
-        return not store.finished
+        if not store.has_all_steps:
+            store.close(f"interrupted ({signaled.name})")
+            if not store.finished:
+                return True
+        late.append(signaled)
+        return False
 
     histories: list[Any] = [step.history for step in before]
     listener = solving.listeners(case, reporter(messages.silent), lambda step: histories.append(step.history))
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
         with listener.following(title, case.planned_steps):
-            in_background(lambda: solving.run_into(case, store, listener, before), pipe, ends)
+            in_background(lambda: solving.solve_into(case, store, listener, before), pipe, ends)
+            if store.finished:
+                with_tables(store.path, pipe, messages, listener, late)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories
+
+
+def with_tables(
+    output: Path,
+    pipe: tuple[int, int],
+    messages: Messages,
+    listener: Listener | None = None,
+    late: Sequence[Interrupted] = (),
+) -> None:
+    """Write the missing tables [[stress]] and [[fatigue]] of a result; signals end the process."""
+    if not (missing := missing_stresses(output)):
+        return
+
+    def work() -> None:
+        for path in solving.write_stresses(output):
+            if listener is not None:
+                listener.said("written", file=path)
+
+    try:
+        for signaled in late:  # while the output was completed
+            raise signaled
+        in_background(work, pipe)
+    except Interrupted as signaled:
+        if missing := missing_stresses(output):
+            for path in missing.values():
+                temporary_of(path).unlink(missing_ok=True)
+            wanted = f"the table{'s' * (len(missing) > 1)} {listed([*missing], 'and')}"
+            resume = f"hexcontact resume {shlex.quote(str(output))}"
+            messages.interrupted(signaled, f"all load steps are in {output}; to compute {wanted}: {resume}")
 
 
 def overview(path: Path) -> Path:

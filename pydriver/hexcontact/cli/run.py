@@ -76,7 +76,7 @@ def resume(
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
     from ..solve import restart
-    from .messages import Messages, overview, picture_beside, solved
+    from .messages import Messages, overview, picture_beside, solved, with_tables
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
@@ -91,10 +91,11 @@ def resume(
             if again.warning:
                 print_error(f"warning: {again.warning}")
             histories = solved(again.case, again.store, pipe, file.stem, messages, again.before)
+        else:
+            with_tables(restart.output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
     path = path if file.is_absolute() else Path(os.path.relpath(path))
     picture = overview(path) if plot else None
     if again is None:
-        restart.complete(file)
         return messages.was_finished(file, picture)
     return messages.conclude(again.case, histories, path, picture, [again.warning] * bool(again.warning))

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic_core import PydanticCustomError
 
+from .. import netcdf_library
 from ..errors import DeckError
 from ..files import is_defect, require_ordinary, text_of
 from ..text import did_you_mean, folded, listed, shown
@@ -473,7 +474,7 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
         raise DeckError(f"{path}: no such file; expected {_EXPECTED}")
     require_ordinary(path, _EXPECTED)
     try:
-        with netCDF4.Dataset(path) as file:
+        with netcdf_library.opened(path) as file:
             lengths = {
                 name: variable.shape[0]
                 for name, variable in file.variables.items()

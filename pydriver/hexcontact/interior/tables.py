@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import netcdf_library
 from ..deck.below import Criteria, Fatigue, Stress
 from ..deck.recorded import recorded
 from ..errors import DeckError
@@ -106,12 +107,10 @@ def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
 
 def read_table(path: Path) -> xarray.Dataset | None:
     """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
-    import xarray
-
     if not path.is_file():  # a pipe would block
         return None
     try:
-        with xarray.open_dataset(path, engine="netcdf4") as found:
+        with netcdf_library.opened_by_xarray(path) as found:
             found.load()
     except (OSError, ValueError):
         return None
@@ -151,7 +150,7 @@ def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
     """Write a dataset of stresses or fatigue parameters to a file, complete or not at all."""
     packed = {name: {"zlib": True, "complevel": 1} for name in found.data_vars}
     with replacing(target) as path:
-        found.to_netcdf(path, format="NETCDF4_CLASSIC", engine="netcdf4", encoding=packed)
+        netcdf_library.write(found, path, format="NETCDF4_CLASSIC", encoding=packed)
     return target
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import netcdf_library
 from ..arrays import has_entries
 from ..core import memory
 from ..core.contact import shaped
@@ -123,10 +124,8 @@ class FrictionField:
 
 def _read_map(path: Path) -> HeightMap:
     """Read a map: the only variable of a netCDF file that has the coordinates x and y."""
-    import xarray
-
     try:
-        with reading(path, "a map in netCDF"), xarray.open_dataset(path, engine="netcdf4") as dataset:
+        with reading(path, "a map in netCDF"), netcdf_library.opened_by_xarray(path) as dataset:
             maps = [v for v in dataset.data_vars.values() if {"x", "y"} <= set(v.coords)]
             if len(maps) != 1:
                 raise DeckError(

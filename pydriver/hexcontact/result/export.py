@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import netcdf_library
 from .._version import __version__
 from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
@@ -300,13 +301,11 @@ def to_ugrid(
     DeckError
         If there is nothing to export.
     """
-    import netCDF4
-
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
     if target.is_file() and target.stat().st_size and not is_mesh(target):
         raise DeckError(f"{target} is there and was not made by hexcontact; delete it or choose another name")
-    with replacing(target) as path, netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as file:
+    with replacing(target) as path, netcdf_library.opened(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs
         named = {name: known[name] for name in ("title", "source", "history") if name in known}
         about = {"content": "fields on a mesh", "hexcontact_version": __version__}

@@ -11,8 +11,6 @@ import contextlib
 import functools
 import hashlib
 import os
-import sys
-import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +21,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..errors import DeckError
 from ..files import reading
+from ..netcdf_library import LOCK, close, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
@@ -43,16 +42,6 @@ _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes
 _HDF5 = b"\x89HDF\r\n\x1a\n\x02\x08\x08"  # version of the head, then sizes of addresses and lengths
 _END = slice(28, 36)  # in the head: the address where the file ends
-
-_netcdf = threading.Lock()  # the netCDF library is for one thread at a time
-
-
-@contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """Keep other threads out of the netCDF library, also those that read through xarray."""
-    backend = sys.modules.get("xarray.backends.netCDF4_")
-    with _netcdf, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
-        yield
 
 
 # --- writing --------------------------------------------------------------------------------------
@@ -78,7 +67,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         If the file cannot be written.
     """
     with _new_file(path) as file:
-        with _alone():
+        with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
             given = [
@@ -106,7 +95,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 _write_block(columns, layout, position - len(block) + 1, block)
                 block.clear()
             layout.complete_fixed(fixed, step)
-        with _alone():
+        with LOCK:
             for name, column in of_all_steps.items():
                 column[...] = fixed[name]
 
@@ -135,13 +124,12 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
-        with _alone():
+        with LOCK:
             file = file_type(path, "w", format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:
-            with _alone():
-                file.close()
+            close(file)
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
@@ -156,7 +144,7 @@ def _write_block(
     columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
 ) -> None:
     """Write the fields of load steps, of which `first` is the place of the first."""
-    with _alone():
+    with LOCK:
         for name, column in columns.items():
             values = [layout.field(name, first + place, step) for place, step in enumerate(steps)]
             block = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
@@ -212,7 +200,7 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
 
 def is_ours(path: Path) -> bool:
     """Test whether a file is a result of any version, which may be damaged."""
-    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= _names_of_attributes(path)
+    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= attributes(path).keys()
 
 
 def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
@@ -227,7 +215,7 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
         if not overwrite and os.path.lexists(path):
             raise DeckError(f"{path} exists already; --overwrite (overwrite=True in Python) replaces it")
         ours = {"stress_of", "hexcontact_version"}
-        if os.path.lexists(path) and not (path.is_file() and ours <= _names_of_attributes(path)):
+        if os.path.lexists(path) and not (path.is_file() and ours <= attributes(path).keys()):
             raise DeckError(
                 f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
                 "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
@@ -236,24 +224,32 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
 
 def is_mesh(path: Path) -> bool:
     """Test whether a file has the fields of a result on a mesh, as `hexcontact.result.export` writes it."""
-    return {"content", "hexcontact_version"} <= _names_of_attributes(path)
+    return {"content", "hexcontact_version"} <= attributes(path).keys()
 
 
-def stress_files(deck: str, output: Path) -> Iterable[Path]:
-    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
+def stress_files(deck: str, output: Path) -> dict[str, Path]:
+    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]], by their names."""
     if not any(name in deck for name in _BELOW):
-        return ()
+        return {}
     from ..interior.tables import files_of
 
-    return files_of(deck, output).values()
+    return files_of(deck, output)
 
 
-def _names_of_attributes(path: Path) -> set[str]:
-    import netCDF4
+def missing_stresses(output: Path) -> dict[str, Path]:
+    """Return those of the `stress_files` of a finished run that are not there, or are of another run."""
+    about = attributes(output)
+    files = stress_files(about.get("deck", ""), output)
+    return {name: path for name, path in files.items() if attributes(path).get("stress_of") != about["run"]}
 
-    with contextlib.suppress(OSError, RuntimeError), _alone(), netCDF4.Dataset(path) as file:
-        return set(file.ncattrs())
-    return set()
+
+def attributes(path: Path) -> dict[str, Any]:
+    """Return the attributes of a file; none if it is missing, damaged or another file."""
+    if not path.is_file():  # a pipe would block
+        return {}
+    with contextlib.suppress(OSError, RuntimeError, AttributeError), opened(path) as file:
+        return {name: file.getncattr(name) for name in file.ncattrs()}
+    return {}
 
 
 def read_output(path: Path) -> Result:
@@ -269,11 +265,9 @@ def read_output(path: Path) -> Result:
     FileNotFoundError
         If it is missing.
     """
-    import netCDF4
-
     with reading(path):
         sealed = check_seal(path)
-    with reading(path), _alone(), netCDF4.Dataset(path) as file:
+    with reading(path), opened(path) as file:
         _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
         for name in COORDINATES:
             if 0 in file[name].shape:
@@ -282,12 +276,10 @@ def read_output(path: Path) -> Result:
             if fault := fault_of_dimensions(name, column.dimensions):
                 raise DeckError(f"{path} is damaged: {fault}")
     with reading(path):
-        import xarray
-
         from .result import Result
 
         # the mesh, for other programs, repeats rows and columns
-        dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
+        dataset = opened_by_xarray(path, drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:

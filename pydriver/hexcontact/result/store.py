@@ -277,7 +277,7 @@ class Store:
                 f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
                 "delete it or choose another output"
             )
-        require_free(stress_files(self.metadata.deck, self.path), overwrite)
+        require_free(stress_files(self.metadata.deck, self.path).values(), overwrite)
         with self.writing("the journal"):
             if left:  # they become the old output, which a complete new one replaces
                 with contextlib.suppress(DeckError):

@@ -107,9 +107,9 @@ def resume(
 
 def complete(path: str | os.PathLike[str]) -> None:
     """Write the missing stresses of a finished run, which was killed before it wrote them."""
-    output = _output_of(Path(path))
+    output = output_of(Path(path))
     if output.is_file():
-        list(write_stresses(output, only_missing=True))
+        list(write_stresses(output))
 
 
 @contextlib.contextmanager
@@ -123,7 +123,7 @@ def reopened(
     Restart or None
         None if the run is finished.
     """
-    store, last = _found(_output_of(Path(path)))
+    store, last = _found(output_of(Path(path)))
     refines = store is not None and bool(TrialFolder(store.folder))
     if store is None or (last is None and not refines):
         if store is not None:
@@ -154,7 +154,7 @@ def reopened(
         yield Restart(case, store, before, "; ".join(doubts))
 
 
-def _output_of(path: Path) -> Path:
+def output_of(path: Path) -> Path:
     """Return the output of a run, by its own path or that of its journal."""
     if path.is_dir() and path.name.endswith(".d"):
         output = path.with_name(path.name.removesuffix(".d"))

@@ -14,7 +14,7 @@ from ..errors import AccuracyWarning, HexcontactError
 from ..problem.overview import parameters_of
 from ..problem.problem import Problem
 from ..result.layout import Metadata, assemble
-from ..result.netcdf import require_free
+from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import visible
@@ -157,6 +157,14 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     DeckError, ConvergenceError, ResourceError
         As `run`.
     """
+    solve_into(case, store, listener, before)
+    if store.finished:
+        for path in write_stresses(store.path):
+            listener.said("written", file=path)
+
+
+def solve_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:
+    """Solve a case into a store as `run_into`, without the tables [[stress]] and [[fatigue]]."""
     try:
         if case.accuracy is not None:
             from . import lattices
@@ -164,38 +172,36 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
             solver = lattices.OnDisk(store, listener)
             solver.finish(lattices.refine(case, solver))
         else:
-            _solve_into(case, store, listener, before)
+            _record_steps(case, store, listener, before)
             store.finish()
     except Stopped as reason:
         listener.said("stopped", level=logging.WARNING, reason=str(reason))
         store.close(str(reason))
     else:
         listener.said("written", file=store.path)
-        if case.deck.stress or case.deck.fatigue:
-            for path in write_stresses(store.path):
-                listener.said("written", file=path)
 
 
-def _solve_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step]) -> None:
-    """Record all load steps; apart from `run_into`, so that the last one is freed before the output."""
+def _record_steps(case: Problem, store: Store, listener: Listener, before: Sequence[Step]) -> None:
+    """Record all load steps; apart from `solve_into`, so that the last one is freed before the output."""
     for step in steps(case, before=before, listener=listener):
         store.append(step)
         store.publish()
         _announce_finished(step, store, listener)
 
 
-def write_stresses(output: Path, only_missing: bool = False) -> Iterator[Path]:
-    """Write the tables [[stress]] and [[fatigue]] of the deck of a result beside it, and yield the files."""
-    from ..interior.tables import computed, files_of, write_netcdf
+def write_stresses(output: Path) -> Iterator[Path]:
+    """Write the missing tables [[stress]] and [[fatigue]] of the deck of a result, and yield the files."""
+    missing = missing_stresses(output)
+    if not missing:
+        return
+    from ..interior.tables import computed, write_netcdf
     from ..result.export import kept_steps
 
     result = open_result(output)
     try:
-        files = files_of(result.deck, output)
-        wanted = [name for name, path in files.items() if not (only_missing and path.exists())]
-        for name, found in computed(result, kept_steps(result), wanted) if wanted else ():
-            require_free([files[name]], overwrite=True)
-            yield write_netcdf(found, files[name])
+        for name, found in computed(result, kept_steps(result), [*missing]):
+            require_free([missing[name]], overwrite=True)
+            yield write_netcdf(found, missing[name])
     finally:
         result.close()
 

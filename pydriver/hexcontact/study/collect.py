@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import netcdf_library
 from ..errors import DeckError, ResourceError
 from ..files import reading, replacing, require_ordinary
 from ..result.netcdf import check_seal
@@ -26,11 +27,9 @@ STUDY_VERSION = 1
 
 def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
     """Return the history of a finished case: the values of each quantity by load step, by its name."""
-    import netCDF4
-
     with reading(path):
         check_seal(path)
-    with reading(path), netCDF4.Dataset(path) as file:
+    with reading(path), netcdf_library.opened(path) as file:
         file.set_auto_mask(False)
         return {
             name: np.asarray(column[...], dtype=float)
@@ -129,11 +128,9 @@ def _coordinate(axis: Axis, places: Any, settings: Sequence[Mapping[str, Any]]) 
 
 def is_study(path: Path) -> bool:
     """Return whether a file is the result of a study."""
-    import netCDF4
-
     require_ordinary(path, "the result of a study")
     try:
-        with netCDF4.Dataset(path) as file:
+        with netcdf_library.opened(path) as file:
             return "study_version" in file.ncattrs()
     except OSError:
         return False
@@ -165,7 +162,7 @@ def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
 
     try:
         with replacing(path) as temporary:
-            dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
-            xarray.Dataset(attrs=about).to_netcdf(temporary, mode="a", engine="netcdf4", group="study")
+            netcdf_library.write(dataset, temporary, encoding={name: {"dtype": "S1"} for name in texts})
+            netcdf_library.write(xarray.Dataset(attrs=about), temporary, mode="a", group="study")
     except (OSError, RuntimeError) as error:
         raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error

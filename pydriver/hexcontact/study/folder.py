@@ -21,10 +21,11 @@ from .._version import __version__
 from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import replacing, require_ordinary, text_of
 from ..lock import Lock
-from .job import Outcome
-from .plan import Plan, PlannedCase, hash_of
+from ..result.netcdf import missing_stresses, stress_files
+from .job import Outcome, holds
+from .plan import Plan, PlannedCase
 
-_INDEX = "index.json"
+INDEX = "index.json"
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
 
 
@@ -53,17 +54,17 @@ class StudyFolder:
         if self.folder.exists() and not self.folder.is_dir():
             raise DeckError(f"{self.folder} is a file; the study needs a folder of this name for its cases")
         there = os.listdir(self.folder) if self.folder.is_dir() else []
-        if there and not {_INDEX, "lock"} & set(there):
+        if there and not {INDEX, "lock"} & set(there):
             raise DeckError(
                 f"the folder {self.folder} holds other things than cases of a study; choose another output"
             )
         self.numbers: dict[str, int] = {}
         self._entries: dict[str, Any] = {}
-        if (self.folder / _INDEX).exists():
+        if (self.folder / INDEX).exists():
             self._read()
 
     def _read(self) -> None:
-        path = self.folder / _INDEX
+        path = self.folder / INDEX
         content = text_of(path, "the index of a study")
         try:
             self._entries = json.loads(content)["cases"]
@@ -90,7 +91,7 @@ class StudyFolder:
             if case.hash in new:
                 number = self.numbers[case.hash]
                 self._entries[case.hash] = {"number": number, "parameters": dict(case.settings)}
-        self._write(_INDEX, {"index_version": 1, "cases": self._entries})
+        self._write(INDEX, {"index_version": 1, "cases": self._entries})
 
     def assign(self, plan: Plan) -> None:
         """Assign numbers to the cases without writing the index."""
@@ -115,17 +116,9 @@ class StudyFolder:
         return self.folder / f"{self.number(case):04d}.nc"
 
     def done(self, case: PlannedCase) -> bool:
-        """Return whether the file of a case exists, is complete, and holds this case."""
-        import netCDF4
-
+        """Return whether the file of a case is complete and holds this case, with its tables beside it."""
         path = self.path(case)
-        if not path.is_file():
-            return False
-        try:
-            with netCDF4.Dataset(path) as file:
-                return bool(file.complete) and hash_of(file.deck) == case.hash
-        except (OSError, AttributeError, RuntimeError):
-            return False
+        return holds(path, case.hash) and not (stress_files(case.deck, path) and missing_stresses(path))
 
     def failure(self, case: PlannedCase) -> Outcome | None:
         """Return the failure in the note of a case; None without one."""

@@ -1,0 +1,171 @@
+"""The netCDF library, which one thread may enter at a time: its lock, and files that are closed under it."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import inspect
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from .errors import HexcontactError
+
+if TYPE_CHECKING:
+    import netCDF4
+    import xarray
+
+
+class _Lock:
+    """Lock of the netCDF library for this package, and of xarray for the time that it is held.
+
+    A thread may take it again. Whoever reads by xarray takes it, too: garbage collection
+    closes a file of xarray if it gets the lock at once, and leaves it open for later otherwise.
+    """
+
+    def __init__(self) -> None:
+        self.own, self._depth = threading.RLock(), 0
+        self._foreign: Any = None
+
+    def acquire(self, blocking: bool = True) -> bool:
+        """Take the lock; False without waiting if another thread has it."""
+        if not self.own.acquire(blocking):
+            return False
+        if self._depth == 0:
+            try:
+                self._foreign = lock_of_xarray()
+                taken = self._foreign is None or self._foreign.acquire(blocking)
+            except BaseException:
+                self.own.release()
+                raise
+            if not taken:
+                self.own.release()
+                return False
+        self._depth += 1
+        return True
+
+    def release(self) -> None:
+        """Release the lock."""
+        self._depth -= 1
+        if self._depth == 0 and self._foreign is not None:
+            self._foreign.release()
+        self.own.release()
+
+    def __enter__(self) -> None:
+        self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def __reduce__(self) -> str:
+        """Return the name of the only lock, which stands for it in a pickle."""
+        return "LOCK"
+
+
+LOCK = _Lock()
+
+
+def lock_of_xarray() -> Any:
+    """Return the lock of xarray for the netCDF library; None while no other thread can read by xarray.
+
+    Raises
+    ------
+    HexcontactError
+        If this version of xarray has no such lock.
+    """
+    if "xarray" not in sys.modules and threading.active_count() == 1:
+        return None
+    import xarray
+    import xarray.backends.netCDF4_ as backend
+
+    try:
+        lock = backend.NETCDF4_PYTHON_LOCK
+    except AttributeError:
+        raise HexcontactError(
+            f"xarray {xarray.__version__} has no lock of the netCDF library (NETCDF4_PYTHON_LOCK); "
+            "install a version that has it, such as 2026.2"
+        ) from None
+    _keep_out(backend.NetCDF4DataStore)
+    return lock
+
+
+@functools.cache
+def _keep_out(store: type) -> None:
+    """Make the stores of xarray wait for this package.
+
+    xarray holds its lock to open, close and read files, and calls the library without it for
+    attributes, sizes and filters (https://github.com/pydata/xarray/issues/7079). The methods that take
+    the lock of xarray first stay as they are: their order would be the opposite one.
+    """
+    for name, method in [*vars(store).items()]:
+        if inspect.isfunction(method) and name not in ("_acquire", "close"):
+            setattr(store, name, _waiting(method))
+
+
+def _waiting(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method of a store that waits for this package."""
+
+    @functools.wraps(method)
+    def waiting(*args: Any, **options: Any) -> Any:
+        with LOCK.own:
+            return method(*args, **options)
+
+    return waiting
+
+
+@contextlib.contextmanager
+def opened(path: Path, mode: Literal["r", "w"] = "r", **options: Any) -> Iterator[netCDF4.Dataset]:
+    """Open a file of netCDF, and close it, with no other thread in the library meanwhile."""
+    import netCDF4
+
+    with LOCK:
+        file = netCDF4.Dataset(path, mode, **options)
+        try:
+            yield file
+        finally:
+            close(file)
+
+
+def close(file: netCDF4.Dataset) -> None:
+    """Close a file, so that its destructor does not, not even after an error."""
+    with LOCK:
+        try:
+            file.close()
+        except BaseException:
+            file._close(False)
+            raise
+
+
+def write(dataset: xarray.Dataset, path: Path, mode: Literal["w", "a"] = "w", **options: Any) -> None:
+    """Write a dataset of xarray to a file, or to a group of it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        The dataset.
+    path : Path
+        The file.
+    mode : str
+        w: a new file; a: more of a file.
+    **options
+        Those of `xarray.Dataset.to_netcdf`: format, group, encoding.
+    """
+    from xarray.backends import NetCDF4DataStore
+
+    encoding = options.pop("encoding", None)
+    with LOCK:
+        store = NetCDF4DataStore.open(path, mode, lock=LOCK, **options)
+        try:
+            dataset.dump_to_store(store, encoding=encoding)
+        finally:
+            store.close()
+
+
+def opened_by_xarray(path: Path, **options: Any) -> xarray.Dataset:
+    """Open a file with xarray, whose fields are then read under the lock."""
+    import xarray
+
+    with LOCK:
+        return xarray.open_dataset(path, engine="netcdf4", lock=LOCK, **options)

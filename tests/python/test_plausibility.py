@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from hexcontact import Case, open_result
+from hexcontact import AccuracyWarning, Case, PlausibilityWarning, open_result
 from hexcontact.analytic import hertz_ellipse, hertz_sphere
 from hexcontact.cli.app import app
 from hexcontact.core.estimators import expected_entry_error, expected_lattice_errors
@@ -111,6 +112,86 @@ def test_the_size_of_an_elongated_contact_is_two_half_axes() -> None:
     assert (major, minor) == pytest.approx((1e6 * pressed.semi_major, 1e6 * pressed.semi_minor), rel=0.05)
     assert "spacings in the smaller half-axis of the contact may" in plausibility.warnings(long)[0]
     assert plausibility.row(case()).startswith("radius about 234 µm, 20 spacings;")
+
+
+SOCKET = {"shape": "formula", "expression": "-(x**2 + y**2)/(2*10.05e-3)"}
+GROOVE = {"shape": "formula", "expression": "-x**2/(2*4.89e-3) + y**2/(2*18.2375e-3)"}
+
+
+@pytest.mark.parametrize(
+    ("radius", "other", "load", "slopes"),
+    [
+        (10e-3, SOCKET, 200e3, (1.379, 1.372)),  # contact radius 13.79 mm
+        (4.7625e-3, GROOVE, 555.5556, (0.2816, 0.2742)),  # half-axis 1.3409 mm
+    ],
+)
+def test_surfaces_that_conform_are_judged_by_the_slope_of_each(
+    radius: float, other: dict[str, str], load: float, slopes: tuple[float, float]
+) -> None:
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    bodies: Any = [{**steel, "surface": {"shape": "sphere", "radius": radius}}, {**steel, "surface": other}]
+    for turned in (False, True):
+        one, two = bodies[::-1] if turned else bodies
+        conforming = Case(body_1=one, body_2=two, nodes_in_radius=20, normal_load=load)
+        assert conforming.estimate is not None
+        found = conforming.estimate.body_slopes[::-1] if turned else conforming.estimate.body_slopes
+        assert found == pytest.approx(slopes, rel=0.07)  # to the node next to the edge
+        assert plausibility.expected(conforming)["gap_slope"] < 0.03
+        sentence = next(line for line in conforming.warnings if "half-space theory" in line)
+        assert sentence.startswith(f"body {1 + turned} slopes by {max(found):.2g} (the gap by 0.0")
+        assert f"slope at the edge {max(found):.2g} (the gap by" in plausibility.row(conforming)
+
+
+def test_a_gap_from_python_gets_a_note_that_the_bodies_are_not_judged() -> None:
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    known: Any = {"body_1": steel, "body_2": steel, "nodes_in_radius": 20, "normal_load": 100.0}
+    given = Case(**known, gap=lambda x, y: (x**2 + y**2) / 20e-3)
+    note = "note: the slopes of the bodies are not judged, since only their gap is known"
+    for shown in (repr(given), given._repr_html_(), repr(result := given.run()), result._repr_html_()):
+        assert note in shown
+    surface = {"shape": "sphere", "radius": 10e-3}
+    assert "note: " not in repr(Case(**known | {"body_1": {**steel, "surface": surface}}))
+
+
+def test_python_warns_once_at_the_line_of_the_program() -> None:
+    doubtful: Any = {"friction__coefficient": 55, "grid__nodes_in_radius": 3}
+    line = "friction.coefficient = 55, expected at most 3"
+    with pytest.warns(PlausibilityWarning) as built:
+        one = case(**doubtful)
+    assert [str(warning.message)[: len(line)] for warning in built] == [line]
+    with pytest.warns(PlausibilityWarning) as ran:
+        result = one.run(on_step=lambda step: True)
+    assert [str(warning.message) for warning in ran] == one.warnings[1:]
+    assert len(one.warnings) == 2
+    assert {warning.filename for warning in (*built, *ran)} == {__file__}
+    for shown in (repr(one), one._repr_html_(), repr(result), result._repr_html_()):
+        assert all(f"warning: {sentence}" in shown.replace("&#x27;", "'") for sentence in one.warnings)
+    with pytest.warns(PlausibilityWarning) as changed:
+        started = one.changed({"friction.coefficient": 0.3}).start()
+    assert [str(warning.message) for warning in changed] == [
+        sentence for sentence in started.case.warnings if "spacings" in sentence
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(one.warnings) == 2
+        one.run(on_step=lambda step: True)
+        repr(case(grid__nodes_in_radius=3))
+
+
+def test_adaptive_steps_that_miss_their_tolerance_are_warned_of() -> None:
+    load = [{"normal_load": 100.0, "tangential_load_x": 24.0, "steps": "auto"}]
+    solver = {"solver__entry": "implicit", "solver__step_tolerance": 1e-3}
+    for nodes in (5, 4, 6, 7):  # last bits decide on which lattices a step is limited
+        one = case(**solver, load=load, grid__nodes_in_radius=nodes)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            missed = one.run(on_step=lambda step: step.history["step_limited"] == 1).step_limited.values == 1
+        accuracy = [warning for warning in found if warning.category is AccuracyWarning]
+        assert len(accuracy) == missed.any()
+        if missed.any():
+            break
+    assert "than solver.step_tolerance = 0.001" in str(accuracy[0].message)
+    assert accuracy[0].filename == __file__
 
 
 def test_a_refined_lattice_is_judged_by_its_error_bars() -> None:

@@ -149,9 +149,8 @@ class Summary(NamedTuple):
             shown.print(TextTable("Against Hertz", HERTZ_HEADERS, rows))
         if self.result is not None and (rows := trial_rows(self.result)):
             shown.print(TextTable("Accuracy", TRIAL_HEADERS, rows))
-        printed = (
-            [] if whole_file else str(self.parameters.get("warnings", "")).splitlines()
-        )  # before the run
+        before = () if whole_file else ("warnings", "notes")  # printed before the run
+        printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
             if remark not in printed:
                 shown.print(f"note: {remark}", soft_wrap=True)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn, TypeGuard
+from typing import Any, Generic, NoReturn, TypeGuard, TypeVar
 
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -26,6 +26,8 @@ def refuse(sentence: str) -> NoReturn:
     raise PydanticCustomError("deck", "{sentence}", {"sentence": sentence})
 
 
+_Value = TypeVar("_Value")
+_Given = TypeVar("_Given")
 SMALLEST = 1.0 / LARGEST
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SHARE = rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*"  # both letters mu
@@ -67,6 +69,15 @@ class Kind:
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
         """Describe with `schema`."""
         return self.schema()
+
+
+class Read(Generic[_Value, _Given]):
+    """For type checkers: a field that is a value in SI, made of an argument that may carry a unit."""
+
+    def __get__(self, table: object, kind: type) -> _Value:
+        raise NotImplementedError
+
+    def __set__(self, table: object, value: _Given) -> None: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)

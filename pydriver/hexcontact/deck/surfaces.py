@@ -8,10 +8,10 @@ sphere). Body 2 has mirrored coordinates, so that the gap is the sum of both hei
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,16 +23,38 @@ from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
 from .formula import Formula
-from .kinds import Flag, HeightFormula, Kind, PowerCoefficient, Quantity, Schema, Several, Word, refuse
+from .kinds import (
+    Flag,
+    HeightFormula,
+    Kind,
+    PowerCoefficient,
+    Quantity,
+    Read,
+    Schema,
+    Several,
+    Word,
+    refuse,
+)
 from .model import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
-LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
-Angle = Annotated[float, Quantity(ANGLE)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
-Point = Annotated[tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
+if TYPE_CHECKING:
+    Radius = Read[float, float | str]
+    LengthFromZero = Read[float, float | str]
+    Angle = Read[float, float | str]
+    Coefficient = Read[float, float | str]
+    Point = Read[tuple[float, float], Sequence[float | str]]
+else:
+    Radius = PositiveLength
+    LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
+    Angle = Annotated[float, Quantity(ANGLE)]
+    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')]
+    Point = Annotated[
+        tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
+    ]
 
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
@@ -136,7 +158,7 @@ class Flat(Surface):
 class Sphere(Surface):
     """A sphere, as the paraboloid of the theory of Hertz, or as the true arc."""
 
-    radius: PositiveLength = meaning(..., "radius R")
+    radius: Radius = meaning(..., "radius R")
     exact: Annotated[bool, Flag()] = meaning(False, "take the true arc, not the parabola")
     formula: ClassVar[str] = "h = r²/(2R); exact: h = R − √(R² − r²) for r ≤ R"
 
@@ -163,8 +185,8 @@ class Sphere(Surface):
 class Paraboloid(Surface):
     """A surface with two principal radii of curvature."""
 
-    radius_x: PositiveLength = meaning(..., "radius of curvature R₁ along the first axis (x if angle is 0)")
-    radius_y: PositiveLength = meaning(..., "radius of curvature R₂ across it")
+    radius_x: Radius = meaning(..., "radius of curvature R₁ along the first axis (x if angle is 0)")
+    radius_y: Radius = meaning(..., "radius of curvature R₂ across it")
     angle: Angle = meaning(0.0, "angle of the first axis, from x towards y")
     formula: ClassVar[str] = "h = s²/(2R₁) + t²/(2R₂), s along and t across the first axis"
 
@@ -183,7 +205,7 @@ class Paraboloid(Surface):
 class Cylinder(Surface):
     """A parabolic cylinder with its axis in the plane."""
 
-    radius: PositiveLength = meaning(..., "radius R")
+    radius: Radius = meaning(..., "radius R")
     angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
     formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
 
@@ -222,7 +244,7 @@ class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
 
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
-    coefficient: Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')] = meaning(..., "coefficient C")
+    coefficient: Coefficient = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
 
     @field_validator("coefficient")
@@ -241,7 +263,7 @@ class Power(Surface):
 class Punch(Surface):
     """The flat end of a circular punch; nothing can touch outside it."""
 
-    radius: PositiveLength = meaning(..., "radius a of the flat end")
+    radius: Radius = meaning(..., "radius a of the flat end")
     formula: ClassVar[str] = "h = 0 for r ≤ a, nothing beyond"
 
     @property
@@ -258,7 +280,7 @@ class RoundedPunch(Surface):
     """A flat punch whose edge is a parabolic fillet."""
 
     flat_radius: LengthFromZero = meaning(..., "radius b of the flat middle")
-    edge_radius: PositiveLength = meaning(..., "radius of curvature R of the rounded edge")
+    edge_radius: Radius = meaning(..., "radius of curvature R of the rounded edge")
     formula: ClassVar[str] = "h = (r − b)²/(2R) for r > b, else 0"
 
     def _height(self, x: Array, y: Array) -> Array:

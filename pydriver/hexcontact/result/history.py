@@ -345,7 +345,7 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
     ]
     in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
     sentences = [
-        *str(parameters.get("warnings", "")).splitlines(),
+        *(line for name in ("warnings", "notes") for line in str(parameters.get(name, "")).splitlines()),
         unasked_path(in_parts, in_parts=True),
         unasked_path([k for k in cold if k not in in_parts], in_parts=False),
         halved_steps(histories, tolerance),

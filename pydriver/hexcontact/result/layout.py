@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..arrays import integer
 from ..core.lattice import Lattice
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES, Variable
@@ -271,6 +272,7 @@ def lattice_of(dataset: xarray.Dataset) -> Lattice:
 
 def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
     """Return a load step of a result by its number, see `hexcontact.Result.step`."""
+    number = integer(number, "step", "the number of a load step, from 1; -1 is the last one")
     numbers = dataset["step"].values
     if -len(numbers) <= number < 0:
         return dataset.isel(step=number)

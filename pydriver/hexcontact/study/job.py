@@ -16,7 +16,7 @@ from .._version import __version__
 from ..errors import HexcontactError, ResourceError
 
 if TYPE_CHECKING:
-    from ..case import Case
+    from ..problem.problem import Problem
     from ..result.step import Step
     from ..solve.events import Listener
     from ..solve.restart import Restart
@@ -78,8 +78,8 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     Outcome
         Also of a failure, which is not raised.
     """
-    from ..case import Case
     from ..interior.tables import files_of
+    from ..problem.problem import Problem
     from ..result.store import Store
     from ..solve.run import listeners, metadata_of, run_into
 
@@ -95,7 +95,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
 
     began = False
     try:
-        case = Case.from_text(job.deck, target.name)
+        case = Problem.from_text(job.deck, target.name)
         with contextlib.ExitStack() as stack:
             restart = _interrupted(job, case, stack)
             if restart is None:
@@ -126,7 +126,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     return Outcome(job.hash, seconds=time.perf_counter() - started)
 
 
-def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart | None:
+def _interrupted(job: Job, case: Problem, stack: contextlib.ExitStack) -> Restart | None:
     """Reopen the journal of an interrupted attempt to continue it; None if there is none."""
     from ..result.journal import journal_of
     from ..solve.restart import reopened

@@ -211,7 +211,7 @@ class Case(Problem):
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on limits of theory, lattice and load steps that the case exceeds, as `check` prints them.
+        """Sentences on limits of theory, lattice and load steps that the case exceeds, those of `check`.
 
         Each is raised once as a `PlausibilityWarning`: when the case is built if it takes no estimate of the
         contact, else here or by `run` or `start`.

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
     import xarray
 
-Value = float | int | str
-
 _LENGTHS = 26  # byte of a member of an archive at which the lengths of its name and extra field stand
 _BLOCK = 2**20  # bytes that are read at a time
 
@@ -125,7 +123,7 @@ class Step:
     index: int
     lattice: Lattice
     fields: Mapping[str, NDArray[Any]]
-    history: Mapping[str, Value]
+    history: Mapping[str, Any]
     companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     control: Mapping[str, Any] = field(default_factory=dict)
     prescribed: Mapping[str, float] = field(default_factory=dict)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable
+from ..result.history import extent_of
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solving
@@ -24,6 +25,7 @@ from .options import LogLevel
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
+    from ..result.history import Extent
     from ..result.step import Step
     from ..result.store import Store
 
@@ -78,13 +80,14 @@ class Messages:
         self,
         case: Problem,
         histories: list[Any],
+        extent: Extent | None,
         target: Path,
         picture: Path | None,
         warnings: Sequence[str] = (),
     ) -> dict[str, Any] | None:
         """Print or return the result of a run, with a message on an accuracy that was not reached."""
         refined = open_result(target) if case.accuracy else None
-        summary = tables.Summary.of_run(case, histories, refined)
+        summary = tables.Summary.of_run(case, histories, refined, extent)
         shortfall = refined.shortfall if refined is not None else ""
         if shortfall:
             print_error(shortfall)
@@ -120,8 +123,8 @@ def solved(
     name: str,
     messages: Messages,
     before: Sequence[Step] = (),
-) -> list[Any]:
-    """Solve a case into a store and return the histories of all its steps.
+) -> tuple[list[Any], Extent | None]:
+    """Solve a case into a store; return the histories of all its steps and the extent of the last contact.
 
     Signals end the process, unless the last step is finished: then the output is completed.
     """
@@ -133,14 +136,21 @@ def solved(
         return not store.finished
 
     histories: list[Any] = [step.history for step in before]
-    listener = solving.listeners(case, reporter(messages.silent), lambda step: histories.append(step.history))
+    extent: Extent | None = None
+
+    def note(step: Step) -> None:
+        nonlocal extent
+        histories.append(step.history)
+        extent = extent_of(step)
+
+    listener = solving.listeners(case, reporter(messages.silent), note)
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
         with listener.following(title, case.planned_steps):
             in_background(lambda: solving.run_into(case, store, listener, before), pipe, ends)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
-    return histories
+    return histories, extent
 
 
 def overview(path: Path) -> Path:

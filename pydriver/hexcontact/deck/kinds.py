@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
 import re
@@ -301,6 +302,20 @@ class Flag(Kind):
 
     def _schema(self) -> Schema:
         return {"type": "boolean"}
+
+
+class RadiusOfCurvature(Quantity):
+    """A radius of curvature above 0; that of a hollow is refused with a remedy."""
+
+    def _parse(self, value: object) -> float:
+        try:
+            return super()._parse(value)
+        except PydanticCustomError as error:
+            with contextlib.suppress(UnitError):
+                if to_si(value, self.dimension) < 0.0:
+                    example = '{ shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }'
+                    refuse(f"{error.message()}; a hollow is a formula with its radii in m: {example}")
+            raise
 
 
 @dataclass(frozen=True, eq=False, repr=False)

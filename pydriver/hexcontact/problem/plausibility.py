@@ -133,6 +133,7 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         return found
     found |= {
         "contact_radius": known.radius,
+        "extent": tuple(known.size.tolist()),
         "half_width": known.half_width,
         "max_pressure": known.max_pressure,
         "slope": max(known.slope, *known.body_slopes, 0.0),
@@ -180,7 +181,9 @@ def row(case: Problem) -> str:
     size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {found['spacings']:.2g} spacings"
     if axes:
         major, minor = (quantity(axis, "m", 3) for axis in axes)
-        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one"
+        along, across = (quantity(length, "m", 3) for length in found["extent"])
+        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one; "
+        size += f"extent about {along} in x, {across} in y"
     return (
         f"{size}; p_max about {pressure}, "
         f"{found['pressure_ratio']:.2g} E*; slope at the edge {found['slope']:.2g}"

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
-from .history import step_rows
+from .history import extent_of, step_rows
 from .layout import history_of
 from .raster import SLIP, STICK, Plane, png_of
 from .view import StepView
@@ -43,7 +43,7 @@ def result_rows(dataset: xarray.Dataset) -> list[Row]:
     last = dataset.isel(step=-1)
     history = {name: last[name].item() for name in history_of(dataset)}
     try:
-        return list(step_rows(history))
+        return list(step_rows(history, extent_of(last)))
     except KeyError:  # a data set with some quantities only
         return [(spelled(name), f"{value}") for name, value in history.items()]
 

@@ -274,9 +274,9 @@ class Step:
 
     def _repr_html_(self) -> str:
         from ..text import html_table
-        from .history import step_rows
+        from .history import extent_of, step_rows
 
-        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history))
+        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
 
 
 def _read_only(values: NDArray[Any]) -> NDArray[Any]:

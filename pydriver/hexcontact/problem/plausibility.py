@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.estimators import LATTICE_ERRORS, expected_entry_error, expected_lattice_errors
+from ..core.estimators import LATTICE_ERRORS, NO_VALUE, expected_entry_error, expected_lattice_errors
 from ..deck.interface import TwoCoefficients
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
@@ -158,7 +158,11 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
     """Return a sentence for each limit that a case exceeds; arguments as `expected`."""
     found = expected(case, estimated)
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
-    worth = [f"{percent(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
+    worth = [
+        f"{percent(error)}{' or more' * (error >= NO_VALUE)} in the {spelled(name)}"
+        for error, name in errors
+        if error > 0.01
+    ]
     known = found | {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",

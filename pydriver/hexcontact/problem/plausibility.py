@@ -88,7 +88,7 @@ LIMITS = (
     ),
     Limit(
         "lattice_error",
-        "{spacings:.2g} spacings in the {radius_words} may leave errors of {lattice_words}; "
+        "{spacing_words} in the {radius_words} may leave errors of {lattice_words}; "
         "{needed_spacings:g} leave at most 5 %",
         "Errors fall with the square of the spacings, or faster: (X1), (X2)",
         most=_LATTICE_ERROR,
@@ -166,6 +166,7 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
     known = found | {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
+        "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": _even_steps(found.get("growing_steps", 0.0)),
         "step_percent": percent(found.get("step_error", 0.0)),
@@ -222,6 +223,12 @@ def _half_axes(found: dict[str, Any]) -> tuple[float, float] | None:
     if "half_width" not in found or found["half_width"] > _ROUND * found["contact_radius"]:
         return None
     return found["contact_radius"] ** 2 / found["half_width"], found["half_width"]
+
+
+def _counted(count: float, noun: str) -> str:
+    """Return a number of things in words."""
+    words = f"{count:.2g}"
+    return f"{words} {noun}{'s' * (words != '1')}"
 
 
 def _even_steps(count: float) -> str:

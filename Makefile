@@ -177,7 +177,7 @@ package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build t
 
 lint: install $(STAMPS)/extra-lint $(STAMPS)/extra-test  ## check style, types and spelling
 	@code=0; \
-	for check in 'ruff check' 'ruff format --check' mypy 'fortitude check fortran tests docs' codespell; do \
+	for check in 'ruff check' 'ruff format --check' mypy 'python docs/site/typed.py' 'fortitude check fortran tests docs' codespell; do \
 	  echo "$$check"; $$check || code=1; \
 	done; \
 	exit $$code

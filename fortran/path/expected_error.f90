@@ -13,7 +13,7 @@ module hc_expected_error
   public :: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, entry_steps, &
             oblique_error, oblique_steps, turning_error
 
-  !> Relative errors that a lattice leaves at most, in nine of ten positions of it.
+  !> Relative errors that a lattice leaves at most; the largest one says no more than that the quantity may be wrong altogether.
   type :: lattice_errors_t
     !> Largest pressure, contact area to the edge between the nodes
     real(wp) :: max_pressure = 0.0_wp, contact_area = 0.0_wp
@@ -21,13 +21,16 @@ module hc_expected_error
     real(wp) :: stick_area = 0.0_wp, dissipated_energy = 0.0_wp
   end type lattice_errors_t
 
-  !> Errors of 1/n^2 with n spacings in the radius: of the largest pressure, the contact area, the stick area
-  real(wp), parameter :: of_pressure = 0.12_wp, of_area = 0.4_wp, of_stick = 0.8_wp
-  !> Spacings from which that is true of the stick area: fewer have one or two nodes in it
-  real(wp), parameter :: least_stick = 3.0_wp
-  !> Error and exponent of the energy that a slip ring of one spacing dissipates; where it is narrower than half of one the
-  !> energy is off by 65 % and says nothing
-  real(wp), parameter :: of_ring = 0.09_wp, ring_order = 3.5_wp, no_value = 0.65_wp
+  !> Errors times n^2 with n spacings in the radius: of the largest pressure, the contact area, the dissipated energy; of the
+  !> stick area with n spacings in its radius
+  real(wp), parameter :: of_pressure = 0.12_wp, of_area = 0.56_wp, of_energy = 2.0_wp, of_stick = 0.65_wp
+  !> Spacings in the contact radius and in the stick radius below which these rules end, and by which power of them the
+  !> error of the pressure grows there
+  real(wp), parameter :: few = 2.0_wp, few_stick = 2.3_wp, few_order = 1.75_wp
+  !> Error and exponent of the energy that a slip ring of one spacing dissipates, and spacings in it that are too few
+  real(wp), parameter :: of_ring = 0.11_wp, ring_order = 3.5_wp, narrow = 0.8_wp
+  !> Error that stands for no value at all
+  real(wp), parameter :: no_value = 0.65_wp
   !> -ln of the error of a contact pressed in one step without slip, what slip adds, its exponent, and what a step adds
   real(wp), parameter :: no_slip = 0.2_wp, slip_share = 1.2_wp, slip_order = 1.2_wp, per_step = 0.13_wp
   !> Error of an oblique load in one step, exponent of what friction has left, and what a step divides it by
@@ -42,23 +45,43 @@ contains
     !> Width of the slip ring over the radius; 0: nothing slips
     real(wp), intent(in) :: ring
     type(lattice_errors_t) :: errors
+    real(wp) :: stick
 
-    errors%max_pressure = min(no_value, of_pressure/spacings**2)
-    errors%contact_area = min(no_value, of_area/spacings**2)
+    errors%max_pressure = min(no_value, of_pressure/spacings**2*max(1.0_wp, few/spacings)**few_order)
+    errors%contact_area = merge(of_area/spacings**2, no_value, spacings >= few)
     if (ring <= 0.0_wp) return
-    errors%stick_area = merge(of_stick/spacings**2, no_value, spacings >= least_stick)
-    errors%dissipated_energy = min(no_value, of_ring*(ring*spacings)**(-ring_order))
+    stick = 1.0_wp - ring
+    if (stick > 0.0_wp) errors%stick_area = merge(of_stick/(stick*spacings)**2, no_value, stick*spacings >= few_stick)
+    if (ring*spacings >= narrow) then
+      errors%dissipated_energy = min(no_value, of_ring*(ring*spacings)**(-ring_order) + of_energy/spacings**2)
+    else ! all of it may stick
+      errors%dissipated_energy = no_value
+      errors%stick_area = min(no_value, errors%stick_area + 1.0_wp/stick**2 - 1.0_wp)
+    end if
   end function lattice_errors
 
-  !> Estimate the spacings in the radius that leave no more than an error in any of them, (X1) and (X2) solved for them.
+  !> Estimate the spacings in the radius that leave no more than an error in any of them, (X1) and (X2) solved by bisection.
   elemental real(wp) function lattice_spacings(error, ring)
-    !> The error
+    !> The error, below that of no value
     real(wp), intent(in) :: error
     !> Width of the slip ring over the radius; 0: nothing slips
     real(wp), intent(in) :: ring
+    type(lattice_errors_t) :: errors
+    real(wp) :: too_few, middle
+    integer :: k
 
-    lattice_spacings = sqrt(of_area/error)
-    if (ring > 0.0_wp) lattice_spacings = max(sqrt(of_stick/error), (of_ring/error)**(1.0_wp/ring_order)/ring)
+    too_few = 0.0_wp
+    lattice_spacings = 1.0e4_wp*sqrt(1.0_wp/error)
+    if (ring > 0.0_wp) lattice_spacings = lattice_spacings/min(ring, max(1.0_wp - ring, epsilon(ring)))
+    do k = 1, 2*digits(ring)
+      middle = 0.5_wp*(too_few + lattice_spacings)
+      errors = lattice_errors(middle, ring)
+      if (max(errors%max_pressure, errors%contact_area, errors%stick_area, errors%dissipated_energy) > error) then
+        too_few = middle
+      else
+        lattice_spacings = middle
+      end if
+    end do
   end function lattice_spacings
 
   !> Compute the width of the slip ring over the contact radius under a load Q: 1 - (1 - Q/mu P)^(1/3) (Cattaneo, Mindlin).

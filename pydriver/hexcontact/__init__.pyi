@@ -20,6 +20,7 @@ from .errors import DeckError as DeckError
 from .errors import HexcontactError as HexcontactError
 from .errors import KernelFolderWarning as KernelFolderWarning
 from .errors import PathWarning as PathWarning
+from .errors import PlausibilityWarning as PlausibilityWarning
 from .errors import ResourceError as ResourceError
 from .errors import RimWarning as RimWarning
 from .errors import StopRun as StopRun

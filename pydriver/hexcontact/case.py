@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from numpy.typing import ArrayLike
 
 from .arrays import Array
 from .core.lattice import Lattice
-from .deck.read import assemble
-from .deck.tables import Grid, Solver
-from .deck.toml import refuse_deep
+from .deck.read import Assembled, assemble
+from .deck.tables import FINENESS, Grid, Solver
+from .deck.toml import refuse_deep, with_overrides
 from .deck.write import plain
-from .errors import DeckError
-from .problem.arguments import Body, known_keywords, middle_of, with_radians
+from .errors import DeckError, PlausibilityWarning, warn
+from .problem import plausibility
+from .problem.arguments import Body, known_keywords, middle_of, refuse_unknown, with_radians
 from .problem.friction_law import given_coefficient
-from .problem.gap import given_gap
+from .problem.gap import GivenGap, given_gap
 from .problem.loads import LoadStep, Target
 from .problem.problem import Problem
 
@@ -29,6 +30,23 @@ if TYPE_CHECKING:
 
 __all__ = ["Body", "Case", "LoadStep", "Target"]
 
+_LOADS = ("normal_load", "approach", "steps")
+_ARGUMENTS = {  # of a case, with their keys in a deck
+    "title": "title",
+    "body_1": "body.1",
+    "body_2": "body.2",
+    "interface": "interface",
+    "friction_coefficient": "friction.coefficient",
+    "shear_limit": "friction.shear_limit",
+    "bulk": "bulk",
+    **{key: f"grid.{key}" for key in Grid.model_fields},
+    **{key: f"solver.{key}" for key in Solver.model_fields},
+    "accuracy": "accuracy",
+    "wear": "wear",
+    **dict.fromkeys(("loads", *_LOADS), "load"),
+    "fields": "output.fields",
+    "every": "output.every",
+}
 _LEFT_OUT = ("friction", "interface", "solver", "wear", "output")  # tables, if they are empty
 
 
@@ -112,22 +130,22 @@ class Case(Problem):
         body_2: Body | Mapping[str, Any],
         gap: Callable[[Array, Array], ArrayLike] | ArrayLike | None = None,
         lattice: Lattice | None = None,
-        spacing: float | None = None,
+        spacing: float | str | None = None,
         nodes_across: int | None = None,
         nodes_in_radius: float | None = None,
-        extent: str | Sequence[float] | None = None,
+        extent: str | Sequence[float | str] | None = None,
         window: Sequence[int] | None = None,
-        center: Sequence[float] | None = None,
-        origin: Sequence[float] | None = None,
-        normal_load: float | None = None,
-        approach: float | None = None,
+        center: Sequence[float | str] | None = None,
+        origin: Sequence[float | str] | None = None,
+        normal_load: float | str | None = None,
+        approach: float | str | None = None,
         steps: int | str | None = None,
         interface: Mapping[str, Any] | None = None,
         loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,
         friction_coefficient: (
             float | str | Mapping[str, Any] | ArrayLike | Callable[[Array, Array], ArrayLike] | None
         ) = None,
-        shear_limit: float | None = None,
+        shear_limit: float | str | None = None,
         bulk: Mapping[str, Any] | None = None,
         algorithm: str | None = None,
         method: str | None = None,
@@ -143,7 +161,6 @@ class Case(Problem):
         title: str = "",
     ) -> None:
         own_gap = given_gap(gap, lattice)
-        mu = given_coefficient(friction_coefficient, lattice)
         if lattice is not None:
             for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
                 if value is not None:
@@ -151,27 +168,58 @@ class Case(Problem):
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
             if not callable(own_gap):  # the deck of the case leads to the same window
                 center = middle_of(lattice)
-        if loads is None:
-            loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
-        elif normal_load is not None or approach is not None or steps is not None:
-            raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
         arguments = locals()
-        data = {
-            "title": title or None,
-            "body": {"1": body_1, "2": body_2},
-            "interface": interface,
-            "friction": {"coefficient": mu, "shear_limit": shear_limit},
-            "bulk": bulk,
-            "grid": {key: arguments[key] for key in Grid.model_fields},
-            "solver": {key: arguments[key] for key in Solver.model_fields},
-            "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
-            "wear": wear,
-            "load": [loads] if isinstance(loads, Mapping) else loads,
-            "output": {"fields": fields, "every": every},
-        }
-        refuse_deep(data, "")
-        data = {key: value for key, value in plain(data).items() if value or key not in _LEFT_OUT}
-        self._set_up(assemble({**data, "load": with_radians(data["load"])}), own_gap, lattice)
+        data = with_overrides({}, _deck_keys({name: arguments[name] for name in _ARGUMENTS}, lattice))
+        data = {key: value for key, value in data.items() if value or key not in _LEFT_OUT}
+        self._set_up(assemble(data), own_gap, lattice)
+
+    def changed(self, changes: Mapping[str, Any] | None = None, **arguments: Any) -> Self:
+        """Return the same case with other values for some keys of its deck, or some arguments of `Case`.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
+            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is computed
+            again, also if a `Lattice` was given; that of a gap over its nodes cannot change.
+        **arguments
+            New values of arguments of `Case`, such as ``spacing="5 um"``, which replaces ``nodes_in_radius``,
+            or ``normal_load=20.0``, which replaces all loads.
+
+        Raises
+        ------
+        DeckError
+            With a sentence for each fault.
+        TypeError
+            If there is no such argument; it names the nearest.
+        """
+        refuse_unknown(arguments, _ARGUMENTS, "Case.changed")
+        if arguments.keys() & FINENESS:
+            arguments = dict.fromkeys(FINENESS) | arguments
+        return super().changed({**(changes or {}), **_deck_keys(arguments, None)})
+
+    def _set_up(self, given: Assembled, gap: GivenGap | None, lattice: Lattice | None) -> None:
+        super()._set_up(given, gap, lattice)
+        self._warned: set[str] = set()
+        self._warn(plausibility.warnings(self, estimated=False))
+
+    def _warn(self, sentences: Sequence[str]) -> None:
+        """Raise those of some warnings that were not raised before."""
+        for sentence in sentences:
+            if sentence not in self._warned:
+                self._warned.add(sentence)
+                warn(sentence, PlausibilityWarning)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences on limits of theory, lattice and load steps that the case exceeds, those of `check`.
+
+        Each is raised once as a `PlausibilityWarning`: when the case is built if it takes no estimate of the
+        contact, else here or by `run` or `start`.
+        """
+        found = plausibility.warnings(self)
+        self._warn(found)
+        return found
 
     def run(
         self,
@@ -200,6 +248,15 @@ class Case(Problem):
         Result
             All load steps, or those up to where `on_step` ended the run.
 
+        Warns
+        -----
+        PlausibilityWarning
+            For each of `warnings` that was not raised before.
+        AccuracyWarning
+            If an accuracy that the case asks for was not reached.
+        PathWarning
+            If a static load step, or one that begins without contact, was solved in parts.
+
         Raises
         ------
         DeckError, ConvergenceError, ResourceError
@@ -207,6 +264,7 @@ class Case(Problem):
         """
         from .solve.run import run
 
+        self._warn(plausibility.warnings(self))
         return run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
 
     def start(self, output: str | Path | None = None, overwrite: bool = False) -> Session:
@@ -226,11 +284,45 @@ class Case(Problem):
         """
         from .solve.session import Session
 
+        self._warn(plausibility.warnings(self))
         return Session(self, output, overwrite)
+
+    def __repr__(self) -> str:
+        """Name the case, its window and its steps, and show its warnings."""
+        return "\n  ".join([super().__repr__(), *self._notes])
+
+    @property
+    def _notes(self) -> list[str]:
+        """The warnings, marked, and what is not judged."""
+        notes = [f"warning: {sentence}" for sentence in plausibility.warnings(self)]
+        return [*notes, *([f"note: {note}"] if (note := plausibility.unjudged(self)) else [])]
 
     def _repr_html_(self) -> str:
         from .problem.overview import case_rows
         from .solve.frictionless import peak_memory
         from .text import html_table
 
-        return html_table(self.title or "Case", ("", ""), case_rows(self, peak_memory))
+        return html_table(
+            self.title or "Case", ("", ""), case_rows(self, peak_memory), "; ".join(self._notes)
+        )
+
+
+def _deck_keys(arguments: Mapping[str, Any], lattice: Lattice | None) -> dict[str, Any]:
+    """Return arguments of a case by the dotted keys of its deck."""
+    single = {name: arguments[name] for name in _LOADS if arguments.get(name) is not None}
+    loads, accuracy = arguments.get("loads"), arguments.get("accuracy")
+    if single and loads is not None:
+        raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
+    found = {_ARGUMENTS[name]: value for name, value in arguments.items()}
+    if "load" in found:
+        loads = single if loads is None else loads
+        found["load"] = [loads] if isinstance(loads, Mapping) else loads
+    refuse_deep(found, "")
+    if found.get("title") == "":
+        found["title"] = None
+    if "friction_coefficient" in arguments:
+        found["friction.coefficient"] = given_coefficient(arguments["friction_coefficient"], lattice)
+    if isinstance(accuracy, int | float):
+        found["accuracy"] = {"target": accuracy}
+    found = {key: plain(value) for key, value in found.items()}
+    return found | {"load": with_radians(found["load"])} if "load" in found else found

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -67,12 +69,16 @@ class NoSuchStep(DeckError, IndexError):
     """There is no load step of this number."""
 
 
+class PlausibilityWarning(UserWarning):
+    """A case exceeds a limit of the theory, of its lattice or of its load steps; nothing is refused."""
+
+
 class KernelFolderWarning(UserWarning):
     """Spectra of kernels cannot be stored in a folder or read from it; results do not change."""
 
 
 class AccuracyWarning(UserWarning):
-    """The lattice could not be refined to the target accuracy; the result is that of the finest one."""
+    """An accuracy was not reached: that of [accuracy] on the finest lattice, or solver.step_tolerance."""
 
     exit_code = 3
 
@@ -112,3 +118,11 @@ class StopRun(Exception):
 
     `hexcontact.Case.run` catches it and returns the finished steps.
     """
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Raise a warning at the line outside the package whose call led here."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_globals.get("__name__", "").partition(".")[0] == __package__ and frame.f_back is not None:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)

@@ -530,6 +530,26 @@ def test_a_change_of_the_grid_leaves_a_height_map_in_place() -> None:
     assert solved(finer).approach == pytest.approx(solved(case).approach, rel=3e-3)
 
 
+def test_arguments_may_change_as_keys_do() -> None:
+    case = sphere_on_flat(nodes_in_radius=8, friction_coefficient=0.3)
+    for arguments, keys in (
+        ({"spacing": "10 um"}, {"grid.nodes_in_radius": None, "grid.spacing": 1e-5}),
+        (
+            {"friction_coefficient": 0.2, "tolerance": 1e-6},
+            {"friction.coefficient": 0.2, "solver.tolerance": 1e-6},
+        ),
+        ({"normal_load": 2.0, "steps": 3}, {"load": [{"normal_load": 2.0, "steps": 3}]}),
+        ({"accuracy": 0.05, "title": "again"}, {"accuracy.target": 0.05, "title": "again"}),
+        ({"body_2": {"rigid": True}}, {"body.2": {"rigid": True}}),
+    ):
+        assert case.changed(**arguments) == case.changed(keys) != case  # type: ignore[arg-type]
+    assert case.changed({"grid.nodes_in_radius": 9}, tolerance=1e-6).solver.tolerance == 1e-6
+    with pytest.raises(TypeError, match="^spacin: unknown argument of Case.changed; did you mean spacing"):
+        case.changed(spacin=1e-5)
+    with pytest.raises(DeckError, match="^loads: expected either loads, or normal_load or approach"):
+        case.changed(normal_load=1.0, loads=[{"approach": 1e-6}])
+
+
 def test_cases_survive_pickling() -> None:
     for case in (
         sphere_on_flat(nodes_across=21),

@@ -25,6 +25,7 @@ from hexcontact import Case, DeckError
 from hexcontact.case import Body
 from hexcontact.cli.app import app
 from hexcontact.deck import model
+from hexcontact.deck.surfaces import SHAPES
 from hexcontact.deck.write import starter
 from hexcontact.surfaces import Sphere
 from hexcontact.text import cut
@@ -372,3 +373,112 @@ def test_features_that_are_not_included_point_to_the_limits(folder: Path, key: s
         Case.from_toml("deck.toml", {f"body.1.{key}": 1})
     with pytest.raises(TypeError, match=r"unknown argument of Case; [a-z ]+: not included \(docs/limits\.md"):
         Case(**{"body_1": {}, "body_2": {}, key: 1})
+
+
+# --- contacts that are hollow, long, or no ellipse ----------------------------------------------------------
+
+BODIES = """
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = {}
+[body.2]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = {}
+[grid]
+{}
+[[load]]
+normal_load = "{} N"
+"""
+BALL = '{ shape = "sphere", radius = "4.7625 mm" }'
+FLAT = '{ shape = "flat" }'
+
+
+def of_formula(expression: str) -> str:
+    return f'{{ shape = "formula", expression = "{expression}" }}'
+
+
+def test_a_groove_of_a_formula_is_compared_with_hertz(folder: Path) -> None:
+    groove = of_formula("-x**2/(2*4.89e-3) + y**2/(2*18.2375e-3)")
+    Path("groove.toml").write_text(BODIES.format(BALL, groove, "nodes_in_radius = 20", 555.5556))
+    shown = command("run", "groove.toml").stdout
+    exact = re.findall(
+        r"^ *(max pressure|approach|\w+ half-axis).*? +([\d.]+ \wm|[\d.]+ GPa) .*%", shown, re.M
+    )
+    assert [(name, value) for name, value in exact] == [
+        ("max pressure", "1.74585 GPa"),
+        ("approach", "6.62184 µm"),
+        ("larger half-axis", "1.34091 mm"),
+        ("smaller half-axis", "113.308 µm"),
+    ]
+    assert "Against Hertz" in command("info", "groove.nc").stdout
+    moved = groove.replace(" }", ', offset = ["0.1 mm", "0 mm"] }')
+    Path("moved.toml").write_text(BODIES.format(BALL, moved, "nodes_in_radius = 20", 555.5556))
+    assert "Against Hertz" not in command("run", "moved.toml").stdout  # first touch is not at height 0
+
+
+def test_half_axes_of_a_roller_are_those_of_the_ellipse_with_the_same_moments(folder: Path) -> None:
+    roller = of_formula("y**2/16e-3 + 0.00035*16e-3*log(1/max(1-(2*x/16e-3)**2, 1e-12))")
+    grid = 'spacing = "40 um"\nextent = ["16 mm", "0.8 mm"]'
+    Path("roller.toml").write_text(BODIES.format(roller, FLAT, grid, 10e3))
+    for words in (("run", "roller.toml"), ("info", "roller.nc")):
+        shown = re.sub(r"\s+", " ", command(*words).stdout)
+        assert re.search(
+            r"contact half-axes 8\.\d+ mm by 2\d\d\.\d µm of the ellipse with the same moments; the contact "
+            r"extends over 15\.3 mm in x and [45]\d\d µm in y",
+            shown,
+        ), shown
+    checked = re.sub(r"\s+", " ", command("check", "roller.toml").stdout)
+    assert re.search(r"half-axes about 8\.\d+ mm by .*; extent about 15\.\d mm in x, 5\d\d µm in y", checked)
+    ellipse = '{ shape = "paraboloid", radius_x = "50 mm", radius_y = "5 mm" }'
+    Path("ellipse.toml").write_text(BODIES.format(ellipse, FLAT, "nodes_in_radius = 8", 100))
+    assert "same moments" not in command("run", "ellipse.toml").stdout
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "sentence"),
+    [
+        (
+            BALL,
+            '{ shape = "paraboloid", radius_x = "-4.89 mm", radius_y = "18.2375 mm" }',
+            'radius_x = "-4.89 mm": expected a length above 0 such as "1 mm"; a hollow is a formula with its '
+            'radii in m: { shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }',
+        ),
+        (
+            '{ shape = "cylinder", radius = "10 mm" }',
+            FLAT,
+            "touch along a line, so the contact has no end; expected a shape that bounds it: a paraboloid "
+            "with a large radius along the line, as in cases/long_cylinder.toml, or a formula with ends",
+        ),
+        (of_formula("y**2/16e-3"), FLAT, "touch along a line, so the contact has no end"),
+        (BALL, of_formula("-(x**2 + y**2)/9e-3"), "the gap falls away from the point of contact"),
+    ],
+)
+def test_surfaces_without_a_contact_get_a_remedy(one: str, two: str, sentence: str, folder: Path) -> None:
+    Path("deck.toml").write_text(BODIES.format(one, two, "nodes_in_radius = 10", 20))
+    [line] = refused("check", "deck.toml")
+    assert sentence in line
+
+
+@pytest.mark.parametrize(
+    ("expression", "form"),
+    [
+        ("(x**2 + y**2)/2e-2", [[100.0, 0.0], [0.0, 100.0]]),
+        ("x*y/1e-2 - y**2", [[0.0, 100.0], [100.0, -2.0]]),
+        ("0", [[0.0, 0.0], [0.0, 0.0]]),
+        ("x**2 + 1e-12", None),
+        ("(x - 1e-9)**2", None),
+        ("min(x**2, 1)", None),
+        ("max(x**2, y**2)", None),
+        ("x**2 + x**4", None),
+        ("abs(x)", None),
+        ("x**2/2e-2 + 1e-9*sin(1e6*x)", None),
+        ("1e-2 - sqrt(1e-4 - x**2 - y**2)", None),
+    ],
+)
+def test_quadratic_forms_are_recognized_in_formulas(expression: str, form: list[list[float]] | None) -> None:
+    found = SHAPES["formula"](expression=expression).curvature
+    assert (found is None) == (form is None)
+    if form is not None:
+        assert found == pytest.approx(np.array(form), abs=1e-11)

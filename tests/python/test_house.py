@@ -92,6 +92,12 @@ def test_every_file_of_the_package_is_installed() -> None:
     assert {path.relative_to(ROOT / "pydriver").as_posix() for path in sources} == set(listed)
 
 
+def test_every_public_name_is_in_the_typed_calls() -> None:
+    calls = (ROOT / "tests/typing/calls.py").read_text()
+    errors = {name for name in hexcontact.__all__ if hasattr(hexcontact.errors, name)}
+    assert {name for name in hexcontact.__all__ if not re.search(rf"\b{name}\b", calls)} - errors == set()
+
+
 def test_every_quick_test_is_there() -> None:
     listed = (ROOT / "tests/check.txt").read_text().split()
     assert listed

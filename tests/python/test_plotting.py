@@ -1,5 +1,6 @@
 """Pictures: what they show is what the result says. The results here are made from closed solutions."""
 
+import re
 import subprocess
 import sys
 from typing import Any
@@ -12,11 +13,12 @@ import xarray
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
-from hexcontact import Result, analytic, plotting
+from hexcontact import Case, Result, analytic, plotting
 from hexcontact.analytic import EllipticContact
 from hexcontact.core import estimators
 from hexcontact.plotting import maps as plotting_maps
 from hexcontact.plotting.registry import entries
+from hexcontact.plotting.style import new_figure, set_title
 from hexcontact.result.view import StepView
 from hexcontact.text import scaled, worded
 
@@ -447,3 +449,46 @@ def test_what_cannot_be_drawn_is_said() -> None:
 def test_no_window_system_is_touched() -> None:
     code = "import sys, hexcontact.plotting; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_long_titles_break_between_words_and_loads() -> None:
+    loads = r"$P$ = 500 N, $Q_x$ = −137.5 N, bulk $\sigma_{xx}$ = −200 MPa, bulk $\sigma_{yy}$ = −68.4 MPa"
+    title = f"Dovetail rig, Ti-6Al-4V, cylinder-like pad, step 36 ({loads})"
+    for width in (2.4, 3.6, 4.8, 8.6):
+        figure = new_figure(width, 3.0)
+        set_title(figure, title)
+        lines = figure.get_suptitle().split("\n")
+        assert " ".join(lines) == title
+        assert all(line.count("$") % 2 == 0 for line in lines)
+        assert not any(line.endswith("step") or line.endswith("=") for line in lines)
+
+
+@pytest.mark.parametrize("across", ["x", "y"])
+def test_very_long_contacts_are_stretched_across(across: str) -> None:
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    radii = {f"radius_{axis}": 5e-3 if axis == across else 1.2 for axis in "xy"}
+    body: Any = {**steel, "surface": {"shape": "paraboloid", **radii}}
+    result = Case(body_1=body, body_2=steel, spacing=15e-6, normal_load=100.0).run()
+    assert 25 < float(result.contact_semi_major[-1] / result.contact_semi_minor[-1]) < 40
+    figure = plotting.pressure_field(result)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    shown = axes.get_window_extent()
+    thick, long = sorted((shown.width, shown.height))
+    assert thick > long / 9.0
+    assert re.search("scale × [3-6]$", getattr(axes, f"get_{across}label")())
+    assert "scale" not in getattr(axes, f"get_{'xy'['yx'.index(across)]}label")()
+
+
+def test_energy_that_friction_dissipates_vanishes_at_the_edge_of_the_contact() -> None:
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    body: Any = {**steel, "surface": {"shape": "sphere", "radius": 10e-3}}
+    loads = [{"normal_load": 100.0}, {"tangential_load_x": 20.0, "steps": 3}]
+    result = Case(body_1=body, body_2=steel, nodes_in_radius=8, friction_coefficient=0.3, loads=loads).run()
+    drawing: Any = plotting.FIGURES["dissipation_density"](result).axes[0]
+    [corners] = [found for found in drawing.collections if found.get_array() is not None]
+    triangles = corners._triangulation
+    outer = triangles.neighbors == -1
+    rim = np.unique([triangles.triangles[outer], np.roll(triangles.triangles, -1, axis=1)[outer]])
+    assert rim.size > 20
+    assert np.all(np.asarray(corners.get_array())[rim] == 0.0)

@@ -9,6 +9,7 @@ import pytest
 import xarray
 from numpy.testing import assert_array_equal
 
+from hexcontact import DeckError
 from hexcontact.core.lattice import Lattice
 from hexcontact.result.layout import Layout, Metadata, assemble, window_of
 from hexcontact.result.result import Result
@@ -73,6 +74,17 @@ def test_a_window_that_grew_pads_the_steps_before() -> None:
     assert not np.isnan(first["gap"].values[~rim]).any()
     assert_array_equal(data["pressure"].sel(step=2), made_step(1, LARGE).fields["pressure"])
     assert_array_equal(data["initial_gap"], made_step(1, LARGE).fields["initial_gap"])
+
+
+def test_slices_are_load_steps_and_no_other_key_is_one() -> None:
+    result = Result(assemble(Metadata(), [made_step(k) for k in range(4)]))
+    assert result[1:3]["step"].values.tolist() == [int(step["step"]) for step in list(result)[1:3]] == [2, 3]
+    assert_array_equal(result[::-1]["normal_load"], [40.0, 30.0, 20.0, 10.0])
+    for wrong in ("1", 1.5, None, slice(0, 1), [1]):
+        with pytest.raises(DeckError, match="^step = .*: expected the number of a load step, from 1"):
+            result.step(wrong)  # type: ignore[arg-type]
+    with pytest.raises(KeyError, match=r"1 is no name of a quantity; result.step\(1\) returns a load step"):
+        result[1]  # type: ignore[call-overload]
 
 
 def test_windows_side_by_side_are_joined() -> None:

@@ -30,6 +30,7 @@ from hexcontact.deck.kinds import Whole
 from hexcontact.deck.model import extended, meaning
 from hexcontact.deck.toml import with_overrides
 from hexcontact.deck.write import starter
+from hexcontact.problem.problem import Problem
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback, Listener
 from hexcontact.solve.run import metadata_of, run_into
@@ -834,13 +835,22 @@ def test_page_about_studies_runs_as_it_stands(folder: Path, monkeypatch: pytest.
     assert "together: 4 cases, 4 missing" in done.stdout
     assert command("more_friction.toml").returncode == 0
     solved.clear()
-    reading, combined, script, tied = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    reading, combined, joined, script, tied = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     names: dict[str, Any] = {"__name__": "__main__"}
     exec(reading, names)
     names["study"].close()
     exec(combined, names)
     assert names["whole"].friction_coefficient.values.tolist() == [0.3, 0.45, 0.6, 0.7]
     names["whole"].close()
+    exec(joined, names)
+    both, files = names["both"], names["files"]
+    assert both.sizes["case"] == 2
+    assert files[0].attrs["lattice_spacing"] != files[1].attrs["lattice_spacing"]
+    kept = {name: [file.attrs.get(name) for file in files] for name in both.attrs}
+    assert {"Conventions", "effective_modulus"} <= kept.keys()
+    assert [name for name, (one, other) in kept.items() if np.any(one != other)] == []
+    for file in files:
+        file.close()
     exec(script.replace('"study.nc"', '"again.nc"'), names)
     assert len(solved) == 6
     assert (names["data"].status == 0).all()
@@ -854,7 +864,7 @@ def test_outcome_of_whatever_goes_wrong_is_told_not_raised(
     def broken(*_: Any, **__: Any) -> Any:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(Case, "from_text", broken)
+    monkeypatch.setattr(Problem, "from_text", broken)
     outcome = solve_case(Job("x", DECK, str(folder / "a.nc")))
     assert (outcome.exit_code, outcome.message) == (1, "ZeroDivisionError: by zero")
 

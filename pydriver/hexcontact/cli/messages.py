@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
+from ..result.history import extent_of
 from ..result.netcdf import missing_stresses
 from ..result.store import open_result
 from ..solve import log
@@ -26,6 +27,7 @@ from .options import LogLevel
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
+    from ..result.history import Extent
     from ..result.step import Step
     from ..result.store import Store
     from ..solve.events import Listener
@@ -81,13 +83,14 @@ class Messages:
         self,
         case: Problem,
         histories: list[Any],
+        extent: Extent | None,
         target: Path,
         picture: Path | None,
         warnings: Sequence[str] = (),
     ) -> dict[str, Any] | None:
         """Print or return the result of a run, with a message on an accuracy that was not reached."""
         refined = open_result(target) if case.accuracy else None
-        summary = tables.Summary.of_run(case, histories, refined)
+        summary = tables.Summary.of_run(case, histories, refined, extent)
         shortfall = refined.shortfall if refined is not None else ""
         if shortfall:
             print_error(shortfall)
@@ -123,8 +126,8 @@ def solved(
     name: str,
     messages: Messages,
     before: Sequence[Step] = (),
-) -> list[Any]:
-    """Solve a case into a store and return the histories of all its steps.
+) -> tuple[list[Any], Extent | None]:
+    """Solve a case into a store; return the histories of all its steps and the extent of the last contact.
 
     Signals end the process. If the last step is finished, the output is completed first.
     """
@@ -139,7 +142,14 @@ def solved(
         return False
 
     histories: list[Any] = [step.history for step in before]
-    listener = solving.listeners(case, reporter(messages.silent), lambda step: histories.append(step.history))
+    extent: Extent | None = None
+
+    def note(step: Step) -> None:
+        nonlocal extent
+        histories.append(step.history)
+        extent = extent_of(step)
+
+    listener = solving.listeners(case, reporter(messages.silent), note)
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
         with listener.following(title, case.planned_steps):
@@ -148,7 +158,7 @@ def solved(
                 with_tables(store.path, pipe, messages, listener, late)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
-    return histories
+    return histories, extent
 
 
 def with_tables(

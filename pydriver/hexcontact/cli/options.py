@@ -15,7 +15,6 @@ from ..errors import DeckError
 from ..text import listed
 
 if TYPE_CHECKING:
-    from ..case import Case
     from ..problem.problem import Problem
     from ..result.result import Result
 
@@ -237,11 +236,11 @@ def beside(file: Path, ending: str) -> Path:
     return there.parent / f"{there.stem}{ending}"
 
 
-def case_of(deck: Path, settings: list[str] | None) -> Case:
+def case_of(deck: Path, settings: list[str] | None) -> Problem:
     """Return the case of a deck with the keys that ``--set`` replaces."""
-    from ..case import Case
+    from ..problem.problem import Problem
 
-    return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
+    return Problem.from_toml(deck, overrides=dict(map(setting, settings or ())))
 
 
 def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:

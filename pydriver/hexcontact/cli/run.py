@@ -54,9 +54,9 @@ def run(
         if plot:  # refuses before the run
             picture_beside(target)
         with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
-            histories = solved(case, store, pipe, deck.stem, messages)
+            histories, extent = solved(case, store, pipe, deck.stem, messages)
         picture = overview(target) if plot else None
-    return messages.conclude(case, histories, target, picture)
+    return messages.conclude(case, histories, extent, target, picture)
 
 
 @command("hexcontact resume fretting.nc")
@@ -90,7 +90,7 @@ def resume(
                 picture_beside(again.store.path)
             if again.warning:
                 print_error(f"warning: {again.warning}")
-            histories = solved(again.case, again.store, pipe, file.stem, messages, again.before)
+            histories, extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
         else:
             with_tables(restart.output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
@@ -98,4 +98,5 @@ def resume(
     picture = overview(path) if plot else None
     if again is None:
         return messages.was_finished(file, picture)
-    return messages.conclude(again.case, histories, path, picture, [again.warning] * bool(again.warning))
+    notes = [again.warning] * bool(again.warning)
+    return messages.conclude(again.case, histories, extent, path, picture, notes)

@@ -203,7 +203,8 @@ def _run_missing(study: Study, **options: Any) -> None:
 
     def work() -> None:
         try:
-            if study.run(cancel=cancel, **options) is not None:
+            study.run(cancel=cancel, **options)
+            if not _State.of(study).missing:
                 complete.set()
         finally:
             over.set()

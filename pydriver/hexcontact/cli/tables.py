@@ -15,6 +15,7 @@ from ..result.history import (
     cycles,
     energy_table,
     error_of,
+    extent_of,
     fitted,
     half_axes,
     is_frictional,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..problem.problem import Problem
+    from ..result.history import Extent
     from ..result.result import Result
 
 History = Mapping[str, Any]
@@ -104,21 +106,30 @@ class Summary(NamedTuple):
     case: Problem | None
     result: Result | None = None
     fault: str = ""
+    extent: Extent | None = None
 
     @classmethod
-    def of_run(cls, case: Problem, histories: Sequence[History], refined: Result | None) -> Summary:
+    def of_run(
+        cls,
+        case: Problem,
+        histories: Sequence[History],
+        refined: Result | None,
+        extent: Extent | None = None,
+    ) -> Summary:
         """Summarize a run; the finest lattice of a refined one, with errors, is read from its result."""
         from ..problem.overview import parameters_of
 
         found = histories_of(refined) if refined is not None else histories
-        return cls(case.title, found, parameters_of(case), case, refined)
+        extent = extent if refined is None else extent_of(refined.step(-1))
+        return cls(case.title, found, parameters_of(case), case, refined, extent)
 
     @classmethod
     def of_result(cls, result: Result) -> Summary:
         """Summarize a file."""
         histories, attributes = histories_of(result), result.dataset.attrs
         case, fault = _recorded_case(result.deck)
-        return cls(result.case_title, histories, attributes, case, result, fault)
+        extent = extent_of(result.step(-1))
+        return cls(result.case_title, histories, attributes, case, result, fault, extent)
 
     @property
     def remarks(self) -> list[str]:
@@ -149,14 +160,13 @@ class Summary(NamedTuple):
         headers, energies = energy_table(self.histories, _MOST_ROWS)
         if energies:
             shown.print(TextTable("Dissipated energy", headers, energies))
-        shown.print(pairs(f"Last load step{named}", step_rows(last)))
+        shown.print(pairs(f"Last load step{named}", step_rows(last, self.extent)))
         if rows := hertz_rows(self.hertz, last):
             shown.print(TextTable("Against Hertz", HERTZ_HEADERS, rows))
         if self.result is not None and (rows := trial_rows(self.result)):
             shown.print(TextTable("Accuracy", TRIAL_HEADERS, rows))
-        printed = (
-            [] if whole_file else str(self.parameters.get("warnings", "")).splitlines()
-        )  # before the run
+        before = () if whole_file else ("warnings", "notes")  # printed before the run
+        printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
             if remark not in printed:
                 shown.print(f"note: {remark}", soft_wrap=True)
@@ -302,6 +312,8 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
     surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
     curvatures = [curvature for surface in surfaces if (curvature := surface.curvature) is not None]
     quadratic = len(curvatures) == len(surfaces)
+    if any(surface.shape == "formula" for surface in surfaces):  # heights are not shifted to first touch
+        quadratic &= len({surface.offset for surface in surfaces}) == 1
     if case.deck.interface or case.frictional or load <= 0 or not quadratic:
         return []
     import numpy as np

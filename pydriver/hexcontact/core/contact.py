@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, integer, number, reals, word
-from ..errors import DeckError, RimWarning
+from ..errors import DeckError, RimWarning, warn
 from . import _core
 from .calls import Handle, called
 from .lattice import Lattice
@@ -289,7 +288,7 @@ class Contact(Handle):
         if not self._mask.all() and (found.zone[self._mask] > 0).all():
             return
         words = "contact at the rim of the window (touches_rim): a larger window may have another solution"
-        warnings.warn(words, RimWarning, stacklevel=3)
+        warn(words, RimWarning)
 
 
 class NormalContact(Contact):

@@ -209,6 +209,7 @@ def unresolved_slip_zones(
     return np.asarray(called(_api.unresolved_slip_zones, spacing, *areas, *tractions)) != 0
 
 
+NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
 LATTICE_ERRORS = ("max_pressure", "contact_area", "stick_area", "dissipated_energy")
 
 

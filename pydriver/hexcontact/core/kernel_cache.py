@@ -26,11 +26,10 @@ import platform
 import re
 import time
 import uuid
-import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..errors import DeckError, KernelFolderWarning
+from ..errors import DeckError, KernelFolderWarning, warn
 from . import _core
 
 _cache: Any = _core.hc_f2py_cache
@@ -186,12 +185,12 @@ def warn_of_faults() -> None:
     if _settings.folder is None:
         return
     for line in _cache.kernel_message().decode(errors="replace").strip().splitlines():
-        _warn(line, 5)
+        _warn(line)
 
 
-def _warn(message: str, level: int = 4) -> None:
+def _warn(message: str) -> None:
     _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
-    warnings.warn(message, KernelFolderWarning, stacklevel=level)
+    warn(message, KernelFolderWarning)
 
 
 def _bytes(value: float | str, name: str) -> int:

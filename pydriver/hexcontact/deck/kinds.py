@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn, TypeGuard
+from typing import Any, Generic, NoReturn, TypeGuard, TypeVar
 
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -26,6 +27,8 @@ def refuse(sentence: str) -> NoReturn:
     raise PydanticCustomError("deck", "{sentence}", {"sentence": sentence})
 
 
+_Value = TypeVar("_Value")
+_Given = TypeVar("_Given")
 SMALLEST = 1.0 / LARGEST
 _SHARE = rf"([+-]?{DIGITS})\s*(?:\*\s*)?(?:mu|[\u00b5\u03bc])\s*(?:\*\s*)?P"  # both letters mu
 
@@ -66,6 +69,15 @@ class Kind:
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
         """Describe with `schema`."""
         return self.schema()
+
+
+class Read(Generic[_Value, _Given]):
+    """For type checkers: a field that is a value in SI, made of an argument that may carry a unit."""
+
+    def __get__(self, table: object, kind: type) -> _Value:
+        raise NotImplementedError
+
+    def __set__(self, table: object, value: _Given) -> None: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -291,6 +303,20 @@ class Flag(Kind):
 
     def _schema(self) -> Schema:
         return {"type": "boolean"}
+
+
+class RadiusOfCurvature(Quantity):
+    """A radius of curvature above 0; that of a hollow is refused with a remedy."""
+
+    def _parse(self, value: object) -> float:
+        try:
+            return super()._parse(value)
+        except PydanticCustomError as error:
+            with contextlib.suppress(UnitError):
+                if to_si(value, self.dimension) < 0.0:
+                    example = '{ shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }'
+                    refuse(f"{error.message()}; a hollow is a formula with its radii in m: {example}")
+            raise
 
 
 @dataclass(frozen=True, eq=False, repr=False)

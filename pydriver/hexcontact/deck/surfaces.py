@@ -7,11 +7,12 @@ sphere). Body 2 has mirrored coordinates, so that the gap is the sum of both hei
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,17 +24,43 @@ from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
 from .formula import Formula
-from .kinds import Flag, HeightFormula, Kind, PowerCoefficient, Quantity, Schema, Several, Word, refuse
+from .kinds import (
+    Flag,
+    HeightFormula,
+    Kind,
+    PowerCoefficient,
+    Quantity,
+    RadiusOfCurvature,
+    Read,
+    Schema,
+    Several,
+    Word,
+    refuse,
+)
 from .model import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
-LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
-Angle = Annotated[float, Quantity(ANGLE)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
-Point = Annotated[tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
+if TYPE_CHECKING:
+    Radius = Read[float, float | str]
+    CurvatureRadius = Read[float, float | str]
+    LengthFromZero = Read[float, float | str]
+    Angle = Read[float, float | str]
+    Coefficient = Read[float, float | str]
+    Point = Read[tuple[float, float], Sequence[float | str]]
+else:
+    Radius = PositiveLength
+    CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
+    LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
+    Angle = Annotated[float, Quantity(ANGLE)]
+    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')]
+    Point = Annotated[
+        tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
+    ]
 
+_SAME_FORM = 1e-10  # rounding errors of a quadratic form, as a share of its largest coefficient
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
 
@@ -136,7 +163,7 @@ class Flat(Surface):
 class Sphere(Surface):
     """A sphere, as the paraboloid of the theory of Hertz, or as the true arc."""
 
-    radius: PositiveLength = meaning(..., "radius R")
+    radius: CurvatureRadius = meaning(..., "radius R")
     exact: Annotated[bool, Flag()] = meaning(False, "take the true arc, not the parabola")
     formula: ClassVar[str] = "h = r²/(2R); exact: h = R − √(R² − r²) for r ≤ R"
 
@@ -163,8 +190,8 @@ class Sphere(Surface):
 class Paraboloid(Surface):
     """A surface with two principal radii of curvature."""
 
-    radius_x: PositiveLength = meaning(..., "radius of curvature R₁ along the first axis (x if angle is 0)")
-    radius_y: PositiveLength = meaning(..., "radius of curvature R₂ across it")
+    radius_x: CurvatureRadius = meaning(..., "radius of curvature R₁ along the first axis (x if angle is 0)")
+    radius_y: CurvatureRadius = meaning(..., "radius of curvature R₂ across it")
     angle: Angle = meaning(0.0, "angle of the first axis, from x towards y")
     formula: ClassVar[str] = "h = s²/(2R₁) + t²/(2R₂), s along and t across the first axis"
 
@@ -183,7 +210,7 @@ class Paraboloid(Surface):
 class Cylinder(Surface):
     """A parabolic cylinder with its axis in the plane."""
 
-    radius: PositiveLength = meaning(..., "radius R")
+    radius: CurvatureRadius = meaning(..., "radius R")
     angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
     formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
 
@@ -222,7 +249,7 @@ class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
 
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
-    coefficient: Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')] = meaning(..., "coefficient C")
+    coefficient: Coefficient = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
 
     @field_validator("coefficient")
@@ -241,7 +268,7 @@ class Power(Surface):
 class Punch(Surface):
     """The flat end of a circular punch; nothing can touch outside it."""
 
-    radius: PositiveLength = meaning(..., "radius a of the flat end")
+    radius: Radius = meaning(..., "radius a of the flat end")
     formula: ClassVar[str] = "h = 0 for r ≤ a, nothing beyond"
 
     @property
@@ -258,7 +285,7 @@ class RoundedPunch(Surface):
     """A flat punch whose edge is a parabolic fillet."""
 
     flat_radius: LengthFromZero = meaning(..., "radius b of the flat middle")
-    edge_radius: PositiveLength = meaning(..., "radius of curvature R of the rounded edge")
+    edge_radius: Radius = meaning(..., "radius of curvature R of the rounded edge")
     formula: ClassVar[str] = "h = (r − b)²/(2R) for r > b, else 0"
 
     def _height(self, x: Array, y: Array) -> Array:
@@ -274,9 +301,30 @@ class FormulaSurface(Surface):
     )
     formula: ClassVar[str] = "h = h(x, y), as the formula gives it"
 
+    @property
+    def curvature(self) -> Array | None:
+        """That of a formula that is a quadratic form; None for others."""
+        return _quadratic_form(self.expression)
+
     def _height(self, x: Array, y: Array) -> Array:
         x, y = np.broadcast_arrays(x, y)
         return Formula(self.expression).over(x=x, y=y) + np.zeros(x.shape)
+
+
+@functools.lru_cache(64)
+def _quadratic_form(expression: str) -> Array | None:
+    """Return C of a formula that is h = r . C r / 2 at all distances from a nanometer to a kilometer."""
+    radii, angles = 10.0 ** np.arange(-9.0, 4.0)[:, None], 0.1 + np.linspace(0.0, 2.0 * math.pi, 12)
+    cosines, sines = np.cos(angles), np.sin(angles)
+    x, y = radii * cosines, radii * sines
+    heights = (Formula(expression).over(x=x, y=y) + np.zeros(x.shape)) / radii**2
+    if not np.isfinite(heights).all():
+        return None
+    forms = np.stack([0.5 * cosines**2, cosines * sines, 0.5 * sines**2], axis=1)
+    found = np.linalg.lstsq(forms, heights[0], rcond=None)[0]
+    if (np.abs(heights - forms @ found) > _SAME_FORM * np.abs(found).max()).any():
+        return None
+    return np.array([[found[0], found[1]], [found[1], found[2]]])
 
 
 def _axes(angle: float) -> tuple[Array, Array]:

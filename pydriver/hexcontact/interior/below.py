@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from ..core.edges import TractionField
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
-from ..errors import DeckError, NotInResult, PathWarning
+from ..errors import DeckError, NotInResult, PathWarning, warn
 from ..variables import EDGES, INTERFACE, TRACTIONS
 from .extremes import with_places
 from .fatigue import SLIPS, histories, parameters_below, tabulated
@@ -136,12 +135,11 @@ class BelowSurface(ABC):
         criteria = Criteria.parse({"parameters": parameters, **constants}, NOWHERE)
         numbers = self.cycle_steps(segment, steps)
         if steps is None and len(numbers) < _FEW_STEPS:
-            warnings.warn(
+            warn(
                 f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes "
                 f"and phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with "
                 "adaptive steps a smaller solver.step_tolerance",
                 PathWarning,
-                stacklevel=2,
             )
         loaded = self._loaded(numbers, SLIPS if "ruiz" in parameters else (), edges=True)
         where = given or Fatigue.default_region

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 
 DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node
+_VANISH = "dissipation_density", "worn_depth"  # with the pressure at the edge, as tractions do
 _DIVIDED = 30_000, 8_000  # triangles up to which each is cut into four, into sixteen
 _SO_FAR = "accumulated_slip", "dissipation_density", "worn_depth"  # also where the contact was before
 _WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
@@ -168,9 +169,10 @@ def draw_field(
     signed = min(float(v.min()) for v in values) < -0.01 * largest
     factor, unit = scaled(largest, field.unit)
     shades: TriMesh | None = None
+    vanishes = field.unit == "Pa" or name in _VANISH
     for axes, view, field_values in zip(panels, views, values, strict=True):
         left = name in _SO_FAR and bool(np.any(field_values[~view.contact]))
-        mesh = _whole_mesh(view, field_values) if left else mesh_of(view, field_values, field.unit == "Pa")
+        mesh = _whole_mesh(view, field_values) if left else mesh_of(view, field_values, vanishes)
         if field.unit == "Pa":
             mesh = finer(mesh, view, partial(field.at, view, name))
         if not mesh.triangles.size:

@@ -25,6 +25,7 @@ Limits = tuple[float, float, float, float]
 ARROWS, FEWER_ARROWS = 13, 9  # across the contact, about, in a large and in a small picture
 _WIDTH = 7.2  # inches of a picture with several panels, or of an elongated contact
 _HIGH = 4.5  # inches of a map of an upright contact among others
+_THIN, _LEAST_ASPECT = 1.0 / 15.0, 1.0 / 7.0  # of maps that are stretched across, and what they become
 _ROWS = 5  # maps of a wide contact in one column
 
 
@@ -70,9 +71,17 @@ class Part:
         return self.limits[1] - self.limits[0]
 
     @property
+    def stretch(self) -> int:
+        """How often a length across a very elongated contact is as long in the picture as one along it."""
+        aspect = (self.limits[3] - self.limits[2]) / self.width
+        aspect = min(aspect, 1.0 / aspect)
+        return max(round(_LEAST_ASPECT / aspect), 1) if aspect < _THIN else 1
+
+    @property
     def aspect(self) -> float:
-        """Height over width."""
-        return (self.limits[3] - self.limits[2]) / self.width
+        """Height over width in the picture."""
+        aspect = (self.limits[3] - self.limits[2]) / self.width
+        return aspect * self.stretch if aspect < 1.0 else aspect / self.stretch
 
     @property
     def is_wide(self) -> bool:
@@ -95,8 +104,14 @@ class Part:
     def show(self, axes: Axes) -> None:
         """Set limits and labels of axes to this part."""
         x_min, x_max, y_min, y_max = (self.factor * limit for limit in self.limits)
-        axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
-        axes.set(xlabel=f"x ({self.unit})", ylabel=f"y ({self.unit})")
+        times = self.stretch if self.is_wide else 1.0 / self.stretch
+        axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect=times)
+        note = f"\nscale × {self.stretch}" * (self.stretch > 1)
+        axes.set(
+            xlabel=f"x ({self.unit}){note * self.is_tall}", ylabel=f"y ({self.unit}){note * self.is_wide}"
+        )
+        if self.stretch > 1:
+            axes.locator_params(axis="y" if self.is_wide else "x", nbins=4)
         if self.is_tall:
             axes.locator_params(axis="x", nbins=2)
 

@@ -69,10 +69,11 @@ def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:
     """Set the title of a figure, on as many lines as needed; axes of the caller have none."""
     if title and ax is None:
         width = int(13.0 * figure.get_size_inches()[0])  # characters, about
-        loads = re.search(r" \(\$.*$", title)  # on one line
+        loads = re.search(r" \(\$.*$", title)  # on one line, or each on one
         start, end = (title[: loads.start()], title[loads.start() :]) if loads else (title, "")
         start = re.sub(r"step (\d+)$", "step\u00a0\\1", start)
-        lines = textwrap.wrap(start + end.replace(" ", "\u00a0").replace("\u00a0", " ", 1), width)
+        end = end[:1] + re.sub(" " if len(end) <= width else "(?<!,) ", "\u00a0", end[1:])
+        lines = textwrap.wrap(start + end, width, break_long_words=False, break_on_hyphens=False)
         figure.suptitle("\n".join(lines).replace("\u00a0", " "))
 
 

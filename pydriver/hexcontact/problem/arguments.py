@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any, ParamSpec, TypeVar
 
 from ..core.lattice import Lattice
@@ -40,18 +40,23 @@ def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
 
     @functools.wraps(call)
     def checked(*arguments: _P.args, **keywords: _P.kwargs) -> _T:
-        if (name := next((name for name in keywords if name not in known), None)) is None:
-            return call(*arguments, **keywords)
-        path = SYMBOLS.get(name, name)
-        same = [word for word in (path, path.replace(".", "_")) if word in known]
-        below = [f"{of}.{path}" for of in known if of in _TABLES and path in _TABLES[of].known_keys()]
-        longer = [word for word in known if word.startswith(f"{name}_")]
-        near = [*same, *below, *longer, *filter(None, [nearest(name, known, cutoff=0.7)])]
-        hint = f"did you mean {near[0]}?" if near else f"known here: {listed(known, 'and')}"
-        hint = not_included(name) or hint
-        raise TypeError(f"{name}: unknown argument of {title}; {hint}")
+        refuse_unknown(keywords, known, title)
+        return call(*arguments, **keywords)
 
     return checked
+
+
+def refuse_unknown(keywords: Iterable[str], known: Collection[str], title: str) -> None:
+    """Raise a TypeError for an unknown keyword that names the nearest."""
+    if (name := next((name for name in keywords if name not in known), None)) is None:
+        return
+    path = SYMBOLS.get(name, name)
+    same = [word for word in (path, path.replace(".", "_")) if word in known]
+    below = [f"{of}.{path}" for of in known if of in _TABLES and path in _TABLES[of].known_keys()]
+    longer = [word for word in known if word.startswith(f"{name}_")]
+    near = [*same, *below, *longer, *filter(None, [nearest(name, known, cutoff=0.7)])]
+    hint = f"did you mean {near[0]}?" if near else f"known here: {listed(list(known), 'and')}"
+    raise TypeError(f"{name}: unknown argument of {title}; {not_included(name) or hint}")
 
 
 class Body(Argument, tables.Body):

@@ -258,9 +258,16 @@ def _touching_problems(gap: Separation) -> list[Mistake]:
     if smaller > 1e-12 * larger:
         return []
     sentence = (
-        "the two surfaces touch along a line, so the contact has no end; expected a shape that bounds it"
+        "the two surfaces touch along a line, so the contact has no end; expected a shape that bounds it: "
+        "a paraboloid with a large radius along the line, as in cases/long_cylinder.toml, or a formula with "
+        "ends, such as a profile that rises there"
     )
-    if larger == 0:
+    if smaller < -1e-12 * abs(larger):
+        sentence = (
+            "the gap falls away from the point of contact, so the two surfaces do not touch there; expected "
+            "each hollow flatter than the body in it"
+        )
+    elif larger == 0:
         sentence = (
             "the two surfaces touch everywhere, so the contact has no end and one unknown, its mean "
             'pressure; expected a shape that bounds it, or [interface] with law = "power"; a periodic '

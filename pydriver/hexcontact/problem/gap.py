@@ -74,6 +74,12 @@ class Gap:
         return not isinstance(self.source, Separation)
 
     @property
+    def heights(self) -> tuple[Callable[[Array, Array], Array], ...]:
+        """Heights (m) of the surfaces of body 1 and body 2; empty if only their sum is known."""
+        known = self.source
+        return (known.surface_1.height, known.surface_2.height) if isinstance(known, Separation) else ()
+
+    @property
     def first_touch(self) -> tuple[float, float] | None:
         """Point (m) where the bodies touch first; None if it is unknown."""
         known = isinstance(self.source, Separation | HeightMap)

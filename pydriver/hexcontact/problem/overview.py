@@ -50,6 +50,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         ),
         **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
         **({"warnings": "\n".join(doubts)} if (doubts := plausibility.warnings(case)) else {}),
+        **({"notes": note} if (note := plausibility.unjudged(case)) else {}),
         "machine": machine(),
     }
 

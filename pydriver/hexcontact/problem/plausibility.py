@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.estimators import (
     LATTICE_ERRORS,
+    NO_VALUE,
     expected_entry_error,
     expected_lattice_errors,
     expected_turning_error,
@@ -60,7 +61,7 @@ _STEP_ERROR = 0.1  # of the shear tractions, that load steps may leave
 LIMITS = (
     Limit(
         "slope",
-        "the surfaces slope by {slope:.2g} at the edge of the contact (a/R of a sphere), expected at most "
+        "{steepest} by {slope:.2g}{gap_words} at the edge of the contact (a/R of a sphere), expected at most "
         "0.1: half-space theory takes them as flat",
         "Points at the edge move inwards, by 2 (1 - 2 nu) / (3 pi (1 - nu)) a/R of their distance under a "
         "sphere, which the theory leaves out: 1.2 % at a/R = 0.1 and nu = 0.3 (for cones: Hay, Bolshakov, "
@@ -101,7 +102,7 @@ LIMITS = (
     ),
     Limit(
         "lattice_error",
-        "{spacings:.2g} spacings in the {radius_words} may leave errors of {lattice_words}; "
+        "{spacing_words} in the {radius_words} may leave errors of {lattice_words}; "
         "{needed_spacings:g} leave at most 5 %",
         "Errors fall with the square of the spacings, or faster: (X1), (X2)",
         most=_LATTICE_ERROR,
@@ -161,15 +162,18 @@ _ROUND = 0.95  # smaller half-axis over radius from which an estimated contact c
 _STEADY = 0.05  # exponent of the radius on the load up to which a contact does not grow: punches
 
 
-def expected(case: Problem) -> dict[str, Any]:
+def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     """Return the known expected values at the largest load, SI.
 
     Parameters
     ----------
     case : Problem
         The case. For a gap over the nodes of a window only the friction is known.
+    estimated : bool
+        Also values that take an estimate of the contact.
     """
-    mu, known = case.deck.friction.coefficient if case.deck.friction else 0.0, case.estimate
+    mu = case.deck.friction.coefficient if case.deck.friction else 0.0
+    known = case.estimate if estimated else None
     found: dict[str, Any] = {}
     if isinstance(mu, TwoCoefficients):
         mu = max(mu.along, mu.across)
@@ -181,9 +185,11 @@ def expected(case: Problem) -> dict[str, Any]:
         return found
     found |= {
         "contact_radius": known.radius,
+        "extent": tuple(known.size.tolist()),
         "half_width": known.half_width,
         "max_pressure": known.max_pressure,
-        "slope": known.slope,
+        "slope": max(known.slope, *known.body_slopes, 0.0),
+        "gap_slope": known.slope,
         "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
         "spacings": known.half_width / case.lattice.spacing,
     }
@@ -215,13 +221,19 @@ def expected(case: Problem) -> dict[str, Any]:
     return found
 
 
-def warnings(case: Problem) -> list[str]:
-    """Return a sentence for each limit that a case exceeds."""
-    found = expected(case)
+def warnings(case: Problem, estimated: bool = True) -> list[str]:
+    """Return a sentence for each limit that a case exceeds; arguments as `expected`."""
+    found = expected(case, estimated)
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
-    worth = [f"{percent(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
+    worth = [
+        f"{percent(error)}{' or more' * (error >= NO_VALUE)} in the {spelled(name)}"
+        for error, name in errors
+        if error > 0.01
+    ]
     known = found | {
+        **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
+        "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": _even_steps(found.get("growing_steps", 0.0)),
         "step_percent": percent(found.get("step_error", 0.0)),
@@ -243,11 +255,36 @@ def row(case: Problem) -> str:
     size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {found['spacings']:.2g} spacings"
     if axes:
         major, minor = (quantity(axis, "m", 3) for axis in axes)
-        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one"
+        along, across = (quantity(length, "m", 3) for length in found["extent"])
+        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one; "
+        size += f"extent about {along} in x, {across} in y"
     return (
         f"{size}; p_max about {pressure}, "
         f"{found['pressure_ratio']:.2g} E*; slope at the edge {found['slope']:.2g}"
+        f"{_steepest(case, found)['gap_words']}"
     )
+
+
+def unjudged(case: Problem) -> str:
+    """Return a note on what the warnings cannot judge; empty if there is nothing."""
+    if not case.gap_given:
+        return ""
+    return (
+        "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
+        "of each body at the edge of the contact, also where surfaces conform"
+    )
+
+
+def _steepest(case: Problem, found: dict[str, Any]) -> dict[str, str]:
+    """Name the steepest surface, and the slope of the gap if the surfaces conform."""
+    if (
+        case.estimate is None
+        or "slope" not in found
+        or (gap := f"{found['gap_slope']:.2g}") == f"{found['slope']:.2g}"
+    ):
+        return {"steepest": "the surfaces slope", "gap_words": ""}
+    body = 1 + case.estimate.body_slopes.index(found["slope"])
+    return {"steepest": f"body {body} slopes", "gap_words": f" (the gap by {gap})"}
 
 
 def _half_axes(found: dict[str, Any]) -> tuple[float, float] | None:
@@ -255,6 +292,12 @@ def _half_axes(found: dict[str, Any]) -> tuple[float, float] | None:
     if "half_width" not in found or found["half_width"] > _ROUND * found["contact_radius"]:
         return None
     return found["contact_radius"] ** 2 / found["half_width"], found["half_width"]
+
+
+def _counted(count: float, noun: str) -> str:
+    """Return a number of things in words."""
+    words = f"{count:.2g}"
+    return f"{words} {noun}{'s' * (words != '1')}"
 
 
 def _even_steps(count: float) -> str:

@@ -178,6 +178,11 @@ class Problem:
         return self._gap.height_map
 
     @property
+    def gap_given(self) -> bool:
+        """Whether the gap was given in Python, so that the surfaces of the bodies are unknown."""
+        return self._gap.given
+
+    @property
     def adaptive(self) -> bool:
         """Whether load steps are chosen during the solution: some are "auto", and have a history."""
         return self.solver.algorithm == "incremental" and any(s.ramp is not None for s in self.load_steps)
@@ -436,7 +441,9 @@ class Problem:
     def estimated(self, **drive: Any) -> Estimate:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
         place = self._center, self.deck.grid.origin
-        return window.estimate_contact(self.pair, self._gap.at, *place, self.interface, **drive)
+        return window.estimate_contact(
+            self.pair, self._gap.at, *place, self.interface, self._gap.heights, **drive
+        )
 
     @cached_property
     def growth(self) -> float:

@@ -9,7 +9,7 @@ vectors), since the window is a rhombus.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,6 +62,8 @@ class Estimate(NamedTuple):
         Largest pressure (Pa).
     slope : float
         Largest slope of the gap within the contact.
+    body_slopes : tuple of float
+        Those of the surfaces of body 1 and body 2; empty if only their gap is known.
     """
 
     radius: float
@@ -72,6 +74,7 @@ class Estimate(NamedTuple):
     size: Array
     max_pressure: float
     slope: float
+    body_slopes: tuple[float, ...] = ()
 
     @property
     def bounds(self) -> Array:
@@ -158,6 +161,7 @@ def estimate_contact(
     center: tuple[float, float],
     origin: tuple[float, float],
     interface: Interface = UNILATERAL,
+    heights: Sequence[GapFunction] = (),
     **drive: float,
 ) -> Estimate:
     """Estimate the contact under a normal load (N) or at an approach (m).
@@ -172,6 +176,8 @@ def estimate_contact(
         A point near the contact, and a lattice node.
     interface : (float, float, float)
         Coefficient (Pa/m^m) and exponent of its compliance, and stiffness (Pa/m) of its springs.
+    heights : sequence of callable
+        Heights of the surfaces of both bodies, if they are known.
     **drive : float
         `normal_load` or `approach`, above zero.
 
@@ -199,7 +205,7 @@ def estimate_contact(
                 lattice = centered(2 * lattice.spacing, center, lattice.shape, origin)
             continue
         enclosed = True
-        estimate = _measure(lattice, pressure, gap)
+        estimate = _measure(lattice, pressure, gap, heights)
         if estimate.half_width >= NARROW_NODES * lattice.spacing:
             return estimate
         factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
@@ -266,7 +272,7 @@ def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: li
     return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
 
 
-def _measure(lattice: Lattice, pressure: Array, gap: GapFunction) -> Estimate:
+def _measure(lattice: Lattice, pressure: Array, gap: GapFunction, heights: Sequence[GapFunction]) -> Estimate:
     contact = pressure > 0
     rows, cols = np.nonzero(contact)
     x, y = lattice.x[contact], lattice.y[contact]
@@ -274,8 +280,7 @@ def _measure(lattice: Lattice, pressure: Array, gap: GapFunction) -> Estimate:
     moments = np.cov(np.stack([x, y]), bias=True) + np.eye(2) * lattice.cell_area / 12  # a cell's own inertia
     half_width = 2 * math.sqrt(max(float(np.linalg.eigvalsh(moments)[0]), 0.0))
     indices = np.array([cols + lattice.col_first, rows + lattice.row_first]) * lattice.spacing
-    height = np.where(contact, gap(lattice.x, lattice.y), np.nan)
-    steepest = max(np.nanmax(np.abs(np.diff(height, axis=axis)), initial=0.0) for axis in (0, 1))
+    slope, *body_slopes = (_steepest(height, lattice, contact) for height in (gap, *heights))
     return Estimate(
         radius=math.sqrt(area / math.pi),
         half_width=half_width,
@@ -284,8 +289,16 @@ def _measure(lattice: Lattice, pressure: Array, gap: GapFunction) -> Estimate:
         cell=lattice.spacing,
         size=np.array([np.ptp(x), np.ptp(y)]) + lattice.spacing,
         max_pressure=float(pressure.max()),
-        slope=float(steepest) / lattice.spacing,
+        slope=slope,
+        body_slopes=tuple(body_slopes),
     )
+
+
+def _steepest(height: GapFunction, lattice: Lattice, contact: Mask) -> float:
+    """Return the largest slope of a surface within the contact."""
+    heights = np.where(contact, height(lattice.x, lattice.y), np.nan)
+    steepest = max(np.nanmax(np.abs(np.diff(heights, axis=axis)), initial=0.0) for axis in (0, 1))
+    return float(steepest) / lattice.spacing
 
 
 # --- the interface ------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
 History = Mapping[str, Any]
+Extent = tuple[float, float]
 
 LOADS_AND_MOTIONS = {
     name: (label_of(name), VARIABLES[name].units) for name in names_where(lambda v: v.motion)
@@ -43,6 +44,7 @@ _SLIP = 2  # among the zones
 _NOTICED = 1e-6  # share of the normal load or approach from which tangential ones are shown
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
+_ELLIPTIC = 0.005  # share by which the area of a contact may differ from that of the ellipse with its moments
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 _WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
 _UNCERTAIN = 0.1  # ... and from which a remark is made
@@ -94,6 +96,29 @@ def contact_size(history: History) -> tuple[str, str]:
         return "contact radius", quantity(fitted("contact_radius", history), "m") + error
     words = " by ".join(quantity(axis, "m") for axis in axes)
     return "contact half-axes", words + error_of("contact_semi_major", history)
+
+
+def extent_of(step: Any) -> Extent | None:
+    """Return the lengths (m) of the contact of a step along x and y, between its outermost nodes.
+
+    None without contact, or if its zones were not kept.
+    """
+    if (zone := getattr(step, "zone", None)) is None or not (inside := np.asarray(zone) > 0).any():
+        return None
+    along, across = (float(np.ptp(np.asarray(values)[inside])) for values in (step.x, step.y))
+    return along, across
+
+
+def _moments(history: History, extent: Extent | None) -> str:
+    """Name the ellipse of the half-axes of a contact that is none, and the extent of the contact."""
+    axes, area = half_axes(history), fitted("contact_area", history)
+    if axes is None or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+        return ""
+    words = " of the ellipse with the same moments"
+    if extent is None:
+        return words
+    along, across = (quantity(length, "m", 3) for length in extent)
+    return f"{words}; the contact extends over {along} in x and {across} in y"
 
 
 def error_of(name: str, history: History) -> str:
@@ -173,14 +198,15 @@ def describe(history: History, short: bool = False) -> str:
     return "  ".join(part for part in parts if part)
 
 
-def step_rows(history: History) -> list[Row]:
-    """Return rows of a table of a load step, with estimated errors and residuals."""
+def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
+    """Return rows of a table of a load step, with errors, residuals and the extent of the contact."""
     rows = [
         (spelled(name), load_or_motion(name, history) + error_of(name, history))
         for name in worth_showing([history])
     ]
+    name_of_size, size = contact_size(history)
     rows += [
-        contact_size(history)
+        (name_of_size, size + _moments(history, extent))
         if name == "contact_radius"
         else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
         for name in SUMMARY
@@ -409,7 +435,7 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
     ]
     in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
     sentences = [
-        *str(parameters.get("warnings", "")).splitlines(),
+        *(line for name in ("warnings", "notes") for line in str(parameters.get(name, "")).splitlines()),
         unasked_path(in_parts, in_parts=True),
         unasked_path([k for k in cold if k not in in_parts], in_parts=False),
         halved_steps(histories, tolerance),

@@ -11,7 +11,7 @@ from ..arrays import Array
 from ..errors import NotInResult
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
-from .history import step_rows
+from .history import extent_of, step_rows
 from .layout import history_of
 from .raster import SLIP, STICK, Plane, png_of
 from .view import StepView
@@ -44,17 +44,25 @@ def result_rows(dataset: xarray.Dataset) -> list[Row]:
     last = dataset.isel(step=-1)
     history = {name: last[name].item() for name in history_of(dataset)}
     try:
-        return list(step_rows(history))
+        return list(step_rows(history, extent_of(last)))
     except KeyError:  # a data set with some quantities only
         return [(spelled(name), f"{value}") for name, value in history.items()]
+
+
+def doubts(dataset: xarray.Dataset) -> list[str]:
+    """Return the warnings and notes that a result has of its case, marked."""
+    return [
+        f"{kind}: {line}"
+        for kind in ("warning", "note")
+        for line in str(dataset.attrs.get(f"{kind}s", "")).splitlines()
+    ]
 
 
 def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
     """Return the last step of a result as a table beside maps of it; `quantities` (HTML) unfold below."""
     title, _, about = result_header(dataset, path).partition("\n")
     last, stopped = f"Load step {int(dataset['step'][-1])}", dataset.attrs.get("stopped")
-    doubts = [f"warning: {line}" for line in str(dataset.attrs.get("warnings", "")).splitlines()]
-    note = "; ".join([about.strip(), *([stopped] if stopped else []), *doubts])
+    note = "; ".join([about.strip(), *([stopped] if stopped else []), *doubts(dataset)])
     table = html_table(f"{title}: {last}", ("", ""), result_rows(dataset), note)
     below = f"<details><summary>all quantities</summary>{quantities}</details>"
     row = "display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start"

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..arrays import integer
 from ..core.lattice import Lattice
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
@@ -277,6 +278,7 @@ def lattice_of(dataset: xarray.Dataset) -> Lattice:
 
 def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
     """Return a load step of a result by its number, see `hexcontact.Result.step`."""
+    number = integer(number, "step", "the number of a load step, from 1; -1 is the last one")
     numbers = dataset["step"].values
     if -len(numbers) <= number < 0:
         return dataset.isel(step=number)

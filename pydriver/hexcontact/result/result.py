@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, overload
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -79,8 +79,19 @@ class Result(BelowSurface):
         except KeyError as error:
             raise AttributeError(error.args[0]) from None
 
-    def __getitem__(self, name: str) -> xarray.DataArray:
-        """Return a quantity, also ``step``, which is a method as an attribute."""
+    @overload
+    def __getitem__(self, name: str) -> xarray.DataArray: ...
+
+    @overload
+    def __getitem__(self, name: slice) -> xarray.Dataset: ...
+
+    def __getitem__(self, name: str | slice) -> xarray.DataArray | xarray.Dataset:
+        """Return a quantity, also ``step``, which is a method as an attribute; a slice: those load steps.
+
+        Slices count as those of ``list(result)``: ``result[1:3]`` has the load steps 2 and 3.
+        """
+        if isinstance(name, slice):
+            return self.dataset.isel(step=name)
         if name in self.dataset.variables:
             return self.dataset[name]
         if not isinstance(name, str):
@@ -440,8 +451,7 @@ class Result(BelowSurface):
         table = text_table(("", ""), html.result_rows(self.dataset))
         header = html.result_header(self.dataset, self.path)
         lines = [header, *table.splitlines(), f"fields: {', '.join(fields)}"]
-        notes = [f"warning: {line}" for line in str(self.dataset.attrs.get("warnings", "")).splitlines()]
-        return "\n  ".join([*lines, *notes, *([self.stopped] if self.stopped else [])])
+        return "\n  ".join([*lines, *html.doubts(self.dataset), *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
         from . import html

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     import xarray
 
-Value = float | int | str
-
 _LENGTHS = 26  # byte of a member of an archive at which the lengths of its name and extra field stand
 _BLOCK = 2**20  # bytes that are read at a time
 
@@ -133,7 +131,7 @@ class Step:
     index: int
     lattice: Lattice
     fields: Mapping[str, NDArray[Any]]
-    history: Mapping[str, Value]
+    history: Mapping[str, Any]
     companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     control: Mapping[str, Any] = field(default_factory=dict)
     prescribed: Mapping[str, float] = field(default_factory=dict)
@@ -290,9 +288,9 @@ class Step:
 
     def _repr_html_(self) -> str:
         from ..text import html_table
-        from .history import step_rows
+        from .history import extent_of, step_rows
 
-        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history))
+        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
 
 
 def _read_only(values: NDArray[Any]) -> NDArray[Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,8 @@ from typing import Any
 from .._version import __version__
 from ..deck.recorded import given_in_python
 from ..deck.toml import parse_toml
-from ..errors import DeckError, HexcontactError
+from ..errors import DeckError, HexcontactError, PlausibilityWarning, warn
+from ..problem import plausibility
 from ..problem.problem import Problem
 from ..result.check import PHYSICS, physics
 from ..result.journal import journal_of
@@ -98,7 +98,9 @@ def resume(
             complete(path)
             return checked(open_result(path))
         if restart.warning:
-            warnings.warn(restart.warning, stacklevel=2)
+            warn(restart.warning, UserWarning)
+        for sentence in plausibility.warnings(restart.case):
+            warn(sentence, PlausibilityWarning)
         listener = listeners(restart.case, progress, on_step)
         with listener.following(restart.case.title, restart.case.planned_steps):
             run_into(restart.case, restart.store, listener, restart.before)

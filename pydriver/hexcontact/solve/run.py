@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import AccuracyWarning, HexcontactError
+from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.overview import parameters_of
 from ..problem.problem import Problem
+from ..result.history import limited_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
@@ -100,7 +100,7 @@ def run(
     if output is None:
         with listener.following(case.title, case.planned_steps):
             result = _in_memory(case, listener)
-            return checked(result) if case.accuracy else result
+            return checked(result)
     with (
         Store(output, metadata_of(case), overwrite) as store,
         listener.following(case.title, case.planned_steps),
@@ -110,9 +110,11 @@ def run(
 
 
 def checked(result: Result) -> Result:
-    """Warn if a result misses the accuracy that its case asks for."""
-    if result.shortfall:
-        warnings.warn(result.shortfall, AccuracyWarning, stacklevel=3)
+    """Warn if a result misses an accuracy that its case asks for."""
+    steps = [{"step_limited": limited} for limited in result.dataset.get("step_limited", [])]
+    limited = limited_steps(steps, float(result.dataset.attrs.get("step_tolerance", 0.0)))
+    for sentence in filter(None, (result.shortfall, limited)):
+        warn(sentence, AccuracyWarning)
     return result
 
 

@@ -204,17 +204,17 @@ class Session:
     def advance(
         self,
         *,
-        normal_load: float | None = None,
-        approach: float | None = None,
-        tangential_load_x: float | None = None,
-        shift_x: float | None = None,
-        tangential_load_y: float | None = None,
-        shift_y: float | None = None,
-        torque: float | None = None,
-        twist: float | None = None,
-        bulk_stress_xx: float | None = None,
-        bulk_stress_yy: float | None = None,
-        bulk_stress_xy: float | None = None,
+        normal_load: float | str | None = None,
+        approach: float | str | None = None,
+        tangential_load_x: float | str | None = None,
+        shift_x: float | str | None = None,
+        tangential_load_y: float | str | None = None,
+        shift_y: float | str | None = None,
+        torque: float | str | None = None,
+        twist: float | str | None = None,
+        bulk_stress_xx: float | str | None = None,
+        bulk_stress_yy: float | str | None = None,
+        bulk_stress_xy: float | str | None = None,
         steps: int = 1,
         label: str = "",
     ) -> Step:
@@ -442,6 +442,7 @@ class Session:
 
     def __repr__(self) -> str:
         """Name the case and its last step."""
+        case = Problem.__repr__(self.case)  # without warnings on further lines
         if not self._steps:
-            return f"Session of {self.case!r}, nothing solved yet"
-        return f"Session of {self.case!r}, after {self.step!r}"
+            return f"Session of {case}, nothing solved yet"
+        return f"Session of {case}, after {self.step!r}"

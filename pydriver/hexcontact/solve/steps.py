@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from .._version import __version__
 from ..core.lattice import Lattice
-from ..errors import DeckError, PathWarning
+from ..errors import DeckError, PathWarning, warn
 from ..problem import plausibility
 from ..problem.loads import LoadStep
 from ..problem.overview import machine
@@ -119,6 +118,8 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
             "the half-spaces move as a whole, and what is solved is the layer"
         )
         listener.said("full contact", sentence, area=lattice.size * lattice.cell_area)
+    if (note := plausibility.unjudged(case)) and not case.trial:
+        listener.said("unjudged", f"note: {note}", note=note)
     for sentence in [] if case.trial else plausibility.warnings(case):
         listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
 
@@ -149,7 +150,7 @@ def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) ->
         in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
         words = unasked_path([step.number], in_parts)
         listener.said("halved", level=logging.WARNING, step=step.number, warning=words)
-        warnings.warn(words, PathWarning, stacklevel=2)
+        warn(words, PathWarning)
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:

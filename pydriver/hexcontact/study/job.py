@@ -17,7 +17,7 @@ from ..errors import HexcontactError, ResourceError
 from ..result.netcdf import attributes
 
 if TYPE_CHECKING:
-    from ..case import Case
+    from ..problem.problem import Problem
     from ..result.step import Step
     from ..solve.events import Listener
     from ..solve.restart import Restart
@@ -79,7 +79,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     Outcome
         Also of a failure, which is not raised.
     """
-    from ..case import Case
+    from ..problem.problem import Problem
     from ..result.store import Store
     from ..solve.run import listeners, metadata_of, solve_into, write_stresses
 
@@ -95,7 +95,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
 
     began = False
     try:
-        case = Case.from_text(job.deck, target.name)
+        case = Problem.from_text(job.deck, target.name)
         if holds(target, job.hash):  # only its tables are missing
             list(write_stresses(target))
             return Outcome(job.hash, seconds=time.perf_counter() - started)
@@ -136,7 +136,7 @@ def holds(path: Path, name: str) -> bool:
     return bool(about.get("complete")) and hash_of(str(about.get("deck"))) == name
 
 
-def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart | None:
+def _interrupted(job: Job, case: Problem, stack: contextlib.ExitStack) -> Restart | None:
     """Reopen the journal of an interrupted attempt to continue it; None if there is none."""
     from ..result.journal import journal_of
     from ..solve.restart import reopened

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from ..case import Case
 from ..deck.faults import Source
 from ..deck.read import assemble
 from ..deck.tables import Deck
@@ -17,6 +16,7 @@ from ..deck.toml import with_overrides
 from ..deck.write import as_toml
 from ..errors import DeckError
 from ..problem.checks import checked
+from ..problem.problem import Problem
 from ..text import shown
 from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins
 from .job import MOST_CASES
@@ -145,7 +145,7 @@ def plan(
                     values |= found
                     merged = with_overrides(merged, found)
             if check == "windows":
-                Case._made(assemble(merged, source=about))
+                Problem._made(assemble(merged, source=about))
             elif check == "decks":
                 checked(assemble(merged, source=about), False)
         except DeckError as error:

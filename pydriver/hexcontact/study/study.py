@@ -76,7 +76,7 @@ class Study:
     def __init__(
         self,
         deck: str | Path | Mapping[str, Any],
-        parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]],
+        parameters: Mapping[Any, Any] | Sequence[Mapping[str, Any]],
         *,
         output: str | Path | None = None,
         name: str = "study",
@@ -184,7 +184,7 @@ class Study:
         retry: bool = False,
         listener: Listener | None = None,
         cancel: threading.Event | None = None,
-    ) -> xarray.Dataset | None:
+    ) -> xarray.Dataset:
         """Run the missing cases and combine the results.
 
         In a script this belongs under ``if __name__ == "__main__":``, since it starts processes.
@@ -204,8 +204,8 @@ class Study:
 
         Returns
         -------
-        xarray.Dataset or None
-            The result, also written to `output`; None if it was canceled.
+        xarray.Dataset
+            The result, also written to `output`; if it was canceled, that of the finished cases, not written.
 
         Raises
         ------
@@ -228,7 +228,7 @@ class Study:
                 listener.said("study", f"{self.title}: {cases}{to_run}", **values, output=self.output)
                 if pool is not None:
                     self._work(pool, missing, listener, cancel)
-            return None if cancel.is_set() else self.collect()
+            return self._combined() if cancel.is_set() else self.collect()
         finally:
             lock.release()
 
@@ -307,6 +307,13 @@ class Study:
         DeckError, ResourceError
             If it cannot be written.
         """
+        dataset = self._combined()
+        study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
+        write(dataset, self.output, {"title": self.title, "study": study})
+        return dataset
+
+    def _combined(self) -> xarray.Dataset:
+        """Return the data set of the finished cases."""
         self.folder.enter(self.plan)
         attributes = {
             "source": f"hexcontact {__version__}",
@@ -314,10 +321,7 @@ class Study:
             "study_version": STUDY_VERSION,
             "combine": self.file.combine,
         }
-        study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
-        dataset = collect(self.plan, self.folder, self.file.steps, attributes)
-        write(dataset, self.output, {"title": self.title, "study": study})
-        return dataset
+        return collect(self.plan, self.folder, self.file.steps, attributes)
 
     def __repr__(self) -> str:
         """Name the study, its parameters and the number of its cases."""
@@ -325,6 +329,6 @@ class Study:
         return f"Study({self.title!r}, {self.file.combine} over {axes}: {len(self)} cases, {self.output})"
 
 
-def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> xarray.Dataset | None:
+def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> xarray.Dataset:
     """Read a study file and run its missing cases; options as of `Study.run`."""
     return Study.from_toml(path, output).run(**options)

@@ -1,5 +1,6 @@
 """What all Python tests need."""
 
+import os
 import signal
 
 from hypothesis import settings

@@ -121,7 +121,7 @@ class Summary(NamedTuple):
 
         found = histories_of(refined) if refined is not None else histories
         extent = extent if refined is None else extent_of(refined.step(-1))
-        return cls(case.title, found, parameters_of(case), case, refined, extent)
+        return cls(case.title, found, parameters_of(case), case, refined, extent=extent)
 
     @classmethod
     def of_result(cls, result: Result) -> Summary:

@@ -59,7 +59,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 
 # --- set-up: each step leaves a stamp, so that it is not done again ---------
 

@@ -220,7 +220,24 @@ contains
     if (allocated(error)) return
     edge = edges%stick_edge(punch, 1.0_wp + 0.0_wp*x)
     call check(error, edge%area, count(punch)*lattice%cell_area(), 1.0e-9_wp, 'area, all of it stuck')
+    if (allocated(error)) return
+    call check(error, area_of(edges%contact_mesh(x, vanishes=.false.)), edge%area, 1.0e-9_wp*edge%area, 'mesh of the cells')
   end subroutine test_punch
+
+  !> Area of the triangles of a mesh.
+  pure real(wp) function area_of(mesh) result(total)
+    type(zone_mesh_t), intent(in) :: mesh
+    integer :: k
+
+    total = 0.0_wp
+    do k = 1, size(mesh%triangles, 2)
+      associate (at => mesh%points(:, mesh%triangles(:, k)))
+        associate (a => at(:, 2) - at(:, 1), b => at(:, 3) - at(:, 1))
+          total = total + 0.5_wp*(a(1)*b(2) - a(2)*b(1))
+        end associate
+      end associate
+    end do
+  end function area_of
 
   !> Of an elliptic contact: half-axes of its edge, area of its mesh, fields that vanish at its edge or go on there.
   subroutine test_mesh(error)
@@ -230,8 +247,6 @@ contains
     type(zone_edge_t) :: edge
     type(zone_mesh_t) :: mesh
     real(wp), allocatable :: x(:, :), y(:, :), u(:, :), v(:, :), square(:, :), distance(:, :)
-    real(wp) :: total
-    integer :: k
 
     call new_window(lattice, x, y, error)
     if (allocated(error)) return
@@ -252,15 +267,7 @@ contains
     end associate
 
     mesh = edges%contact_mesh(square, vanishes=.true.)
-    total = 0.0_wp
-    do k = 1, size(mesh%triangles, 2)
-      associate (at => mesh%points(:, mesh%triangles(:, k)))
-        associate (a => at(:, 2) - at(:, 1), b => at(:, 3) - at(:, 1))
-          total = total + 0.5_wp*(a(1)*b(2) - a(2)*b(1))
-        end associate
-      end associate
-    end do
-    call check(error, total, edge%area, 1.0e-9_wp*edge%area, 'area of the mesh')
+    call check(error, area_of(mesh), edge%area, 1.0e-9_wp*edge%area, 'area of the mesh')
     if (allocated(error)) return
     call check(error, count(mesh%values > 0.0_wp), count(square > 0.0_wp), 'nodes of the mesh')
     if (allocated(error)) return

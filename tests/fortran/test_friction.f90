@@ -50,6 +50,7 @@ contains
       new_test('bulk_shear', test_bulk_shear), &
       new_test('no_friction', test_no_friction), &
       new_test('gross_sliding', test_gross_sliding), &
+      new_test('oblong_windows', test_oblong), &
       new_test('threads', test_threads), &
       new_test('bad_input', test_bad_input) &
     ]
@@ -533,6 +534,50 @@ contains
     if (allocated(error)) return
     call new_frictional_contact(contact, problem, error, n_threads=n_threads)
   end subroutine new_sphere
+
+  !> The same steps on windows that are longer along one side or the other have the same tractions.
+  subroutine test_oblong(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 10, more(2, 3) = reshape([0, 0, 5, 0, 0, 4], [2, 3])
+    real(wp), parameter :: beta(2) = [0.0_wp, 0.15_wp], load = 4.0_wp/3.0_wp
+    type(frictional_contact_t) :: contact
+    type(friction_problem_t) :: problem
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: x(:, :), y(:, :)
+    real(wp) :: traction(2*n + 1, 2*n + 1, 3), first(2*n + 1, 2*n + 1, 3)
+    integer :: pair, k, high(2)
+
+    do pair = 1, size(beta)
+      do k = 1, size(more, 2)
+        high = 2*(n + more(:, k)) + 1
+        call new_lattice(lattice, equilateral_basis(1.3_wp/n), -n - more(:, k), high, error)
+        if (allocated(error)) return
+        if (allocated(x)) deallocate (x, y)
+        allocate (x(high(1), high(2)), y(high(1), high(2)))
+        call lattice%coordinates(x, y)
+        call new_friction_problem(problem, lattice, elastic_pair_t(1.0_wp/pi, beta(pair)/pi, 0.3_wp/pi), 0.5_wp*(x**2 + y**2), &
+                                  x < 9.0_wp, coulomb_t(0.4_wp), .false., error)
+        if (allocated(error)) return
+        call new_frictional_contact(contact, problem, error)
+        if (allocated(error)) return
+        if (allocated(state%pressure)) deallocate (state%pressure)
+        call step(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
+        if (allocated(error)) return
+        call step(contact, state, [f, f, f, f], load*[1.0_wp, 0.2_wp, -0.1_wp, 0.02_wp], error)
+        if (allocated(error)) return
+        call step(contact, state, [d, d, d, d], state%motion(:4)*[1.02_wp, 0.7_wp, 1.1_wp, 0.8_wp], error)
+        if (allocated(error)) return
+        associate (low => more(:, k))
+          traction(:, :, 1) = state%pressure(low(1) + 1:low(1) + 2*n + 1, low(2) + 1:low(2) + 2*n + 1)
+          traction(:, :, 2:3) = state%traction(low(1) + 1:low(1) + 2*n + 1, low(2) + 1:low(2) + 2*n + 1, :)
+        end associate
+        if (k == 1) first = traction
+        call check(error, largest(traction - first), 0.0_wp, 1.0e-6_wp, 'tractions')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_oblong
 
   !> One load step; it must converge.
   subroutine step(contact, state, control, value, error, tolerance)

@@ -74,6 +74,7 @@ contains
       new_test('halved_at_first', test_halved_at_first), &
       new_test('bounded', test_bounded), &
       new_test('static', test_static), &
+      new_test('sliding', test_sliding), &
       new_test('motions', test_motions), &
       new_test('rim', test_rim), &
       new_test('half_steps', test_half_steps), &
@@ -749,5 +750,26 @@ contains
     if (allocated(error)) return
     call check(error, next%sweeps, solver%sweeps, 'sweeps of all of them')
   end subroutine test_entry_endless
+
+  !> A load that full sliding does not carry is given up at once: smaller parts of the step lead nowhere.
+  subroutine test_sliding(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: none, pressed, state
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp
+
+    call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(none, contact%problem%lattice)
+    call advance(contact, none, load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 4, pressed, &
+                 error)
+    if (allocated(error)) return
+    call advance(contact, pressed, load_target_t([f, f, f, d], [load, 1.2_wp*mu*load, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 4, &
+                 state, error)
+    if (allocated(error)) return
+    call check_true(error, state%sliding .and. .not. state%converged, 'gross sliding')
+    if (allocated(error)) return
+    call check(error, state%cuts, 0, 'no parts')
+  end subroutine test_sliding
 
 end module test_load_path

@@ -442,6 +442,17 @@ def test_bad_tables_are_one_sentence(tmp_path: Path, lines: str, sentence: str) 
     assert len(text.splitlines()) == 1
 
 
+def test_a_lattice_too_coarse_for_the_peak_at_the_surface_is_warned_of(tmp_path: Path) -> None:
+    deck = DECK.format(pad=PAD)
+    for nodes, region, warned in ((5, "", True), (5, "points = [[0, 0, 1e-3]]", False), (20, "", False)):
+        table = f'[[fatigue]]\nsegment = ["pull", "push"]\nparameters = ["smith_watson_topper"]\n{region}\n'
+        text = deck.replace("nodes_in_radius = 5", f"nodes_in_radius = {nodes}") + table
+        (tmp_path / "deck.toml").write_text(text)
+        code, text = command(tmp_path, "check", "deck.toml")
+        assert code == 0
+        assert ("fatigue.1: 5 spacings in the contact radius are too few" in text) == warned
+
+
 def test_a_cycle_in_a_history_without_labels_is_one_sentence(tmp_path: Path) -> None:
     deck = DECK.format(pad=PAD).replace(', label = "pull"', "").replace(', label = "push"', "")
     deck = deck.replace('label = "press"', "")

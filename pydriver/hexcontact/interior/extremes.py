@@ -15,7 +15,7 @@ _LEAST = ("life",)  # quantities whose least value counts
 
 
 def with_places(found: xarray.Dataset) -> xarray.Dataset:
-    """Return a dataset whose quantities have the attributes largest, largest_at (x, y, depth), largest_step."""
+    """Give each quantity the attributes largest, largest_at and largest_step, life least and so on."""
     for name, field in found.data_vars.items():
         values = np.where(np.isfinite(field.values), field.values, np.nan)
         if field.attrs.get("units") == "rad" or np.isnan(values).all():

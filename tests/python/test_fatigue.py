@@ -22,6 +22,7 @@ from hexcontact import DeckError, PathWarning, fatigue, open_result
 from hexcontact.cli.app import app
 from hexcontact.deck.below import cycle_of, steps_fault
 from hexcontact.interior import stress as stress_below
+from hexcontact.plotting import trailing_edge
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 41)
 E, NU = 200e9, 0.3
@@ -313,6 +314,15 @@ def test_the_stress_at_the_surface_has_the_tractions_of_the_result(finished: Pat
                         assert stress == pytest.approx(expected, abs=1e-8 * largest)
     far = result.stress("stress_zz", "stress_xz", points=[(1.3 * edge, 0, 0)], source=source)
     assert abs(far.to_array().values).max() < 1e-3
+
+
+def test_the_picture_of_the_ends_of_the_contact_is_read_at_the_surface(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    at_surface, below = trailing_edge(result), trailing_edge(result, depth=2e-5)
+    assert at_surface.texts[0].get_text().endswith(", at the surface")
+    assert below.texts[0].get_text().endswith(" deep")
+    peaks = [max(line.get_ydata().max() for line in f.axes[0].lines) for f in (at_surface, below)]
+    assert peaks[0] > 1.1 * peaks[1]
 
 
 def test_fatigue_uses_the_tractions_of_the_surface(finished: Path) -> None:

@@ -321,7 +321,7 @@ def test_the_picture_of_the_ends_of_the_contact_is_read_at_the_surface(finished:
     at_surface, below = trailing_edge(result), trailing_edge(result, depth=2e-5)
     assert at_surface.texts[0].get_text().endswith(", at the surface")
     assert below.texts[0].get_text().endswith(" deep")
-    peaks = [max(line.get_ydata().max() for line in f.axes[0].lines) for f in (at_surface, below)]
+    peaks = [max(np.max(line.get_ydata()) for line in f.axes[0].lines) for f in (at_surface, below)]
     assert peaks[0] > 1.1 * peaks[1]
 
 
@@ -393,9 +393,10 @@ def test_files_and_pages_say_where_the_largest_value_is(finished: Path) -> None:
             ("smith_watson_topper", "largest", found["smith_watson_topper"].values),
             ("life", "least", -found["life"].values),
         ):
-            depth, row, col = np.unravel_index(values.argmax(), values.shape)
+            alike = np.flatnonzero(values >= values.max() - 1e-6 * abs(values.max()))  # mirror images
+            depth, row, col = np.unravel_index(alike[0], values.shape)
             place = [found.x.values[row, col], found.y.values[row, col], found.depth.values[depth]]
-            assert found[name].attrs[word] == found[name].values[depth, row, col]
+            assert found[name].attrs[word] == abs(values.max())
             assert found[name].attrs[f"{word}_at"].tolist() == place
         at = found["life"].attrs["least_at"]
         assert "largest" not in found["smith_watson_topper_polar"].attrs

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import xarray
 
 _LEAST = ("life",)  # quantities whose least value counts
+_ALIKE = 1e-6  # share of a value within which others count as equal: the first of them is named
 
 
 def with_places(found: xarray.Dataset) -> xarray.Dataset:
@@ -20,9 +21,10 @@ def with_places(found: xarray.Dataset) -> xarray.Dataset:
         values = np.where(np.isfinite(field.values), field.values, np.nan)
         if field.attrs.get("units") == "rad" or np.isnan(values).all():
             continue
-        word, pick = ("least", np.nanargmin) if name in _LEAST else ("largest", np.nanargmax)
-        at = field.isel(dict(zip(field.dims, np.unravel_index(pick(values), values.shape), strict=True)))
-        field.attrs[word] = float(at)
+        word, end = ("least", np.nanmin(values)) if name in _LEAST else ("largest", np.nanmax(values))
+        first = np.flatnonzero(abs(values - end) <= _ALIKE * abs(end))[0]
+        at = field.isel(dict(zip(field.dims, np.unravel_index(first, values.shape), strict=True)))
+        field.attrs[word] = float(end)
         field.attrs[f"{word}_at"] = [float(at[axis]) for axis in ("x", "y", "depth")]
         if "step" in at.coords:
             field.attrs[f"{word}_step"] = int(at["step"])

@@ -12,17 +12,19 @@ if TYPE_CHECKING:
     import xarray
 
 _LEAST = ("life",)  # quantities whose least value counts
+_ALIKE = 1e-6  # share of a value within which others count as equal: the first of them is named
 
 
 def with_places(found: xarray.Dataset) -> xarray.Dataset:
-    """Return a dataset whose quantities have the attributes largest, largest_at (x, y, depth), largest_step."""
+    """Give each quantity the attributes largest, largest_at and largest_step, life least and so on."""
     for name, field in found.data_vars.items():
         values = np.where(np.isfinite(field.values), field.values, np.nan)
         if field.attrs.get("units") == "rad" or np.isnan(values).all():
             continue
-        word, pick = ("least", np.nanargmin) if name in _LEAST else ("largest", np.nanargmax)
-        at = field.isel(dict(zip(field.dims, np.unravel_index(pick(values), values.shape), strict=True)))
-        field.attrs[word] = float(at)
+        word, end = ("least", np.nanmin(values)) if name in _LEAST else ("largest", np.nanmax(values))
+        first = np.flatnonzero(abs(values - end) <= _ALIKE * abs(end))[0]
+        at = field.isel(dict(zip(field.dims, np.unravel_index(first, values.shape), strict=True)))
+        field.attrs[word] = float(end)
         field.attrs[f"{word}_at"] = [float(at[axis]) for axis in ("x", "y", "depth")]
         if "step" in at.coords:
             field.attrs[f"{word}_step"] = int(at["step"])

@@ -13,6 +13,7 @@ from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
 from ..errors import NotInResult
 from ..interior.stress import LOADED, below, bodies_of
+from ..result.interpolate import tractions_of
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from ..variables import EDGES
@@ -25,7 +26,7 @@ from .zones import draw_zone_bars
 if TYPE_CHECKING:
     import xarray
 
-    from ..result.result import Result
+from ..result.result import Result
 
 _DEPTH = 0.6  # of the section, in its widths
 _POINTS = 121  # along the line; 60 below each other
@@ -86,16 +87,15 @@ def stress(
 
 
 @figure("trailing_edge", "stress at both ends of the contact, over the load history")
-def trailing_edge(result: Result, depth: float | None = None, angle: float = 0.0) -> Figure:
+def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Figure:
     """Draw the stress along a section at both ends of the contact over the load steps.
 
     Parameters
     ----------
     result : Result
         Output of `Case.run` or `open_result`.
-    depth : float, optional
-        Depth of the points, m; by default two spacings, where the shape of the tractions within a spacing has
-        no influence.
+    depth : float
+        Depth of the points, m; by default they lie on the surface.
     angle : float
         Direction of the section from x, rad; its ends are those of the largest contact.
 
@@ -116,8 +116,7 @@ def trailing_edge(result: Result, depth: float | None = None, angle: float = 0.0
     place = np.linspace(0.0, cut.line.length, 16 * _POINTS)
     inside = place[largest.touches(*cut.line.points(place))]
     x, y = cut.line.points(inside[[0, -1]])
-    deep = 2.0 * largest.spacing if depth is None else depth
-    points = np.stack([x, y, np.full(2, deep)], axis=-1)
+    points = np.stack([x, y, np.full(2, depth)], axis=-1)
     names = ("stress_xx", "stress_yy", "stress_xy")
     along = np.array([math.cos(angle) ** 2, math.sin(angle) ** 2, math.sin(2.0 * angle)])
     found = [_below(view, points, *names) for view in views]
@@ -137,7 +136,8 @@ def trailing_edge(result: Result, depth: float | None = None, angle: float = 0.0
     symbol = r"$\sigma_{xx}$" if angle == 0.0 else r"$\sigma$ along the section"
     axes.set(xlabel="load step", ylabel=f"{symbol} in body {found[0].attrs['body']} ({unit})")
     legend_below(axes, ncols=2, fontsize=8)
-    set_title(canvas, f"{title_of(dataset_of(result))}, {worded(deep, 'm')} deep")
+    deep = f"{worded(depth, 'm')} deep" if depth else "at the surface"
+    set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
     return canvas
 
 
@@ -147,4 +147,7 @@ def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
     fields = {name: view.data[name].values for name in wanted if view.has(name)}
     bodies = bodies_of(str(view.data.attrs.get("deck", "")))
     body = 2 if bodies and bodies[0].rigid else 1
-    return below(view.lattice, [fields], bodies, body, {"points": points}, names, friction=view.friction)
+    given = view.lattice, [fields], bodies, body, {"points": points}, names
+    return below(
+        *given, friction=view.friction, surface=lambda _: tractions_of(view.data, view.lattice, "edges")
+    )

@@ -380,6 +380,7 @@ def test_what_is_unusual_in_a_series_is_named(folder: Path) -> None:
         ('normal_load [N]\n"1,000"\n', "expected a decimal point, not a comma"),
         ("normal_load,twist\nN,N\n1,2\n", 'column "twist": expected an angle'),
         ("Normal_Lod\n1\n", "did you mean normal_load?"),
+        ("Normal load,normal_load\n1,2\n", 'once; "Normal load" and "normal_load" are normal_load'),
         ("normal_load\n-5\n", 'line 2, column "normal_load" = "-5"'),
     ):
         put("history.csv", text)

@@ -181,3 +181,15 @@ def test_the_overview_names_interpolation_and_overshoot() -> None:
 def test_a_map_without_any_height_is_refused() -> None:
     for values in (np.nan * BALL, np.inf + BALL, -np.inf + BALL):
         assert complaint(on_grid(values)).startswith("gap: expected heights, NaN in holes, and inf where")
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 5), (3, 3), (5, 2)])
+def test_a_map_of_few_points_has_its_heights(shape: tuple[int, int]) -> None:
+    x, y = (np.arange(float(count)) for count in shape)
+    heights = np.random.default_rng(0).random(shape)
+    grid = HeightMap(x, y, heights)
+    np.testing.assert_allclose(grid(*np.meshgrid(x, y, indexing="ij")), heights, atol=1e-15)
+    heights[0, 0] = np.nan
+    holed = HeightMap(x, y, heights)
+    assert np.isinf(holed(np.array([0.5]), np.array([0.5]))).all()
+    assert "1 without a height" in str(holed)

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 import hexcontact
 from hexcontact import Case, DeckError
-from hexcontact.cli.options import setting
+from hexcontact.cli.options import setting, steps_of
 from hexcontact.deck.kinds import Kind
 from hexcontact.deck.model import Table, kind_of, parts_of
 from hexcontact.deck.series import read_series
@@ -214,3 +214,16 @@ def test_long_lines_of_a_series_get_their_sentence_at_once(tmp_path: Path) -> No
         with pytest.raises(DeckError):
             read_series(path)
     assert time.process_time() - start < 10.0
+
+
+@pytest.mark.parametrize("number", ["9" * 5_000, "1-" + "9" * 5_000, "1-999999999"])
+def test_long_numbers_of_steps_and_entries_get_their_sentence(number: str) -> None:
+    """Python refuses integers of more than 4300 digits, and a range of 10^9 steps fills the memory."""
+    for key in (f"load.{number}", f"load.{number}.steps"):
+        with pytest.raises(DeckError, match="expected an entry from 1 to 1, not "):
+            Case.from_text(starter("sphere"), overrides={key: 1})
+    if number == "1-999999999":
+        assert steps_of(number, ["", ""]) == [1, 2, 3]  # the third one is not there
+    else:
+        with pytest.raises(DeckError, match="expected a number of a load step"):
+            steps_of(number, ["", ""])

@@ -210,11 +210,11 @@ def steps_of(text: str, labels: Sequence[str], option: str = "step") -> list[int
         if word and word in labels:
             ends = zip(labels, [*labels[1:], ""], strict=True)
             numbers += [k for k, (own, after) in enumerate(ends, start=1) if own == word != after]
-        elif found := re.fullmatch(r"(\d+) *- *(\d+)", word):
-            numbers += range(int(found[1]), int(found[2]) + 1)
+        elif found := re.fullmatch(r"(\d{1,9}) *- *(\d{1,9})", word):
+            numbers += range(int(found[1]), min(int(found[2]), max(int(found[1]), len(labels) + 1)) + 1)
         elif word == "all":
             numbers += range(1, len(labels) + 1)
-        elif re.fullmatch(r"-?\d+", word):
+        elif re.fullmatch(r"-?\d{1,9}", word):
             numbers.append(int(word))
     if len(numbers) < len(words):
         known = [f'"{label}"' for label in dict.fromkeys(labels) if label]

@@ -51,7 +51,7 @@ _NOT_INCLUDED = {
     "heat": ("temperature", "thermal", "heat", "conductivity"),
     "lubrication": ("lubricat", "viscosity", "fluid"),
     "adhesion": ("adhesi", "surfaceenergy", "workofadhesion"),
-    "viscoelastic bodies": ("viscoelastic", "relaxation", "prony", "damping"),
+    "viscoelastic bodies": ("viscoelastic", "prony"),
     "anisotropic bodies": ("anisotrop", "orthotropicstiffness"),
     "inertia": ("density", "mass", "inertia", "velocity", "frequency"),
     "rolling": ("rolling", "creepage"),

@@ -350,6 +350,9 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
     if columns is None:
         for column in found:
             if key := meant.get(folded(column.header)):
+                if key in chosen and column.header not in headers[: headers.index(column.header)]:
+                    both = f"{shown(chosen[key].header)} and {shown(column.header)}"
+                    problems.append(f"{path}: expected each column once; {both} are {key}")
                 chosen[key] = column
             elif folded(column.header) not in _IGNORED:
                 others = (

@@ -13,6 +13,7 @@ from ..errors import DeckError, Fault
 from ..files import text_of
 from .units import DIGITS
 
+_LONGEST_NUMBER = 9  # digits of an entry
 DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
 # Text in quotes or a comment; a number with a comma; brackets; a number with a unit without quotes.
@@ -146,8 +147,8 @@ def _entry(array: Any, number: str, key: str) -> Any:
     """Return the entry of an array in a dotted key."""
     if not isinstance(array, list):
         raise DeckError(f"{key}: expected a key of a table, but {number} would be inside a plain value")
-    if not number.isdecimal() or not 1 <= int(number) <= len(array):
+    if not number.isdecimal() or len(number) > _LONGEST_NUMBER or not 1 <= int(number) <= len(array):
         example = key.replace(f".{number}", f".1.{number}", 1)
         hint = "" if number.lstrip("-").isdecimal() else f" (entries of arrays count from 1: {example})"
-        raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number}{hint}")
+        raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number[:60]}{hint}")
     return array[int(number) - 1]

@@ -118,9 +118,11 @@ class HeightMap:
         """Points beside steps, at which the spline leaves the range of the heights, and in holes."""
         found = ~self._there
         if self._degree > 1:
-            heights, slopes = self._filled, [self._spline(self.x, self.y, *d) for d in ((1, 0), (0, 1))]
-            found |= _beside_steps(self.x, heights, slopes[0])
-            found |= _beside_steps(self.y, heights.T, slopes[1].T).T
+            x, y, heights = self.x, self.y, self._filled
+            if len(x) > 2:  # two points have a line between them
+                found |= _beside_steps(x, heights, self._spline(x, y, dx=1))
+            if len(y) > 2:
+                found |= _beside_steps(y, heights.T, self._spline(x, y, dy=1).T).T
         return found
 
     @cached_property

@@ -179,17 +179,17 @@ def _interface(case: Problem) -> str:
 
 def _history(case: Problem) -> str:
     segments = case.load_steps[-1].segment + 1
-    if case.adaptive:
-        chosen = sum(step.ramp is not None for step in case.load_steps)
-        given = len(case.load_steps) - chosen
-        where = f"{chosen} segment{'s' * (chosen > 1)}"
-        fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
-        return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
     gaps = "".join(
         f"; {count} of {rows.count} rows of a series keep the {key.replace('_', ' ')} of the row before"
         for rows in (load.series for load in case.deck.load if load.series)
         for key, count in rows.missing.items()
     )
+    if case.adaptive:
+        chosen = sum(step.ramp is not None for step in case.load_steps)
+        given = len(case.load_steps) - chosen
+        where = f"{chosen} segment{'s' * (chosen > 1)}"
+        fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
+        return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}{gaps}"
     wears = ""
     if wear := case.deck.wear:
         solved = 'a number that shows on the way (jump "auto")'

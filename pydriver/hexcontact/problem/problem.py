@@ -398,7 +398,7 @@ class Problem:
             self.initial_gap(lattice)
             self._check_interface(source, lattice)
             return lattice
-        if not grid.center and self.height_map and (fault := self.height_map.touch_fault):
+        if lattice is None and not grid.center and self.height_map and (fault := self.height_map.touch_fault):
             raise DeckError(f"gap: {fault}")
         touch = self._gap.first_touch or (0.0, 0.0)
         center = grid.center or touch

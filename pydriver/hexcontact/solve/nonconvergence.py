@@ -131,7 +131,8 @@ def _sliding(
         return (
             True,
             f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at "
-            f"x = {place[0]}, y = {place[1]} (at most {quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
+            f"x = {place[0]}, y = {place[1]} (at most {quantity(largest, 'N m')}), since the tangential load "
+            "acts at x = y = 0",
             f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
             "that touch at x = y = 0",
         )

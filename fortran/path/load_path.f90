@@ -234,8 +234,9 @@ contains
         length = norm2(q)
         if (state%zone(col, row) == slip .and. bound(col, 2) > 0.0_wp .and. length > 0.0_wp) then
           turned = 0.0_wp
-          if (reached(col) >= at_bound*bound(col, 1)) &
+          if (reached(col) >= at_bound*bound(col, 1)) then
             turned = abs(turned_part(q_before(1), q_before(2), q(1), q(2)))
+          end if
           row_error = row_error + norm2(state%slip_increment(col, row, :)) &
                       *(turned + length*abs(bound(col, 2) - bound(col, 1))/bound(col, 2))
         else if (state%zone(col, row) == separated .and. bound(col, 1) > 0.0_wp) then

@@ -196,7 +196,8 @@ contains
   end function slipped
 
   !> Compute by how much a traction may have turned while a node slipped, (W4): its part before the step that is transverse to that
-  !> at the end, positive where it turns from x to y. Beyond a right angle less and less: a node whose traction reverses sticks until that is at its bound again.
+  !> at the end, positive where it turns from x to y. Beyond a right angle less and less: a node whose traction reverses sticks
+  !> until that is at its bound again.
   elemental real(wp) function turned_part(before_x, before_y, x, y) result(turned)
     !> Traction at the beginning and at the end of the step [Pa]
     real(wp), intent(in) :: before_x, before_y, x, y

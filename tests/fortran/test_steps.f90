@@ -109,8 +109,8 @@ contains
     ! only the first node slips, whose friction carries 2
     call check(error, wear_left(energies(:, :, :2), traction, pressure, friction), options%closing_gain*0.25_wp, thr, 'tractions')
     if (allocated(error)) return
-    call check(error, wear_left(energies, traction, pressure, friction), options%closing_safety/(1.0_wp - options%slowest_closing), &
-               1.0e-12_wp, 'changes that grow')
+    call check(error, wear_left(energies, traction, pressure, friction), &
+               options%closing_safety/(1.0_wp - options%slowest_closing), 1.0e-12_wp, 'changes that grow')
     if (allocated(error)) return
     energies(:, 1, 3) = [1.5_wp, 0.0_wp]
     call check(error, wear_left(energies, traction, pressure, friction), options%closing_safety/3.0_wp/0.75_wp, thr, 'a quarter')

@@ -152,9 +152,9 @@ def test_halved_jumps_change_the_depth_as_stated() -> None:
     coarse = worn(fretting(wear={"cycles": 100_000}).run()).isel(step=-1)
     off = np.abs(coarse["worn_depth"] - fine["worn_depth"]).max()
     assert 0.0 < off <= coarse["worn_depth_step_error"]
-    assert coarse["worn_depth_step_error"] < 0.15 * coarse["max_worn_depth"]
+    assert coarse["worn_depth_step_error"] < 0.3 * coarse["max_worn_depth"]
     left = coarse["unworn_cycle_change"] * coarse["max_worn_depth"]
-    assert coarse["worn_depth_step_error"] == np.abs(coarse["worn_depth_step_change"]).max() + left
+    assert coarse["worn_depth_step_error"] == 2.0 * np.abs(coarse["worn_depth_step_change"]).max() + left
 
 
 @pytest.mark.parametrize("last", [5, 14, 15, 16, 17])

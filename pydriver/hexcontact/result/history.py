@@ -223,7 +223,7 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
         words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
         rows.append(("load steps", words))
     if (share := path_error_share(history)) >= _WORTH_STATING:
-        rows.append(("energy by load steps", f"dissipated energy within {percent(share)}"))
+        rows.append(("size of load steps", f"dissipated energy within {percent(share)}"))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
 

@@ -127,11 +127,12 @@ def _sliding(
         return doubtful and not math.isinf(case.friction_coefficient), "", ""
     of_load = values[3] - moment
     if twist and abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest and not shear >= bound:
-        x, y = (quantity(at, "m") for at in _center(lattice, solution))
+        place = [quantity(at, "m") for at in _center(lattice, solution)]
         return (
             True,
-            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at x = {x}, "
-            f"y = {y} (at most {quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
+            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at "
+            f"x = {place[0]}, y = {place[1]} (at most {quantity(largest, 'N m')}), since the tangential load "
+            "acts at x = y = 0",
             f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
             "that touch at x = y = 0",
         )

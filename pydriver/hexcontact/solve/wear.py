@@ -45,6 +45,7 @@ from .frictional import FrictionWindow, state_of
 LABEL = "wear"  # of the cycles that wear, which are no part of the load history
 MOST_UNWORN = 50  # cycles on unworn surfaces, until they close
 _SUMMED = ("sweeps", "cuts", "operator_applications")  # of the load steps of a cycle
+_SAFETY = 2.0  # errors of the depth are at most 1.7 times its change by jumps of half the size, as measured
 _LEAST = 1e-12  # smallest jump, as a share of all cycles
 
 
@@ -378,7 +379,7 @@ class WearPath(GivenPath):
             "wear_cycles": cycle.cycles,
             "wear_volume": volume,
             "max_worn_depth": deepest,
-            "worn_depth_step_error": float(abs(cycle.change).max()) + self._left * deepest,
+            "worn_depth_step_error": _SAFETY * float(abs(cycle.change).max()) + self._left * deepest,
             "unworn_cycles": self._unworn,
             "unworn_cycle_change": self._left,
             "seconds": time.perf_counter() - self._started,

@@ -351,7 +351,7 @@ def _slipping(case: Problem) -> float:
     """Return the largest Q/mu P; that of a wide ring if shear is due to pressing alone; 0 without shear."""
     if not case.frictional or math.isinf(case.friction_coefficient):
         return 0.0
-    ratio = max(_load_ratio(case, step) for step in case.load_steps)
+    ratio = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
     return max(ratio, _NOTICED) if ratio else 0.8 * (abs(case.pair.beta) > _ALIKE)
 
 

@@ -240,7 +240,7 @@ def loop(
     ValueError
         If there is no tangential load in this result, or no such cycle.
     """
-    dataset = dataset_of(result)
+    dataset = _before_wear(dataset_of(result))
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
         raise NotInResult("a contact without friction has no tangential load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
@@ -296,7 +296,7 @@ def torsion(
     ValueError
         If there is no torque in this result, or no such cycle.
     """
-    dataset = dataset_of(result)
+    dataset = _before_wear(dataset_of(result))
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise NotInResult("there is no torque in this result")
     canvas, axes = drawing(ax, 4.6, 3.8)
@@ -314,6 +314,13 @@ def torsion(
 
 
 Axis = tuple[Array, str, str]  # values, name and unit of the quantity on an axis
+
+
+def _before_wear(dataset: xarray.Dataset) -> xarray.Dataset:
+    """Return the load history without the cycles of wear, of which only the end is recorded."""
+    if "wear_cycles" not in dataset:
+        return dataset
+    return dataset.isel(step=np.isnan(dataset["wear_cycles"].values))
 
 
 def _draw_loop(
@@ -341,7 +348,7 @@ def _draw_loop(
             raise DeckError(f"there is no cycle {number}; the history has {len(found)}")
         first, last, area = found[place]
         steps = slice(first, last + 1)
-        label = f"cycle {place % len(found) + 1}: {worded(area, 'J')}"
+        label = f"cycle {place % len(found) + 1}: loop of {worded(area, 'J')}"
         axes.fill(x[steps] * to_x, y[steps] * to_y, color=color, alpha=0.12, lw=0, label=label, zorder=1)
         if chosen is not None:
             axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)

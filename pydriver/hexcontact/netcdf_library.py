@@ -28,6 +28,7 @@ class _Lock:
     def __init__(self) -> None:
         self.own, self._depth = threading.RLock(), 0
         self._foreign: Any = None
+        self.waiting = 0  # threads that only wait for another one
 
     def acquire(self, blocking: bool = True) -> bool:
         """Take the lock; False without waiting if another thread has it."""
@@ -75,7 +76,7 @@ def lock_of_xarray() -> Any:
     HexcontactError
         If this version of xarray has no such lock.
     """
-    if "xarray" not in sys.modules and threading.active_count() == 1:
+    if "xarray" not in sys.modules and threading.active_count() - LOCK.waiting == 1:
         return None
     import xarray
     import xarray.backends.netCDF4_ as backend

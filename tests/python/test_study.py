@@ -337,6 +337,21 @@ def test_rerun_does_only_what_is_missing(folder: Path, monkeypatch: pytest.Monke
     assert solved == []
 
 
+def test_a_case_without_its_tables_gets_them(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As after a kill between the result and the tables: the case itself is not solved again."""
+    solved = at_once(monkeypatch)
+    (folder / "deck.toml").write_text(DECK + '[[stress]]\nname = "axis"\npoints = [[0, 0, 1e-4]]\n')
+    run_study("study.toml")
+    assert len(solved) == 6
+    written = (folder / "study/0002.nc").stat().st_mtime_ns
+    (folder / "study/0002_axis.nc").unlink()
+    solved.clear()
+    assert run_study("study.toml") is not None
+    assert len(solved) == 1
+    assert (folder / "study/0002_axis.nc").exists()
+    assert (folder / "study/0002.nc").stat().st_mtime_ns == written
+
+
 FAILING = """
 deck = "deck.toml"
 combine = "zip"
@@ -402,6 +417,40 @@ def test_job_array_runs_case_by_case(folder: Path) -> None:
         assert_array_equal(dataset.status, [[2, 0, 0], [2, 2, 2]])
 
 
+def test_a_task_runs_several_cases(folder: Path) -> None:
+    assert command("study.toml", "--case", "2").returncode == 0
+    study = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(f"{study}[slurm]\ncases_per_task = 2\n")
+    script = command("study.toml", "--slurm").stdout
+    assert "# 5 of 6 cases, 2 a task." in script
+    assert "#SBATCH --array=1-3\n" in script
+    assert "cases_per_task" not in script and "cases-per-task" not in script
+    words = script.replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
+    environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "1"}
+    assert subprocess.run(["sh"], input=words, text=True, env=environment, cwd=folder).returncode == 0
+    assert sorted(path.name for path in (folder / "study").glob("*.nc")) == ["0001.nc", "0002.nc", "0003.nc"]
+    environment["SLURM_ARRAY_TASK_ID"] = "3"
+    assert subprocess.run(["sh"], input=words, text=True, env=environment, cwd=folder).returncode == 0
+    assert (folder / "study/0006.nc").exists()
+    done = command("study.toml", "--case", "3-5", "--json")
+    assert [case["case"] for case in json.loads(done.stdout)["cases"]] == [3, 4, 5]
+
+
+def test_arrays_have_at_most_a_thousand_tasks() -> None:
+    array = BACKENDS["slurm"]
+    study, out = Path("study.toml"), Path("study.nc")
+    for count, tasks, first in ((1000, 1000, "1"), (1001, 501, "1-2"), (25_000, 1000, "1-25")):
+        script = array({}, count).script(range(1, count + 1), study, out, False)
+        assert f"#SBATCH --array=1-{tasks}\n" in script
+        if tasks < count:
+            assert f"\nset -- {first} " in script
+            assert script.endswith("--case $1")
+    late = array({}, 2).script([5, 1001], study, out, False)  # numbers of an edited study
+    assert "#SBATCH --array=1-2\n" in late and "\nset -- 5 1001\n" in late
+    with pytest.raises(DeckError, match=r"cases_per_task = 2: expected at least 3, since .* 1000 tasks"):
+        array({"cases_per_task": 2}, 2500).script(range(1, 2501), study, out, False)
+
+
 def test_no_text_of_a_study_becomes_a_line_of_its_script(folder: Path) -> None:
     text = (folder / "study.toml").read_text()
     told = 'title = "a\\ntouch PWN\\n# "\n' + text
@@ -452,6 +501,7 @@ nodelist = "n[1-3],m7"
         ("time = [1, 2]", "slurm.time = [1, 2]: expected text, a number, or true or false"),
         ('comment = ""', "slurm.comment = "),
         ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected one value, without commas"),
+        ("cases_per_task = 0", "slurm.cases_per_task = 0: expected a whole number of at least 1"),
     ],
 )
 def test_options_of_a_script_are_checked(folder: Path, options: str, sentence: str) -> None:

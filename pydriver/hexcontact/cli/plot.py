@@ -36,18 +36,24 @@ def _help() -> str:
     """Return the help, with a line for each figure: this imports the packages that draw."""
     from ..plotting.registry import entries
 
-    choices = [(entry.of_a_result, name, entry.help) for name, entry in entries().items()]
-    choices.append((True, _ALL, "every figure of the result, each in its own file"))
+    choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
+    choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
-    of_a_result, of_none = (
-        "\n".join(f"{name:<{width}}{words}" for of_one, name, words in choices if of_one == kind)
-        for kind in (True, False)
+    of_a_result, of_a_study, of_none = (
+        "\n".join(f"{name:<{width}}{words}" for kind, name, words in choices if kind == wanted)
+        for wanted in ("result", "study", "")
     )
     return (
         f"{_DRAWS}\n\n"
         "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
-        f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n\b\nWithout FILE:\n{of_none}"
+        f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
+        f"\b\nOf a study:\n{of_a_study}\n\n\b\nWithout FILE:\n{of_none}"
     )
+
+
+def _kind(entry: Entry) -> str:
+    """Return what the FILE of a figure is: a result, a study, or nothing."""
+    return "result" if entry.of_a_result else "study" if entry.of_a_study else ""
 
 
 @command(
@@ -102,15 +108,23 @@ def plot(
     """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
     from ..plotting.registry import entries
     from ..result.store import open_result
+    from ..study.shown import read_study, study_of
 
     files = files or []
     figures = entries()
     if what not in (known := [*figures, _ALL]):
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
-    if bool(files) != (what == _ALL or figures[what].of_a_result):
+    study = study_of(files[0]) if len(files) == 1 else None
+    if study is not None and what == "overview":
+        what = "study"
+    shows = "result" if what == _ALL else _kind(figures[what])
+    if files and shows and (study is not None) != (shows == "study"):
+        kind = "the result of a study; expected --what study" if study else "not the result of a study"
+        raise DeckError(f"--what {what}: {files[0]} is {kind}")
+    if bool(files) != bool(shows):
         expected = "expected no FILE" if files else "expected the FILE of a result"
         raise DeckError(f"--what {what}: {expected}")
-    results = [open_result(file) for file in files]
+    results: list[Any] = [open_result(file) for file in files] if study is None else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
         "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
@@ -131,6 +145,8 @@ def plot(
         first = output or beside(files[0], suffix)
         print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
+    if study is not None:
+        files, results = [study], [read_study(study)]
     default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
     print_output(f"written: {picture_of(results, what, output or default, chosen)}")
 
@@ -214,7 +230,8 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     entry = entries()[what]
     arguments = _arguments(entry, len(results), chosen)
     shown = [results] if entry.of_several else results
-    named = listed([result.path for result in results], "and") if results else ""
+    paths = [getattr(result, "path", "") for result in results]  # a study has none
+    named = listed(paths, "and") if any(paths) else ""
     about = f"{what} of {named}" if named else what
     try:
         figure = entry.draw(*shown, **arguments)

@@ -12,11 +12,18 @@ from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_
 
 @command("hexcontact info hertz_spheres.nc")
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
-    """Print a result: origin, history, energies, residuals, the last load step against Hertz."""
+    """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
     from ..interior.tables import content_of, description
     from ..result.store import open_result
+    from ..study import shown
     from . import tables
 
+    if (path := shown.study_of(file)) is not None:
+        study = shown.read_study(path)
+        if as_json:
+            return shown.content_of(study, path)
+        print_output(shown.lines_of(study))
+        return None
     if as_json and (content := content_of(file)):
         return content
     if lines := description(file):
@@ -61,12 +68,21 @@ def export(
         Path | None, output_to("Folder to write into; default: FILE_export beside FILE.")
     ] = None,
 ) -> None:
-    """Write a result for other programs."""
+    """Write a result for other programs; of a study the table of its cases."""
     if not (vtk or ugrid or csv or histories):
         raise DeckError("expected --vtk, --ugrid, --csv or --histories")
     from ..result import export as write
     from ..result.store import open_result
+    from ..study import shown
 
+    if (path := shown.study_of(file)) is not None:
+        if vtk or ugrid or histories or step is not None or source is not None:
+            raise DeckError(f"{path} is the result of a study, which has no fields; expected --csv alone")
+        study, stem = shown.read_study(path), beside(path, "").name
+        target = (output or beside(path, "_export")) / f"{stem}_cases.csv"
+        table = shown.table_of(study).rename(columns=shown.with_units(study))
+        print_output(f"written: {write.write_table(table, target)}")
+        return
     result, folder = open_result(file), output or beside(file, "_export")
     stem = beside(file, "").name
     steps = None if step is None else steps_of(step, labels_of(result))

@@ -12,7 +12,7 @@ from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
 from .guard import Content, Failure, command, print_error, print_output
-from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to
+from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to, steps_of
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
@@ -37,7 +37,8 @@ def study(
     ] = None,
     slurm: Annotated[bool, flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
     case: Annotated[
-        int | None, option("--case", metavar="N", help="Run only case N, as a job array does.")
+        str | None,
+        option("--case", metavar="N,...", help="Run only these cases, as a task does: 3, or 1,4-6."),
     ] = None,
     collect: Annotated[bool, flag("collect", "Run nothing; combine the finished cases.")] = False,
     plan: Annotated[
@@ -75,14 +76,17 @@ def study(
         return None
     with messages.logging(file, planned.output):
         if case is not None:
-            outcome = _run_case(planned, case, retry, messages)
-            if outcome.exit_code:
-                raise Failure(outcome.message, outcome.exit_code)
-            return {
-                "case": case,
-                "output": planned.folder.folder / f"{case:04d}.nc",
-                "seconds": outcome.seconds,
-            }
+            numbers = steps_of(case, [""] * len(planned), "case")
+            outcomes = _run_cases(planned, numbers, retry, messages)
+            failed = [outcome for outcome in outcomes if outcome.exit_code]
+            if failed:
+                more = f"\n{len(failed)} of {len(numbers)} cases failed" if len(numbers) > 1 else ""
+                raise Failure(failed[0].message + more, failed[0].exit_code)
+            done = [
+                {"case": n, "output": planned.folder.folder / f"{n:04d}.nc", "seconds": outcome.seconds}
+                for n, outcome in zip(numbers, outcomes, strict=True)
+            ]
+            return done[0] if len(done) == 1 else {"cases": done}
         if collect:
             planned.collect()
         else:
@@ -176,8 +180,8 @@ class _State:
         }
 
 
-def _run_case(study: Study, number: int, retry: bool, messages: Messages) -> Outcome:
-    """Run one case for a job array; signals end the process unless the case is done; finished steps stay."""
+def _run_cases(study: Study, numbers: Sequence[int], retry: bool, messages: Messages) -> list[Outcome]:
+    """Run cases for a job array; signals end the process unless all are done; finished steps stay."""
     from ..solve.progress import reporter
 
     outcomes: list[Outcome] = []
@@ -185,14 +189,15 @@ def _run_case(study: Study, number: int, retry: bool, messages: Messages) -> Out
     try:
         with signal_pipe() as pipe:
             in_background(
-                lambda: outcomes.append(study.run_case(number, retry, listener)),
+                lambda: outcomes.extend(study.run_case(number, retry, listener) for number in numbers),
                 pipe,
-                lambda _: not (outcomes or study.has(number)),
+                lambda _: not (len(outcomes) == len(numbers) or all(map(study.has, numbers))),
             )
     except Interrupted as signaled:
+        number = numbers[len(outcomes)]
         saved = f"the finished load steps of case {number} are recorded; the same command resumes after them"
         messages.interrupted(signaled, saved)
-    return outcomes[0]
+    return outcomes
 
 
 def _run_missing(study: Study, **options: Any) -> None:

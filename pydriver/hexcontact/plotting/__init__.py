@@ -23,6 +23,7 @@ from .history import history, loop, torsion
 from .compliance import compliance
 from .overview import overview
 from . import influence as influence
+from . import study as study
 from .registry import entries
 
 __all__ = [

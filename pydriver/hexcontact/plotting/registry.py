@@ -54,6 +54,11 @@ class Entry:
         return self.of_several or "result" in self.options
 
     @property
+    def of_a_study(self) -> bool:
+        """Whether it shows a study."""
+        return "study" in self.options
+
+    @property
     def of_several(self) -> bool:
         """Whether it may show several results."""
         return "results" in self.options

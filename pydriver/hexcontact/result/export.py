@@ -27,6 +27,7 @@ from .netcdf import is_mesh
 from .result import Result
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     import xarray
 
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
@@ -367,7 +368,7 @@ def to_csv(
     DeckError
         If there are no such steps.
     """
-    import pandas as pd  # type: ignore[import-untyped]
+    import pandas as pd
 
     steps = [] if numbers is None else kept_steps(result, numbers)
     _make(folder)
@@ -387,6 +388,14 @@ def to_csv(
         with replacing(target) as path:
             table.rename(columns=_with_unit).to_csv(path, index=False)
     return written
+
+
+def write_table(table: pandas.DataFrame, target: Path) -> Path:
+    """Write a table as CSV."""
+    _make(target.parent)
+    with replacing(target) as path:
+        table.map(_cell).to_csv(path, index=False)
+    return target
 
 
 def _cell(value: Any) -> Any:

@@ -259,3 +259,17 @@ def as_list(results: Results) -> list[AnyResult]:
 def dataset_of(result: AnyResult) -> xarray.Dataset:
     """Return the dataset of a result, or the dataset itself."""
     return cast("xarray.Dataset", getattr(result, "dataset", result))
+
+
+def last_steps(study: xarray.Dataset) -> xarray.Dataset:
+    """Return the result of a study with the last load step of each case only."""
+    if "step" not in study.dims:
+        return study
+    last = {}
+    for name, values in study.items():
+        if "step" in values.dims:  # NaN after the last step of a case
+            array = values.transpose(..., "step").values
+            place = np.maximum(np.isfinite(array).sum(axis=-1, keepdims=True) - 1, 0)
+            dims = [dim for dim in values.dims if dim != "step"]
+            last[name] = (dims, np.take_along_axis(array, place, axis=-1)[..., 0], values.attrs)
+    return study.drop_dims("step").assign(last)

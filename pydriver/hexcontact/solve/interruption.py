@@ -8,6 +8,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 
+from ..netcdf_library import LOCK
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
 
 ends_process = False  # whether the process ends with the command, and ignores signals from then on
@@ -80,10 +82,14 @@ def in_background(
         os.close(own)
 
     thread = threading.Thread(target=worker, daemon=True)
-    thread.start()
-    while number := os.read(reader, 1)[0]:
-        if ends(signaled := Interrupted(number)):
-            raise signaled
-    thread.join()
+    LOCK.waiting += 1
+    try:
+        thread.start()
+        while number := os.read(reader, 1)[0]:
+            if ends(signaled := Interrupted(number)):
+                raise signaled
+        thread.join()
+    finally:
+        LOCK.waiting -= 1
     if raised:
         raise raised[0]

@@ -11,7 +11,7 @@ import numpy as np
 from .. import netcdf_library
 from ..errors import DeckError, ResourceError
 from ..files import reading, replacing, require_ordinary
-from ..result.netcdf import check_seal
+from ..result.netcdf import attributes, check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .axes import Axis
 from .folder import StudyFolder
@@ -129,11 +129,7 @@ def _coordinate(axis: Axis, places: Any, settings: Sequence[Mapping[str, Any]]) 
 def is_study(path: Path) -> bool:
     """Return whether a file is the result of a study."""
     require_ordinary(path, "the result of a study")
-    try:
-        with netcdf_library.opened(path) as file:
-            return "study_version" in file.ncattrs()
-    except OSError:
-        return False
+    return "study_version" in attributes(path)
 
 
 def refuse_foreign(path: Path) -> None:

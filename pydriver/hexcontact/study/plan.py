@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -19,7 +18,7 @@ from ..problem.checks import checked
 from ..problem.problem import Problem
 from ..text import shown
 from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins
-from .job import MOST_CASES
+from .job import MOST_CASES, hash_of
 from .tables import StudyFile
 
 CheckLevel = Literal["windows", "decks", "nothing"]
@@ -68,11 +67,6 @@ class Plan:
     axes: tuple[Axis, ...]
     cases: tuple[PlannedCase, ...]
     dims: Mapping[str, int]
-
-
-def hash_of(deck: str) -> str:
-    """Return the name of a case: a hash of the text of its deck."""
-    return hashlib.sha256(deck.encode()).hexdigest()[:20]
 
 
 def described(settings: Mapping[str, Any], names: Mapping[str, str]) -> str:

@@ -284,12 +284,12 @@ class Study:
         Outcome
             Outcome of this run, or of the one before.
         """
-        missing = {self.folder.number(case): case for case in self.missing(retry)}
         known = {self.folder.number(case): case for case in self.cases}
         if number not in known:
             raise DeckError(f"case {number}: expected a number of a case from 1 to {max(known)}")
         case = known[number]
-        if number not in missing:
+        self.folder.enter(self.plan)
+        if not self.folder.missing([case], retry):
             return self.folder.failure(case) or Outcome(case.hash)
         outcome = solve_case(self._job(case), listener=listener)
         self.folder.note(case, outcome)

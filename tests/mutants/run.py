@@ -177,9 +177,9 @@ def tables(rows: dict[str, Row], seed: int, numbers: dict[str, int]) -> list[rep
         chosen: list[Row] = []
         invalid = {"does not compile": 0, "compiles to the same": 0}
         for mutant in drawn(ROOT, language, seed):
-            row = rows.get(mutant.key)
-            if row is None or len(chosen) == number:
+            if len(chosen) == number:
                 break
+            row = rows.get(mutant.key, {})
             if "invalid" in row:
                 invalid[row["invalid"]] += 1
             else:
@@ -193,13 +193,12 @@ def tables(rows: dict[str, Row], seed: int, numbers: dict[str, int]) -> list[rep
             where = f"`{path}:{row['number']}`"
             change = re.sub(r"(.+) for (.+)", r"`\1` for `\2`", row["change"]).replace("`nothing`", "nothing")
             killer = killed_by(row, "suite")
-            slow = "" if row.get("check") else " (suite)"
-            found = (
-                f"`{killer}`{slow}" if killer else "**not killed**" if killer == "" else "not by `make check`"
-            )
-            each.add(
-                where, change.replace("|", "\\|"), f"equivalent: {row['reason']}" if row["reason"] else found
-            )
+            found = "not tried" if row.get("check") is None else "not by `make check`"
+            if killer is not None:
+                found = f"`{killer}`{'' if row['check'] else ' (suite)'}" if killer else "**not killed**"
+            if row["reason"]:
+                found = f"equivalent: {row['reason']}"
+            each.add(where, change, found)
     return [summary, each]
 
 

@@ -139,7 +139,7 @@ def test_the_table_counts_what_was_killed_by_what() -> None:
         {"folder": "", "check": ""},
     ]
     rows = {mutant.key: row | {"path": mutant.path} for mutant, row in zip(mutants, found, strict=True)}
-    summary, each = run.tables(rows, 1, {"fortran": 40})
+    summary, each = run.tables(rows, 1, {"fortran": 4})
     assert summary.rows == [["`fortran/`", "4", "1", "0", "0", "1 of 4 (25 %)", "2 of 3 (67 %), 1 not tried"]]
     killers = ["`laws damping`", "`test_wear.py::test_a` (suite)", "**not killed**", "not by `make check`"]
     assert [row[2] for row in each.rows] == killers

@@ -564,6 +564,11 @@ def test_a_step_that_was_halved_is_one_step(monkeypatch: pytest.MonkeyPatch) -> 
     assert halved.history["residual_tangential"] == pytest.approx(residual_of(halved, 0.1), rel=1e-9)
 
 
+def without_doubts(result: Result) -> dict[str, Any]:
+    """Attributes of a result without the warnings of its coarse lattice."""
+    return {name: value for name, value in result.dataset.attrs.items() if name != "warnings"}
+
+
 def test_the_residual_of_an_adaptive_step_is_that_of_its_record(tmp_path: Path) -> None:
     """Each half meets the tolerance with a slip of its own; the slip of both belongs to no such step."""
     loads = [{"normal_load": 31.5, "steps": "auto"}, {"tangential_load_x": 2.5, "steps": "auto"}]
@@ -579,7 +584,7 @@ def test_the_residual_of_an_adaptive_step_is_that_of_its_record(tmp_path: Path) 
         assert "in two halves" in describe(step.history)
         assert "in two halves" in dict(history.step_rows(step.history))["work"]
     largest = result.residual_tangential.values.max()
-    [sentence] = history.remarks(histories, result.dataset.attrs)
+    [sentence] = history.remarks(histories, without_doubts(result))
     count = len(result)
     assert sentence == (
         f"{count} of {count} load steps were solved in two halves; each part met solver.tolerance; "
@@ -588,7 +593,7 @@ def test_the_residual_of_an_adaptive_step_is_that_of_its_record(tmp_path: Path) 
     assert sentence in html.unescape(report.report(result))
     assert f"note: {sentence}" in CliRunner().invoke(app, ["info", str(file)]).output
     equal = sphere(loads=[{"normal_load": 31.5}]).run()
-    assert history.remarks(equal.history.reset_index().to_dict("records"), equal.dataset.attrs) == []
+    assert history.remarks(equal.history.reset_index().to_dict("records"), without_doubts(equal)) == []
 
 
 def residual_of(step: Step, mu: float) -> float:
@@ -626,10 +631,10 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     with pytest.warns(PathWarning) as warned:
         result = case.run(file)
     assert result.dataset["cuts"].values.tolist() == [2, 0]
-    [warning] = warned.list
+    [warning] = [found for found in warned if found.category is PathWarning]
     expected = "contact and did not converge as a whole" if in_parts else "solutions for smaller loads"
     assert str(warning.message).startswith("step 1 ") and expected in str(warning.message)
-    told = history.remarks(result.history.reset_index().to_dict("records"), result.dataset.attrs)
+    told = history.remarks(result.history.reset_index().to_dict("records"), without_doubts(result))
     assert told[0] == str(warning.message)
     assert told[1].startswith("1 of 2 load steps did not converge at once: step 1 (halved 2 times); ")
     assert told[1].endswith("up to 4.7e-02" if in_parts else "fulfil the conditions all the same")
@@ -638,7 +643,7 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     assert all(sentence in html.unescape(page) for sentence in told)
     shown = CliRunner().invoke(app, ["info", str(file)]).output
     assert all(f"note: {sentence}" in shown for sentence in told)
-    assert tables.file_content(result)["warnings"] == told
+    assert tables.file_content(result)["warnings"][-2:] == told
 
 
 def sphere_of(pair: ElasticPair, friction_coefficient: float) -> tuple[FrictionalContact, float]:

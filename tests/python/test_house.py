@@ -138,7 +138,7 @@ def test_version_is_the_same_everywhere() -> None:
 
 FORMATS: dict[str, dict[str, object]] = {  # by the version that first wrote them; a change is a new line
     "0.4.0": {
-        **{"result": 1, "journal": 2, "lattices": 2, "study": 1},
+        **{"result": 1, "journal": 3, "lattices": 2, "study": 1},
         "record": "index lattice history control fields companion",
         "metadata": "title deck fields every planned_steps parameters run created version resumed deck_file",
         "growth": "run of planned_steps kept added checksum",

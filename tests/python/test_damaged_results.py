@@ -399,7 +399,7 @@ def test_a_record_of_another_version_is_refused(out: Path) -> None:
     record = journal_of(out) / "000001.npz"
     with np.load(record) as file:
         arrays = dict(file)
-    text = arrays["about"].tobytes().replace(b'"journal_version": 2', b'"journal_version": 1')
+    text = arrays["about"].tobytes().replace(b'"journal_version": 3', b'"journal_version": 1')
     np.savez(record, **(arrays | {"about": np.frombuffer(text, "u1")}))
     with pytest.raises(DeckError, match=r"000001\.npz was kept by hexcontact .*layout 1; .* reads layout 3"):
         open_result(out)

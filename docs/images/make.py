@@ -147,7 +147,11 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "interface": stiffening_interface,
     "path_dependence": path_dependence,
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
-    **{name.replace("-", "_"): figure.draw for name, figure in entries().items() if not figure.of_a_result},
+    **{
+        name.replace("-", "_"): figure.draw
+        for name, figure in entries().items()
+        if not (figure.of_a_result or figure.needs)
+    },
 }
 
 

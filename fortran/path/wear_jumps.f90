@@ -9,7 +9,7 @@
 !>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
 !>     call jump_change(..., energy, that of the second jump, that of one jump of both, ..., slower, change)
 !>
-!> Equations: docs/theory/wear.md, (V1) to (V6), (V5).
+!> Equations: docs/theory/wear.md, (V1) to (V6), (V9).
 module hc_wear_jumps
   use hc_precision, only: wp, sp
   use hc_options, only: step_options_t

@@ -22,7 +22,8 @@ from hexcontact.cli.app import app
 from hexcontact.cli.report import report
 from hexcontact.deck.surfaces import Sphere
 from hexcontact.problem import refinement
-from hexcontact.problem.refinement import RATIO, SHIFTS
+from hexcontact.problem.problem import RATIO
+from hexcontact.problem.refinement import SHIFTS
 from hexcontact.result.trials import TrialFolder
 from hexcontact.solve import accuracy
 from hexcontact.variables import ESTIMATED, VARIABLES

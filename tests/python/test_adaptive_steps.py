@@ -336,7 +336,7 @@ def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.Monke
 
 def test_what_a_person_sees(tmp_path: Path) -> None:
     case = made({**DISSIMILAR, "loads": PRESS_AND_SHEAR}, nodes_in_radius=5, step_tolerance=0.1, title="Demo")
-    assert repr(case).endswith("2 adaptive segments)")
+    assert "2 adaptive segments)\n  warning: 5 spacings" in repr(case)
     stream = io.StringIO()
     out = tmp_path / "out.nc"
     result = case.run(out, progress=Lines(stream))

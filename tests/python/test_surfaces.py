@@ -146,7 +146,11 @@ def test_all_shapes_of_the_deck_are_there() -> None:
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: Sphere(radius=-1.0), 'radius = -1.0: expected a length above 0 such as "1 mm"'),
+        (
+            lambda: Sphere(radius=-1.0),
+            'radius = -1.0: expected a length above 0 such as "1 mm"; a hollow is a formula with its radii '
+            'in m: { shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }',
+        ),
         (lambda: Sphere(), 'radius: missing; expected a length above 0 such as "1 mm"'),
         (lambda: Sphere(radius=1.0, exakt=True), "exakt: unknown key; did you mean exact?"),
         (

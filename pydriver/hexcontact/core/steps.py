@@ -263,7 +263,7 @@ def change_by_jump(
     cycles: float,
     max_pressure: float,
 ) -> tuple[Change, Array, Array]:
-    """Compare two jumps with one of both: docs/theory/wear.md, (V6), (V5).
+    """Compare two jumps with one of both: docs/theory/wear.md, (V5) and (V6).
 
     Parameters
     ----------

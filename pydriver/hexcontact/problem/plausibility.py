@@ -243,15 +243,16 @@ def _fatigue_at_surface(case: Problem) -> Iterator[str]:
             yield f"fatigue.{number}"
 
 
+def _at_most(error: float) -> str:
+    """Return an expected error in percent; of the largest, nothing above is known."""
+    return f"{percent(error)}{' or more' * (error >= NO_VALUE)}"
+
+
 def warnings(case: Problem, estimated: bool = True) -> list[str]:
     """Return a sentence for each limit that a case exceeds; arguments as `expected`."""
     found = expected(case, estimated)
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
-    worth = [
-        f"{percent(error)}{' or more' * (error >= NO_VALUE)} in the {spelled(name)}"
-        for error, name in errors
-        if error > 0.01
-    ]
+    worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
     known = found | {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
@@ -260,7 +261,7 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
         "growing_words": _even_steps(found.get("growing_steps", 0.0)),
         "step_percent": percent(found.get("step_error", 0.0)),
         "turning_percent": percent(found.get("turning_error", 0.0)),
-        "ring_percent": percent(found.get("ring_error", 0.0)),
+        "ring_percent": _at_most(found.get("ring_error", 0.0)),
     }
     passed = [
         limit for limit in LIMITS if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most

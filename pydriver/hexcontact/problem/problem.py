@@ -38,6 +38,8 @@ from .window import Estimate, NoContactFound
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
 MOST_DIRECT_NODES = 200
+RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one of a refinement
+LEAST_LEVELS = 3  # lattices of a refinement
 _MOST_CHECKED_NODES = 10_000_000  # nodes of a window for which friction is computed before a run
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 _NO_ELASTICITY = 1e-9  # share of the compliance of the interface that bodies have in a full contact
@@ -285,6 +287,12 @@ class Problem:
         inside = [(low <= c) & (c <= high) for c, (low, high) in zip(at, contact.bounds, strict=True)]
         return int(np.count_nonzero(inside[0] & inside[1]))
 
+    def refined(self, level: int, moved: tuple[float, float] = (0.0, 0.0)) -> Problem:
+        """Return the problem on a lattice refined `level` times, its origin moved by parts of a spacing."""
+        finer = RATIO**level
+        x, y = np.array(self.lattice.origin) + np.array(moved) @ self.lattice.basis / finer
+        return self.on_lattice(self.lattice.spacing / finer, (float(x), float(y)))
+
     def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Self:
         """Return the same problem on a lattice of another spacing (m) and origin (m), without refinement."""
         other = copy.copy(self)
@@ -382,9 +390,7 @@ class Problem:
         if self.adaptive:
             sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]
-        from .refinement import LEAST_LEVELS, Trial
-
-        third = Trial(LEAST_LEVELS - 1).case(self).lattice.size
+        third = self.refined(LEAST_LEVELS - 1).lattice.size
         if third <= wanted.max_nodes:
             return []
         sentence = (

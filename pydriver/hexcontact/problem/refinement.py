@@ -6,15 +6,10 @@ Shifted copies of a lattice have its spacing and origins moved by fractions of i
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-import numpy as np
+from .problem import LEAST_LEVELS, Problem
 
-from .problem import Problem
-
-RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one
-LEAST_LEVELS = 3
 # Origins of the shifted copies, in spacings along both basis vectors: multiples of (1/g, 1/g^2) with
 # g^3 = g + 1, which no row or symmetry of the lattice maps to each other.
 SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
@@ -36,11 +31,7 @@ class Trial(NamedTuple):
 
     def case(self, case: Problem) -> Problem:
         """Return the case on this lattice."""
-        spacing = case.lattice.spacing / RATIO**self.level
-        origin = np.array(case.lattice.origin)
-        if self.copy:
-            origin += SHIFTS[self.copy - 1] @ case.lattice.basis / RATIO**self.level
-        return case.on_lattice(spacing, (float(origin[0]), float(origin[1])))
+        return case.refined(self.level, SHIFTS[self.copy - 1] if self.copy else (0.0, 0.0))
 
     @property
     def name(self) -> str:

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeckError, ResourceError
-from ..problem.problem import Problem
-from ..problem.refinement import LEAST_LEVELS, RATIO, SHIFTS, Trial
+from ..problem.problem import LEAST_LEVELS, RATIO, Problem
+from ..problem.refinement import SHIFTS, Trial
 from ..result.journal import Journal, journal_of
 from ..result.layout import Metadata
 from ..result.step import Step

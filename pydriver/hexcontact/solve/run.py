@@ -100,7 +100,7 @@ def run(
     if output is None:
         with listener.following(case.title, case.planned_steps):
             result = _in_memory(case, listener)
-            return checked(result)
+            return checked(result) if case.accuracy or case.adaptive else result
     with (
         Store(output, metadata_of(case), overwrite) as store,
         listener.following(case.title, case.planned_steps),

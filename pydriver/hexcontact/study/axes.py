@@ -126,7 +126,9 @@ def _read(kind: Kind, value: Any) -> Any:
 
 
 def _unit(kind: Kind | None) -> str:
-    return {Quantity: getattr(kind, "dimension", NUMBER).unit or "1", Whole: "1"}.get(type(kind), "")
+    if isinstance(kind, Quantity):
+        return kind.dimension.unit or "1"
+    return "1" if isinstance(kind, Whole) else ""
 
 
 def axis_of(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:

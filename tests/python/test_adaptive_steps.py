@@ -340,8 +340,9 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     stream = io.StringIO()
     out = tmp_path / "out.nc"
     result = case.run(out, progress=Lines(stream))
-    first, *lines = stream.getvalue().splitlines()
+    first, doubt, *lines = stream.getvalue().splitlines()
     assert first == "Demo: steps that are chosen on the way"
+    assert doubt.startswith("warning: 5 spacings in the contact radius")
     assert lines[0].startswith("step   1 (") and "(100%)" in lines[-1]
     assert " ± " in lines[-1]
     assert " ± " not in describe(result.history.iloc[-1].to_dict(), short=True)

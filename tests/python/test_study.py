@@ -460,7 +460,7 @@ time = 01:30:00
 nice = 10
 exclusive = true
 requeue = false
-nodelist = "n[1-3],m7"
+nodelist = "n[1-3]"
 """
     (folder / "study.toml").write_text(told + options)
     (folder / "study.toml").rename("my study; touch PWN.toml")
@@ -479,7 +479,7 @@ nodelist = "n[1-3],m7"
         "time=01:30:00",
         "nice=10",
         "exclusive",
-        "nodelist=n[1-3],m7",
+        "nodelist=n[1-3]",
     }
     words = lines[-1].replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
     environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "3"}

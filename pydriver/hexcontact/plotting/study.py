@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..errors import DeckError
 from ..result.view import last_steps
 from ..text import quantity, scaled
 from ..variables import SUMMARY, VARIABLES, spelled
@@ -63,7 +64,7 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
 
     Raises
     ------
-    ValueError
+    DeckError
         If there is no such name, or no case is done.
     """
     study = last_steps(study)
@@ -71,13 +72,13 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
     numbers = [name for name in parameters if study[name].dtype.kind in "fi" and study[name].ndim == 1]
     if not numbers or (over and over not in numbers):
         expected = f"expected {' or '.join(numbers)}" if numbers else "none of its parameters is a number"
-        raise ValueError(f"over = {over!r}: {expected}")
+        raise DeckError(f"over = {over!r}: {expected}")
     over = over or max(numbers, key=lambda name: study[name].size)
     names = _varying(study) if quantities is None else list(quantities)
     if unknown := [name for name in names if name not in study.data_vars]:
-        raise ValueError(f"{unknown[0]} is no quantity of this study")
+        raise DeckError(f"{unknown[0]} is no quantity of this study")
     if not names:
-        raise ValueError("no quantity differs between its cases; are any done?")
+        raise DeckError("no quantity differs between its cases; are any done?")
     [along] = study[over].dims
     others = [dim for dim in study["status"].dims if dim != along]
     curves = study.stack(curve=others) if others else study.expand_dims("curve")

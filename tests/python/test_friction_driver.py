@@ -421,7 +421,7 @@ def test_a_state_behind_a_stale_handle_is_an_error(monkeypatch: pytest.MonkeyPat
     with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
         problem.advance(problem.virgin(), *loads)
     small = Lattice(0.1, -1, -1, 3, 3)
-    held = HeldState.copied(small.shape, [np.zeros(small.size)] * 8, [0.0] * 12)
+    held = HeldState.copied(small.shape, [np.zeros(small.size)] * 8, [0.0] * 13)
     monkeypatch.setattr(problem, "_held", lambda state: held)
     with pytest.raises(HexcontactError, match="stale"):
         problem.advance(problem.virgin(), *loads)

@@ -11,7 +11,6 @@ import numpy as np
 from .. import netcdf_library
 from ..errors import DeckError
 from ..files import reading, require_utf8
-from ..result.netcdf import attributes
 from ..result.view import last_steps
 from ..text import quantity, text_table, visible
 from ..variables import SUMMARY
@@ -43,7 +42,7 @@ def study_of(path: Path) -> Path | None:
             raise DeckError(f"{path} holds the cases of a study; hexcontact study STUDY.toml combines them")
         return found
     require_utf8(path, "a netCDF file")
-    return path if "study_version" in attributes(path) else None
+    return path if "study_version" in netcdf_library.attributes(path) else None
 
 
 def read_study(path: Path) -> xarray.Dataset:

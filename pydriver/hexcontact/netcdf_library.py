@@ -129,6 +129,15 @@ def opened(path: Path, mode: Literal["r", "w"] = "r", **options: Any) -> Iterato
             close(file)
 
 
+def attributes(path: Path) -> dict[str, Any]:
+    """Return the attributes of a file; none if it is missing, damaged or another file."""
+    if not path.is_file():  # a pipe would block
+        return {}
+    with contextlib.suppress(OSError, RuntimeError, AttributeError), opened(path) as file:
+        return {name: file.getncattr(name) for name in file.ncattrs()}
+    return {}
+
+
 def close(file: netCDF4.Dataset) -> None:
     """Close a file, so that its destructor does not, not even after an error."""
     with LOCK:

@@ -491,6 +491,25 @@ def hexcontact_(folder: Path, *arguments: str, limit: int = 0) -> subprocess.Com
     )
 
 
+# The command, whose solver waits after some steps until a signal has closed the store.
+WAITING = """
+import threading
+from hexcontact.cli import app
+from hexcontact.result.store import Store
+
+append, close, closed = Store.append, Store.close, threading.Event()
+def waiting(store, *arguments, **options):
+    if len(store.heads) >= 5:
+        closed.wait()
+    return append(store, *arguments, **options)
+def closing(store, *arguments, **options):
+    close(store, *arguments, **options)
+    closed.set()
+Store.append, Store.close = waiting, closing
+app.main()
+"""
+
+
 @pytest.mark.parametrize(
     ("sent", "code"), [(signal.SIGINT, 130), (signal.SIGUSR1, 138), (signal.SIGTERM, 143)]
 )
@@ -498,7 +517,7 @@ def test_a_signal_ends_the_run_and_resume_goes_on(tmp_path: Path, sent: signal.S
     (tmp_path / "a sphere.toml").write_text(DECK.replace("steps = 2", "steps = 30"))
     whole = hexcontact_(tmp_path, "run", "a sphere.toml", "-q", "-o", "whole.nc")
     assert (whole.returncode, whole.stderr) == (0, "")
-    command = [sys.executable, "-m", "hexcontact", "run", "a sphere.toml"]
+    command = [sys.executable, "-c", WAITING, "run", "a sphere.toml"]
     with subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
     ) as process:

@@ -107,14 +107,13 @@ def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
 
 def read_table(path: Path) -> xarray.Dataset | None:
     """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
-    if not path.is_file():  # a pipe would block
+    if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
     try:
         with netcdf_library.opened_by_xarray(path) as found:
-            found.load()
+            return found.load()
     except (OSError, ValueError):
         return None
-    return found if found.attrs.get("content") in (STRESS, FATIGUE) else None
 
 
 def content_of(path: Path) -> dict[str, Any]:

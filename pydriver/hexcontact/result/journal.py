@@ -17,7 +17,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -429,7 +429,10 @@ def _known(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 
 
 def _about(known: Mapping[str, Any]) -> Metadata | Growth:
-    return made(Growth, known["growth"]) if "growth" in known else Metadata.from_plain(known["metadata"])
+    if "growth" not in known:
+        return Metadata.from_plain(known["metadata"])
+    require_kinds(known["growth"], **get_type_hints(Growth))
+    return made(Growth, known["growth"])
 
 
 def _fields(archive: zipfile.ZipFile, part: str, known: Mapping[str, Any]) -> dict[str, NDArray[Any]]:

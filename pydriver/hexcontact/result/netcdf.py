@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..errors import DeckError
 from ..files import reading
-from ..netcdf_library import LOCK, close, opened, opened_by_xarray
+from ..netcdf_library import LOCK, attributes, close, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
@@ -241,15 +241,6 @@ def missing_stresses(output: Path) -> dict[str, Path]:
     about = attributes(output)
     files = stress_files(about.get("deck", ""), output)
     return {name: path for name, path in files.items() if attributes(path).get("stress_of") != about["run"]}
-
-
-def attributes(path: Path) -> dict[str, Any]:
-    """Return the attributes of a file; none if it is missing, damaged or another file."""
-    if not path.is_file():  # a pipe would block
-        return {}
-    with contextlib.suppress(OSError, RuntimeError, AttributeError), opened(path) as file:
-        return {name: file.getncattr(name) for name in file.ncattrs()}
-    return {}
 
 
 def read_output(path: Path) -> Result:

@@ -11,7 +11,8 @@ import numpy as np
 from .. import netcdf_library
 from ..errors import DeckError, ResourceError
 from ..files import reading, replacing, require_ordinary
-from ..result.netcdf import attributes, check_seal
+from ..netcdf_library import attributes
+from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .axes import Axis
 from .folder import StudyFolder

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from .._version import __version__
 from ..errors import HexcontactError, ResourceError
-from ..result.netcdf import attributes
+from ..netcdf_library import attributes
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem

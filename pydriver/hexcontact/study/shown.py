@@ -10,8 +10,7 @@ import numpy as np
 
 from .. import netcdf_library
 from ..errors import DeckError
-from ..files import reading
-from ..result.netcdf import attributes
+from ..files import reading, require_utf8
 from ..result.view import last_steps
 from ..text import quantity, text_table, visible
 from ..variables import SUMMARY
@@ -42,7 +41,8 @@ def study_of(path: Path) -> Path | None:
         if found is None:
             raise DeckError(f"{path} holds the cases of a study; hexcontact study STUDY.toml combines them")
         return found
-    return path if "study_version" in attributes(path) else None
+    require_utf8(path, "a netCDF file")
+    return path if "study_version" in netcdf_library.attributes(path) else None
 
 
 def read_study(path: Path) -> xarray.Dataset:

@@ -371,6 +371,34 @@ def test_histories_are_as_other_programs_take_them(finished: Path) -> None:
     assert (finished / "deck_export/deck_line_0009.vts").is_file()
 
 
+def test_tables_are_exported_as_csv(finished: Path) -> None:
+    for words, folder in ((("deck.nc",), "deck_export"), (("deck_line.nc",), "deck_line_export")):
+        for _ in range(2):  # over what was exported before, too
+            code, text = command(finished, "export", *words, "--csv")
+            assert code == 0, text
+        table = pandas.read_csv(finished / folder / "deck_line.csv")
+        with xarray.open_dataset(finished / "deck_line.nc") as found:
+            assert table.columns[:5].tolist() == [
+                *("x [m]", "y [m]", "depth [m]", "distance [m]", "findley [Pa]")
+            ]
+            for name in ("x", "y", "depth", "distance", "findley"):
+                np.testing.assert_array_equal(table.filter(regex=rf"^{name} \["), found[name].values[:, None])
+    surface = pandas.read_csv(finished / "deck_export/deck_fatigue_1.csv")
+    with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
+        assert len(surface) == found["x"].size
+        for name in ("x [m]", "y [m]", "life", "ruiz_f2 [Pa2 m]"):
+            np.testing.assert_array_equal(surface[name], found[name.partition(" ")[0]].values.ravel())
+    code, text = command(finished, "export", "deck_line.nc", "--vtk")
+    assert code == 2
+    assert "deck_line.nc holds fatigue parameters, a table; expected --csv alone" in text
+    target = finished / "deck_export/deck_line.csv"
+    target.write_text("mine,1\n")
+    code, text = command(finished, "export", "deck.nc", "--csv")
+    assert code == 2 and "deck_line.csv is there and was not made by hexcontact" in text
+    assert target.read_text() == "mine,1\n"
+    target.unlink()
+
+
 def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:
     with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
         assert found["life"].attrs["units"] == "1"

@@ -454,6 +454,17 @@ depths = ["0 um", "0.1 mm"]
     assert command(tmp_path, "export", "deck.nc", "--vtk").returncode == 0
     assert (tmp_path / "deck_export" / "deck_axis.pvd").is_file()
     check_volume(tmp_path)
+    done = command(tmp_path, "export", "deck.nc", "--csv")
+    assert done.stdout.split()[1::2] == [f"deck_export/deck_{n}.csv" for n in ("history", "axis", "stress_2")]
+    rows = (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines()
+    assert rows[0].startswith(
+        "step,x [m],y [m],depth [m],distance [m],von_mises_stress [Pa],displacement_z [m]"
+    )
+    assert [row.split(",")[0] for row in rows[1:]] == ["1"] * 21 + ["2"] * 21
+    (tmp_path / "deck_axis.nc").unlink()  # then it is computed anew
+    (tmp_path / "deck_export/deck_axis.csv").unlink()
+    assert command(tmp_path, "export", "deck.nc", "--csv").returncode == 0
+    assert (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines() == rows
     assert command(tmp_path, "report", "deck.nc").returncode == 0
     page = (tmp_path / "deck.html").read_text()
     assert page.count('<figure class="picture">') == 1
@@ -518,6 +529,15 @@ def test_bad_tables_are_one_sentence(tmp_path: Path, lines: list[str], sentence:
     assert done.returncode == 2
     assert sentence in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_table_with_the_name_of_another_export_is_refused(tmp_path: Path) -> None:
+    table = '[[stress]]\nname = "history"\npoints = [[0, 0, 0]]\n'
+    (tmp_path / "deck.toml").write_text(DECK + table)
+    assert command(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
+    done = command(tmp_path, "export", "deck.nc", "--csv")
+    assert done.returncode == 2 and "the table history would be written to" in done.stderr
+    assert not (tmp_path / "deck_export").exists()
 
 
 def test_files_of_others_are_not_replaced_by_stresses(tmp_path: Path) -> None:

@@ -70,6 +70,21 @@ def computed(
             yield name, of_table(result, name, table, kept)
 
 
+def at_hand(
+    result: BelowSurface, kept: list[int], names: list[str] | None = None
+) -> Iterator[tuple[str, xarray.Dataset]]:
+    """Yield what `computed` does; tables that the run has written are read from their files."""
+    run, path = result.dataset.attrs.get("run"), Path(result.path)
+    files = files_of(result.deck, path) if path.name else {}
+    for name, table in tables_of(result.deck).items():
+        if names is not None and name not in names:
+            continue
+        found = read_table(files[name]) if files else None
+        if found is None or found.attrs.get("stress_of") != run:
+            found = of_table(result, name, table, kept)
+        yield name, found
+
+
 def of_table(
     result: BelowSurface, name: str, table: Stress | Fatigue, kept: list[int] | None = None
 ) -> xarray.Dataset:

@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import os
 import subprocess
 import sys
 import zlib
@@ -632,7 +633,11 @@ def test_a_run_that_was_killed_before_its_stresses_gets_them(tmp_path: Path) -> 
     with xarray.open_dataset(target) as found:
         expected = found.load()
     target.unlink()
+    left = tmp_path / f"deck_stress_1.nc.{(1 << 22) + 1}.tmp"  # no process has such a number
+    left.write_text("")
+    os.utime(left, (0.0, 0.0))
     assert command(tmp_path, "resume", "deck.nc").returncode == 0
+    assert not left.exists()
     with xarray.open_dataset(target) as found:
         assert found.identical(expected)
     written = target.stat().st_mtime_ns

@@ -13,7 +13,7 @@ from .. import netcdf_library
 from ..deck.below import Criteria, Fatigue, Stress
 from ..deck.recorded import recorded
 from ..errors import DeckError
-from ..files import replacing
+from ..files import remove_stale, replacing
 from ..text import quantity
 from .below import BelowSurface
 from .extremes import extremes_of, place_of
@@ -164,6 +164,7 @@ def description(path: Path) -> list[str]:
 def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
     """Write a dataset of stresses or fatigue parameters to a file, complete or not at all."""
     packed = {name: {"zlib": True, "complevel": 1} for name in found.data_vars}
+    remove_stale(target)
     with replacing(target) as path:
         netcdf_library.write(found, path, format="NETCDF4_CLASSIC", encoding=packed)
     return target

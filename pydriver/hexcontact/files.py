@@ -5,8 +5,10 @@ from __future__ import annotations
 import codecs
 import contextlib
 import errno
+import glob
 import os
 import stat
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,6 +23,7 @@ LARGEST_TEXT = 1 << 25  # bytes; 100,000 load steps of six loads each fit
 MADE_BY = f"made by hexcontact {__version__}"  # in pictures and pages
 _HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of HDF5 begin, and netCDF-4 is one
 _MARK = MADE_BY.removesuffix(__version__).encode()
+_QUIET = 5.0  # seconds after which nobody writes to a temporary file any more
 _ENDS = 1 << 16  # bytes at the beginning and at the end of a file, in one of which the mark is
 
 
@@ -217,6 +220,30 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
 def temporary_of(target: Path) -> Path:
     """Return the name under which this process writes a file before it replaces `target`."""
     return target.with_name(f"{target.name}.{os.getpid()}.tmp")
+
+
+def remove_stale(target: Path) -> None:
+    """Delete what killed processes left of a file under the names of `temporary_of`.
+
+    A file that was written to a moment ago may be that of a process on another machine.
+    """
+    for path in target.parent.glob(f"{glob.escape(target.name)}.*.tmp"):
+        number = path.name[len(target.name) + 1 : -len(".tmp")]
+        if number.isascii() and number.isdigit() and not is_process(int(number)):
+            with contextlib.suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _QUIET:
+                    path.unlink()
+
+
+def is_process(number: int) -> bool:
+    """Test whether a process of this number runs on this machine."""
+    try:
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # of another user
+        pass
+    return True
 
 
 def make_anew(path: Path) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import DeckError
+from .files import is_process
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
 _LONGEST = 1000  # bytes of a lock
@@ -151,12 +152,8 @@ def _is_running(holder: dict[str, Any] | None) -> bool:
     number = holder.get("process") if holder else None
     if not holder or holder.get("host") != os.uname().nodename or type(number) is not int or number < 1:
         return False
-    try:
-        os.kill(number, 0)
-    except (ProcessLookupError, OverflowError):
+    if not is_process(number):
         return False
-    except PermissionError:  # of another user
-        pass
     try:
         began = psutil.Process(number).create_time()
     except (psutil.Error, OSError):  # as without /proc

@@ -10,6 +10,7 @@ import threading
 import tomllib
 from pathlib import Path
 
+import drawn
 import numpy as np
 import pandas
 import pytest
@@ -18,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 from validation import critical_planes
 
-from hexcontact import DeckError, PathWarning, fatigue, open_result
+from hexcontact import DeckError, PathWarning, fatigue, open_result, plotting
 from hexcontact.cli.app import app
 from hexcontact.deck.below import cycle_of, steps_fault
 from hexcontact.interior import stress as stress_below
@@ -207,8 +208,12 @@ ductility_exponent = -0.54
 [[fatigue]]
 name = "line"
 steps = [6, 7, 8, 9]
-parameters = ["findley"]
+parameters = ["findley", "life"]
 findley_slope = 0.3
+strength = "714 MPa"
+strength_exponent = -0.08
+ductility = 0.17
+ductility_exponent = -0.54
 line = [[-0.4e-3, 0, 0], [-0.4e-3, 0, 0.2e-3]]
 count = [3]
 """
@@ -369,6 +374,63 @@ def test_histories_are_as_other_programs_take_them(finished: Path) -> None:
     assert len(table) == 3 * 4
     assert (finished / "deck_export/deck_fatigue_1.pvd").is_file()
     assert (finished / "deck_export/deck_line_0009.vts").is_file()
+
+
+def test_tables_are_exported_as_csv(finished: Path) -> None:
+    for words, folder in ((("deck.nc",), "deck_export"), (("deck_line.nc",), "deck_line_export")):
+        for _ in range(2):  # over what was exported before, too
+            code, text = command(finished, "export", *words, "--csv")
+            assert code == 0, text
+        table = pandas.read_csv(finished / folder / "deck_line.csv")
+        with xarray.open_dataset(finished / "deck_line.nc") as found:
+            assert table.columns[:5].tolist() == [*("x [m]", "y [m]", "depth [m]", "distance [m]", "life")]
+            for name in ("x", "y", "depth", "distance", "findley"):
+                np.testing.assert_array_equal(table.filter(regex=rf"^{name} \["), found[name].values[:, None])
+    surface = pandas.read_csv(finished / "deck_export/deck_fatigue_1.csv")
+    with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
+        assert len(surface) == found["x"].size
+        for name in ("x [m]", "y [m]", "life", "ruiz_f2 [Pa2 m]"):
+            np.testing.assert_array_equal(surface[name], found[name.partition(" ")[0]].values.ravel())
+    code, text = command(finished, "export", "deck_line.nc", "--vtk")
+    assert code == 2
+    assert "deck_line.nc holds fatigue parameters, a table; expected --csv alone" in text
+    target = finished / "deck_export/deck_line.csv"
+    target.write_text("mine,1\n")
+    code, text = command(finished, "export", "deck.nc", "--csv")
+    assert code == 2 and "deck_line.csv is there and was not made by hexcontact" in text
+    assert target.read_text() == "mine,1\n"
+    target.unlink()
+
+
+def test_life_is_drawn_beside_another_parameter(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    canvas = plotting.fatigue(result)
+    drawn.assert_painted(canvas)
+    scales = [axes.get_xlabel() for axes in canvas.axes if axes.get_label() == "<colorbar>"]
+    assert scales == ["second fretting parameter of Ruiz (Pa2 m)", "cycles to a crack, up to $10^9$"]
+    panel = drawn.visible(canvas)[1]
+    x, y = drawn.si(panel, drawn.by_label(panel)["least life"])
+    with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
+        life = found["life"].values[0]
+        place = np.argmin(np.hypot(found["x"].values - x, found["y"].values - y))
+    assert life.ravel()[place] == pytest.approx(life.min(), rel=1e-6)
+    canvas.canvas.draw()
+    bar = [axes for axes in canvas.axes if axes.get_label() == "<colorbar>"][1]
+    powers = [tick.get_text() for tick in bar.get_xticklabels()]
+    assert all(re.fullmatch(r"\$10\^\{[\d.]+\}\$", power) for power in powers) and powers
+
+
+def test_tables_on_lines_are_drawn_as_curves(finished: Path) -> None:
+    canvas = plotting.lines(open_result(finished / "deck.nc"))
+    drawn.assert_painted(canvas)
+    life, findley = drawn.visible(canvas)
+    assert (findley.get_xlabel(), findley.get_ylabel()) == ("depth (µm)", "Findley (MPa)")
+    assert (life.get_yscale(), life.get_ylabel()) == ("log", "cycles to a crack")
+    with xarray.open_dataset(finished / "deck_line.nc") as found:
+        place, values = drawn.si(findley, findley.lines[0])
+        np.testing.assert_allclose(place, found["depth"])
+        np.testing.assert_allclose(values, found["findley"])
+        np.testing.assert_array_equal(life.lines[0].get_ydata(), found["life"])
 
 
 def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:

@@ -1,11 +1,13 @@
 """Files are written as a whole, or not at all."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from hexcontact.files import replacing
+from hexcontact.files import remove_stale, replacing
 
 
 def test_a_file_is_replaced_when_it_is_complete(tmp_path: Path) -> None:
@@ -45,3 +47,24 @@ def test_after_an_error_the_file_is_as_it_was(
             failing()
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_what_killed_processes_left_is_removed(tmp_path: Path) -> None:
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait()
+    target = tmp_path / "out_[1].nc"
+    stale = [tmp_path / f"out_[1].nc.{killed.pid}.tmp"]
+    kept = [
+        tmp_path / f"out_[1].nc.{os.getpid()}.tmp",  # this process may write it in another thread
+        tmp_path / f"out_1.nc.{killed.pid}.tmp",  # of another target
+        tmp_path / "out_[1].nc.mine.tmp",
+        target,
+    ]
+    for path in (*stale, *kept):
+        path.write_text("")
+    remove_stale(target)
+    assert all(path.exists() for path in (*stale, *kept))  # just written
+    for path in (*stale, *kept):
+        os.utime(path, (0.0, 0.0))
+    remove_stale(target)
+    assert sorted(tmp_path.iterdir()) == sorted(kept)

@@ -962,6 +962,7 @@ NEEDS_FRICTION = {
     "loop": "a contact without friction has no tangential load",
     "torsion": "there is no torque in this result",
     "fatigue": "the deck has no table",
+    "lines": "the deck has no table",
     "compliance": "the tangential compliance is that of spheres with friction",
 }
 

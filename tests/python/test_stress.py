@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import os
 import subprocess
 import sys
 import zlib
@@ -9,11 +10,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
+import drawn
 import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, DeckError, ResourceError, analytic, influence, kernel_cache, open_result, resume
+from hexcontact import (
+    Case,
+    DeckError,
+    ResourceError,
+    analytic,
+    influence,
+    kernel_cache,
+    open_result,
+    plotting,
+    resume,
+)
 from hexcontact.core.lattice import Lattice
 from hexcontact.interior import fields
 from hexcontact.interior.stress import _edges, nodal_tractions, tractions
@@ -454,6 +466,17 @@ depths = ["0 um", "0.1 mm"]
     assert command(tmp_path, "export", "deck.nc", "--vtk").returncode == 0
     assert (tmp_path / "deck_export" / "deck_axis.pvd").is_file()
     check_volume(tmp_path)
+    done = command(tmp_path, "export", "deck.nc", "--csv")
+    assert done.stdout.split()[1::2] == [f"deck_export/deck_{n}.csv" for n in ("history", "axis", "stress_2")]
+    rows = (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines()
+    assert rows[0].startswith(
+        "step,x [m],y [m],depth [m],distance [m],von_mises_stress [Pa],displacement_z [m]"
+    )
+    assert [row.split(",")[0] for row in rows[1:]] == ["1"] * 21 + ["2"] * 21
+    (tmp_path / "deck_axis.nc").unlink()  # then it is computed anew
+    (tmp_path / "deck_export/deck_axis.csv").unlink()
+    assert command(tmp_path, "export", "deck.nc", "--csv").returncode == 0
+    assert (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines() == rows
     assert command(tmp_path, "report", "deck.nc").returncode == 0
     page = (tmp_path / "deck.html").read_text()
     assert page.count('<figure class="picture">') == 1
@@ -520,6 +543,60 @@ def test_bad_tables_are_one_sentence(tmp_path: Path, lines: list[str], sentence:
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_tables_on_lines_and_at_points_are_drawn(tmp_path: Path) -> None:
+    tables = """
+[[stress]]
+line = [["-1 mm", "0 mm", "0 mm"], ["1 mm", "0 mm", "0 mm"]]
+count = [5]
+[[stress]]
+points = [["0 mm", "0 mm", "0.1 mm"], ["0.1 mm", "0 mm", "0.1 mm"]]
+steps = "all"
+components = ["stress_zz"]
+[[stress]]
+line = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0.3 mm", "0.4 mm"]]
+count = [5]
+steps = [1, 2]
+components = ["displacement_z", "von_mises_stress"]
+"""
+    (tmp_path / "deck.toml").write_text(DECK + tables)
+    assert command(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
+    assert command(tmp_path, "plot", "deck.nc", "--what", "lines").returncode == 0
+    result = open_result(tmp_path / "deck.nc")
+    canvas = plotting.lines(result)
+    drawn.assert_painted(canvas)
+    line, points, moved, mises = drawn.visible(canvas)
+    assert [axes.get_ylabel() for axes in (line, points, moved, mises)] == [
+        *("stress (GPa)", r"$\sigma_{zz}$ (GPa)", "$u_{z}$ (µm)", "von Mises stress (GPa)")
+    ]
+    with xarray.open_dataset(tmp_path / "deck_stress_1.nc") as found:
+        names = [text.get_text() for text in line.get_legend().get_texts()]
+        assert names == [rf"$\sigma_{{{ab}}}$" for ab in ("xx", "yy", "zz", "xy", "yz", "xz")] + ["von Mises"]
+        for curve, name in zip(line.lines, found.data_vars, strict=False):
+            place, values = drawn.si(line, curve)
+            np.testing.assert_allclose(place, found["x"], atol=1e-18)
+            np.testing.assert_allclose(values, found[name][0], atol=1.0)
+    with xarray.open_dataset(tmp_path / "deck_stress_2.nc") as found:
+        assert points.get_xlabel() == "load step"
+        for k, curve in enumerate(points.lines[:2]):
+            assert curve.get_xdata().tolist() == [1, 2]
+            np.testing.assert_allclose(drawn.si(points, curve, "x (m)")[1], found["stress_zz"][:, k])
+    with xarray.open_dataset(tmp_path / "deck_stress_3.nc") as found:
+        assert moved.get_xlabel() == "distance (µm)"
+        for k, curve in enumerate(moved.lines[:2]):
+            np.testing.assert_allclose(drawn.si(moved, curve)[1], found["displacement_z"][k])
+        labels = [text.get_text() for text in mises.get_legend().get_texts()]
+        assert labels == ["step 1", "step 2"]
+
+
+def test_a_table_with_the_name_of_another_export_is_refused(tmp_path: Path) -> None:
+    table = '[[stress]]\nname = "history"\npoints = [[0, 0, 0]]\n'
+    (tmp_path / "deck.toml").write_text(DECK + table)
+    assert command(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
+    done = command(tmp_path, "export", "deck.nc", "--csv")
+    assert done.returncode == 2 and "the table history would be written to" in done.stderr
+    assert not (tmp_path / "deck_export").exists()
+
+
 def test_files_of_others_are_not_replaced_by_stresses(tmp_path: Path) -> None:
     """Only --overwrite replaces files, and only stresses: a result of that name was lost."""
     (tmp_path / "deck.toml").write_text(DECK)
@@ -556,7 +633,11 @@ def test_a_run_that_was_killed_before_its_stresses_gets_them(tmp_path: Path) -> 
     with xarray.open_dataset(target) as found:
         expected = found.load()
     target.unlink()
+    left = tmp_path / f"deck_stress_1.nc.{(1 << 22) + 1}.tmp"  # no process has such a number
+    left.write_text("")
+    os.utime(left, (0.0, 0.0))
     assert command(tmp_path, "resume", "deck.nc").returncode == 0
+    assert not left.exists()
     with xarray.open_dataset(target) as found:
         assert found.identical(expected)
     written = target.stat().st_mtime_ns

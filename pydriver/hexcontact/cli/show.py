@@ -56,7 +56,9 @@ def export(
         flag("vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."),
     ] = False,
     ugrid: Annotated[bool, flag("ugrid", "A netCDF file with the fields on a mesh.")] = False,
-    csv: Annotated[bool, flag("csv", "The history as a table; with --step the fields, too.")] = False,
+    csv: Annotated[
+        bool, flag("csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields.")
+    ] = False,
     histories: Annotated[
         bool, flag("histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
     ] = False,
@@ -68,23 +70,31 @@ def export(
         Path | None, output_to("Folder to write into; default: FILE_export beside FILE.")
     ] = None,
 ) -> None:
-    """Write a result for other programs; of a study the table of its cases."""
+    """Write a result for other programs; of a study the table of its cases, of a table its values."""
     if not (vtk or ugrid or csv or histories):
         raise DeckError("expected --vtk, --ugrid, --csv or --histories")
+    from ..interior.tables import read_table
     from ..result import export as write
     from ..result.store import open_result
     from ..study import shown
 
+    more = vtk or ugrid or histories or step is not None or source is not None
+    stem = beside(file, "").name
     if (path := shown.study_of(file)) is not None:
-        if vtk or ugrid or histories or step is not None or source is not None:
+        if more:
             raise DeckError(f"{path} is the result of a study, which has no fields; expected --csv alone")
         study, stem = shown.read_study(path), beside(path, "").name
         target = (output or beside(path, "_export")) / f"{stem}_cases.csv"
         table = shown.table_of(study).rename(columns=shown.with_units(study))
         print_output(f"written: {write.write_table(table, target)}")
         return
-    result, folder = open_result(file), output or beside(file, "_export")
-    stem = beside(file, "").name
+    folder = output or beside(file, "_export")
+    if (found := read_table(file)) is not None:
+        if more:
+            raise DeckError(f"{file} holds {found.attrs['content']}, a table; expected --csv alone")
+        print_output(f"written: {write.write_table(write.flat(found), folder / f'{stem}.csv')}")
+        return
+    result = open_result(file)
     steps = None if step is None else steps_of(step, labels_of(result))
     # first what may be refused
     written = write.histories_to_csv(result, folder, stem) if histories else []

@@ -30,6 +30,8 @@ _FEW_STEPS = 4  # load steps of a cycle below which a way there or back has noth
 class BelowSurface(ABC):
     """A result, as far as the inside of its bodies follows from it."""
 
+    path: str
+
     @property
     @abstractmethod
     def dataset(self) -> xarray.Dataset:

@@ -13,7 +13,7 @@ from .. import netcdf_library
 from ..deck.below import Criteria, Fatigue, Stress
 from ..deck.recorded import recorded
 from ..errors import DeckError
-from ..files import replacing
+from ..files import remove_stale, replacing
 from ..text import quantity
 from .below import BelowSurface
 from .extremes import extremes_of, place_of
@@ -68,6 +68,21 @@ def computed(
     for name, table in tables_of(result.deck).items():
         if names is None or name in names:
             yield name, of_table(result, name, table, kept)
+
+
+def at_hand(
+    result: BelowSurface, kept: list[int], names: list[str] | None = None
+) -> Iterator[tuple[str, xarray.Dataset]]:
+    """Yield what `computed` does; tables that the run has written are read from their files."""
+    run, path = result.dataset.attrs.get("run"), Path(result.path)
+    files = files_of(result.deck, path) if path.name else {}
+    for name, table in tables_of(result.deck).items():
+        if names is not None and name not in names:
+            continue
+        found = read_table(files[name]) if files else None
+        if found is None or found.attrs.get("stress_of") != run:
+            found = of_table(result, name, table, kept)
+        yield name, found
 
 
 def of_table(
@@ -148,6 +163,7 @@ def description(path: Path) -> list[str]:
 def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
     """Write a dataset of stresses or fatigue parameters to a file, complete or not at all."""
     packed = {name: {"zlib": True, "complevel": 1} for name in found.data_vars}
+    remove_stale(target)
     with replacing(target) as path:
         netcdf_library.write(found, path, format="NETCDF4_CLASSIC", encoding=packed)
     return target

@@ -17,6 +17,7 @@ from .sections import section, tractions
 from .zones import outlines, zones
 from .stress import stress, trailing_edge
 from .fatigue import fatigue
+from .lines import lines
 from .wear import wear
 from .boundary import contact_boundary
 from .history import history, loop, torsion
@@ -33,6 +34,7 @@ __all__ = [
     "fatigue",
     "field_map",
     "history",
+    "lines",
     "loop",
     "outlines",
     "overview",

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.legend import Legend
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
@@ -101,7 +101,9 @@ def legend_under(figure: Figure, handles: Sequence[Any], ax: Axes | None = None,
     return legend
 
 
-def color_scale(figure: Figure, panels: Sequence[Axes], labels: Sequence[str], colors: Sequence[Any]) -> None:
+def color_scale(
+    figure: Figure | SubFigure, panels: Sequence[Axes], labels: Sequence[str], colors: Sequence[Any]
+) -> None:
     """Draw a color scale beside panels with labels of the curves, of many curves only some."""
     count = len(labels)
     norm = BoundaryNorm(np.arange(count + 1) - 0.5, count)
@@ -134,8 +136,8 @@ def shades(count: int) -> Sequence[Any]:
     return [map_(0.88 * k / max(count - 1, 1)) for k in range(count)]
 
 
-def mark_largest(axes: Axes, x: Array, y: Array, values: Array) -> None:
+def mark_largest(axes: Axes, x: Array, y: Array, values: Array, label: str = "largest") -> None:
     """Mark the point of the largest value by a cross that is seen on every color."""
     place = np.unravel_index(np.nanargmax(values), values.shape)
     look: dict[str, Any] = {"color": "white", "path_effects": EDGED, "zorder": 5, "clip_on": False}
-    axes.plot(x[place], y[place], "+", label="largest", **look)
+    axes.plot(x[place], y[place], "+", label=label, **look)

@@ -18,7 +18,7 @@ from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.stress import TENSOR
-from ..interior.tables import as_volume, computed, tables_of
+from ..interior.tables import as_volume, at_hand, tables_of
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh
@@ -127,7 +127,7 @@ def volumes_to_vtk(result: Result, folder: Path, stem: str) -> list[Path]:
         A ``.pvd`` file for each table ``[[stress]]`` and ``[[fatigue]]``.
     """
     written = []
-    for name, found in computed(result, kept_steps(result)):
+    for name, found in at_hand(result, kept_steps(result)):
         _make(folder)
         if "step" not in found.coords:  # of a cycle, at its end
             found = found.expand_dims(step=[int(found.attrs["steps"][-1])])
@@ -343,7 +343,7 @@ def to_csv(
     numbers: Sequence[int] | None = None,
     source: str | None = None,
 ) -> list[Path]:
-    """Write the history as a table, and the fields of some steps, a line for each node.
+    """Write the history as a table, the fields of some steps, a line for each node, and tables of the deck.
 
     Parameters
     ----------
@@ -366,17 +366,27 @@ def to_csv(
     Raises
     ------
     DeckError
-        If there are no such steps.
+        If there are no such steps, or a table [[stress]] or [[fatigue]] of a finished run has the name of
+        another file or cannot be computed.
     """
     import pandas as pd
 
     steps = [] if numbers is None else kept_steps(result, numbers)
-    _make(folder)
     written = [folder / f"{stem}_history.csv", *(folder / f"{stem}_{number:04d}.csv" for number in steps)]
+    wanted = (
+        {name: folder / f"{stem}_{name}.csv" for name in tables_of(result.deck)} if result.complete else {}
+    )
+    for name, target in wanted.items():
+        if target in written:
+            raise DeckError(f"the table {name} would be written to {target}, as others are; rename it")
+    tables = {n: flat(found) for n, found in (at_hand(result, kept_steps(result)) if wanted else ())}
+    _make(folder)
     history = result.history.rename(columns=_with_unit).map(_cell)
     require_replaceable(written[0], ",".join([str(history.index.name), *history.columns[:2]]))
     for target in written[1:]:
         require_replaceable(target, "row,col,x [m],")
+    for name, target in wanted.items():
+        require_replaceable(target, _beginning(tables[name]))
     with replacing(written[0]) as path:
         history.to_csv(path)
     for number, target in zip(steps, written[1:], strict=True):
@@ -387,16 +397,30 @@ def to_csv(
         )
         with replacing(target) as path:
             table.rename(columns=_with_unit).to_csv(path, index=False)
-    return written
+    return written + [write_table(tables[name], target) for name, target in wanted.items()]
+
+
+def flat(found: xarray.Dataset) -> pandas.DataFrame:
+    """Return quantities at or below the surface as a table, a line for each point and step."""
+    dims = [str(dim) for dim in next(iter(found.data_vars.values())).dims]
+    columns = [name for name in ("step", "x", "y", "depth", "distance") if name in found.coords]
+    table = found.to_dataframe(dim_order=dims).reset_index()[[*columns, *map(str, found.data_vars)]]
+    units = {name: str(found[name].attrs.get("units", "")).removesuffix("1") for name in table.columns}
+    return table.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit})
 
 
 def write_table(table: pandas.DataFrame, target: Path) -> Path:
     """Write a table as CSV."""
-    require_replaceable(target, ",".join(table.columns[:2]))
+    require_replaceable(target, _beginning(table))
     _make(target.parent)
     with replacing(target) as path:
         table.map(_cell).to_csv(path, index=False)
     return target
+
+
+def _beginning(table: pandas.DataFrame) -> str:
+    """Return the start of the file of a table, by which it is known again."""
+    return ",".join(table.columns[:4])
 
 
 def _cell(value: Any) -> Any:

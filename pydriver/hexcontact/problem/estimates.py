@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from .problem import Problem
-from .refinement import least_and_most
+from .refinement import coarser, least_and_most
 
 # Operator applications of a load step to 1e-8, measured on meshes of 20 to 60 spacings in the radius.
 # Without friction they are of the pressure alone, a third of an application each.
@@ -75,6 +75,8 @@ def seconds(case: Problem) -> float | None:
 def work(case: Problem) -> str:
     """Return the estimate in words: "about 1,800 operator applications, about 4 s on one core"."""
     runs = least_and_most(case) if case.accuracy else ([case],)
+    if case.estimates_tables:
+        runs = [[*cases, *coarser(cases[-1])] for cases in runs]
     applications = [_total(operator_applications(one) for one in cases) for cases in runs]
     times = [_total(seconds(one) for one in cases) for cases in runs]
     if None in applications or None in times:

@@ -89,8 +89,8 @@ class Below(Table):
 
     estimate_error: Annotated[bool, Flag()] = meaning(
         False,
-        "solve lattices of twice the spacing, too, and give the largest values an estimated error; always with "
-        "[accuracy]",
+        "solve lattices of twice the spacing, too, and give largest values an estimated error; "
+        "always with [accuracy]",
         "true",
     )
 

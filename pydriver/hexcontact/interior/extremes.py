@@ -38,7 +38,7 @@ def with_places(found: xarray.Dataset) -> xarray.Dataset:
 def with_errors(
     found: xarray.Dataset, spacing: float, others: Sequence[tuple[float, xarray.Dataset]]
 ) -> None:
-    """Give each quantity the attribute largest_error, life least_factor, by spacing and table of other lattices."""
+    """Give each quantity largest_error, life least_factor, by spacing and table of other lattices."""
     spacings = np.array([spacing, *(other for other, _ in others)]) / spacing
     for name, field in found.data_vars.items():
         word = "least" if name in _LEAST else "largest"
@@ -76,12 +76,10 @@ def place_of(field: xarray.DataArray) -> str:
     word = "least" if field.name in _LEAST else "largest"
     if (at := field.attrs.get(f"{word}_at")) is None:
         return ""
-    text = _worded(float(field.attrs[word]), field)
+    text = _worded(float(field.attrs[word]), field) + _error_of(field)
     x, y, depth = (quantity(float(place), "m") for place in at)
     step = field.attrs.get(f"{word}_step")
-    return f"{word} {text}{_error_of(field)} at x = {x}, y = {y}, depth {depth}" + (
-        f", step {step}" if step else ""
-    )
+    return f"{word} {text} at x = {x}, y = {y}, depth {depth}" + (f", step {step}" if step else "")
 
 
 def extremes_of(found: xarray.Dataset) -> dict[str, dict[str, Any]]:

@@ -101,7 +101,7 @@ def test_no_plane_is_better_than_the_critical_one() -> None:
 
 @pytest.mark.parametrize(("seed", "numbers"), [(1, (1084, 8950)), (9, (6424, 8146, 9940))])
 def test_next_to_no_tension_has_its_plane_about_any_axes(seed: int, numbers: tuple[int, ...]) -> None:
-    """Under pressure with a little shear the planes of tension are a narrow ridge: cells of it missed 2e-3."""
+    """Under pressure with a little shear the planes of tension are a narrow ridge: cells missed 2e-3."""
     stress, turns = (
         critical_planes.histories(10_000, seed)[0],
         Rotation.random(20, random_state=4).as_matrix(),
@@ -432,6 +432,33 @@ def test_files_and_pages_say_where_the_largest_value_is(finished: Path) -> None:
     step, point = np.unravel_index(values.argmax(), values.shape)
     assert stress["stress_xx"].attrs["largest_step"] == [7, 9][step]
     assert stress["stress_xx"].attrs["largest_at"] == [[0, 0, 0], [-5e-4, 0, 1e-6]][point]
+
+
+@pytest.mark.parametrize(("steps", "code"), [("2", 0), ('"auto"', 2)])
+def test_errors_of_tables_need_the_same_steps_on_every_lattice(tmp_path: Path, steps: str, code: int) -> None:
+    deck = DECK.format(pad=PAD).replace("steps = 2", f"steps = {steps}")
+    (tmp_path / "deck.toml").write_text(deck + "[[stress]]\ndepths = [0]\nestimate_error = true\n")
+    found, text = command(tmp_path, "check", "deck.toml")
+    assert found == code
+    assert ("estimate_error = true: expected false" in text) == (code == 2)
+
+
+def test_a_target_of_accuracy_gives_errors_to_tables(tmp_path: Path) -> None:
+    """The largest von Mises stress below a sphere is 0.6200 p0 at 0.4809 a (nu = 0.3)."""
+    body = 'young_modulus = "72 GPa"\npoisson_ratio = 0.3\n'
+    (tmp_path / "deck.toml").write_text(
+        f'[body.1]\n{body}[body.2]\n{body}surface = {{ shape = "sphere", radius = "25 mm" }}\n'
+        '[grid]\nnodes_in_radius = 5\n[accuracy]\ntarget = 0.1\n[[load]]\nnormal_load = "200 N"\n[[stress]]\n'
+        'line = [[0, 0, 0], [0, 0, 1e-3]]\ncount = [1001]\ncomponents = ["von_mises_stress"]\n'
+    )
+    code, text = command(tmp_path, "run", "deck.toml", "--quiet")
+    assert code == 0, text
+    table = read_table(tmp_path / "deck_stress_1.nc")
+    assert table is not None
+    about, modulus = table["von_mises_stress"].attrs, 72e9 / (2 * (1 - 0.3**2))
+    exact = 0.6200 * (6 * 200.0 * modulus**2 / (np.pi**3 * 25e-3**2)) ** (1 / 3)
+    assert abs(about["largest"] - exact) < about["largest_error"] + 1e-4 * exact
+    assert 0.0 < about["largest_error"] < 0.01 * exact
 
 
 def test_largest_values_have_errors(tmp_path: Path) -> None:

@@ -61,9 +61,10 @@ def _error_of(field: xarray.DataArray) -> str:
         return " with an unknown error"
     if "least_factor" in attributes:
         return f" within a factor of {error:.2g}"
-    if error > abs(largest := float(attributes["largest"])):
-        return f" ± {_worded(error, field)}"
-    return f" ± {percent(error / abs(largest))}" if error else ""
+    if not error:
+        return ""
+    share = error / max(abs(float(attributes["largest"])), np.finfo(float).tiny)
+    return f" ± {percent(share) if share <= 1.0 else _worded(error, field)}"
 
 
 def _worded(value: float, field: xarray.DataArray) -> str:

@@ -7,7 +7,9 @@
 !>     K r^2/2.
 !>
 !> Cells below the best value by more than this are left out, the others are divided into four until the loss is negligible.
-!> Where more cells are left than can be kept, as on a ridge of equal values, the best of them are divided.
+!> Where more cells are left than can be kept, as on a ridge of equal values, the best of them are divided. On a narrow ridge,
+!> as where a history under pressure has next to no tension, these need not contain the maximum: if the loss is not negligible
+!> in the end, Newton's method leads there from the best plane, and from the first cells that were too many.
 module hc_critical_plane
   use hc_precision, only: wp, pi
   use hc_plane_criteria, only: plane_criterion_t, stress_extent_t
@@ -27,6 +29,9 @@ module hc_critical_plane
   real(wp), parameter :: negligible = 1.0e-6_wp
   !> Largest angle between center and corner of a cell, in that from the middle of a face to its side times the cell's share.
   real(wp), parameter :: corner = 1.7_wp*0.25_wp*pi
+  !> Newton's method: most steps, the largest one, and the distance of points over the half width of a ridge.
+  integer, parameter :: n_newton = 20
+  real(wp), parameter :: longest = 0.1_wp, share = 0.2_wp
 
   !> A search: the best plane so far, and the cells that may contain a better one.
   type :: search_t
@@ -54,13 +59,14 @@ contains
     real(wp), intent(out) :: value
     !> Normal of the critical plane (3), its last component not negative
     real(wp), intent(out) :: normal(3)
-    type(search_t) :: search, before
-    real(wp) :: path(size(history, 2), 6), half, enough
-    integer :: i, j, face, division
+    type(search_t) :: search, before, crowd
+    real(wp) :: path(size(history, 2), 6), half, enough, curvature
+    integer :: i, j, k, face, division
 
     path = transpose(history)
     half = 1.0_wp/n_side
-    search%loss = 0.5_wp*criterion%curvature(extent_of(history))*(corner*half)**2
+    curvature = criterion%curvature(extent_of(history))
+    search%loss = 0.5_wp*curvature*(corner*half)**2
     do face = 1, 3
       do j = 1, n_side
         do i = 1, n_side
@@ -82,10 +88,61 @@ contains
           call search%compare(criterion, path, before%face(i), before%place(:, i) + half*[1 - 2*mod(j, 2), 1 - 2*(j/2)])
         end do
       end do
+      if (crowd%number == 0 .and. search%number == search%most) crowd = search
     end do
+    if (search%value > criterion%least() .and. search%loss > negligible*search%value) then
+      normal = search%normal
+      call climb(search, criterion, path, curvature, normal)
+      do k = 1, crowd%number
+        call climb(search, criterion, path, curvature, normal_at(crowd%face(k), crowd%place(:, k)))
+      end do
+    end if
     value = max(search%value, criterion%least())
     normal = sign(1.0_wp, search%normal(3))*search%normal
   end subroutine find_critical_plane
+
+  !> Go from a plane to the maximum beside it by Newton's method, with derivatives from differences.
+  pure subroutine climb(search, criterion, path, curvature, start)
+    type(search_t), intent(inout) :: search
+    class(plane_criterion_t), intent(in) :: criterion
+    !> Stress (times, 6) [Pa]
+    real(wp), intent(in), contiguous :: path(:, :)
+    !> Bound of the curvature
+    real(wp), intent(in) :: curvature
+    real(wp), intent(in) :: start(3)
+    real(wp) :: values(-1:1, -1:1), axes(3, 2), h, gradient(2), xx, yy, xy, step(2), best(3), normal(3), here
+    integer :: newton, halving, i, j
+
+    best = start
+    h = share*sqrt(2.0_wp*search%value/curvature)
+    do newton = 1, n_newton
+      axes = tangents(best)
+      do j = -1, 1
+        do i = -1, 1
+          values(i, j) = value_on(criterion, path, unit(best + h*matmul(axes, [i, j])), -0.5_wp*huge(h))
+        end do
+      end do
+      gradient = 0.5_wp*[values(1, 0) - values(-1, 0), values(0, 1) - values(0, -1)]
+      xx = values(1, 0) - 2.0_wp*values(0, 0) + values(-1, 0)
+      yy = values(0, 1) - 2.0_wp*values(0, 0) + values(0, -1)
+      xy = 0.25_wp*(values(1, 1) - values(-1, 1) - values(1, -1) + values(-1, -1))
+      if (values(0, 0) > search%value) then
+        search%value = values(0, 0)
+        search%normal = best
+      end if
+      if (xx >= 0.0_wp .or. xx*yy <= xy**2) return ! no maximum of the parabola
+      step = h*[xy*gradient(2) - yy*gradient(1), xy*gradient(1) - xx*gradient(2)]/(xx*yy - xy**2)
+      step = step*min(1.0_wp, longest/max(norm2(step), tiny(h)))
+      do halving = 1, n_newton
+        normal = unit(best + matmul(axes, step))
+        here = value_on(criterion, path, normal, values(0, 0))
+        if (here > values(0, 0)) exit
+        step = 0.5_wp*step
+      end do
+      if (.not. here > values(0, 0)) return
+      best = normal
+    end do
+  end subroutine climb
 
   !> Compare the center of a cell with the best plane, and keep the cell if a better one may lie in it.
   pure subroutine compare(self, criterion, path, face, place)
@@ -132,9 +189,15 @@ contains
     real(wp), intent(in) :: place(2)
     real(wp) :: normal(3)
 
-    normal = cshift([place*(0.25_wp*pi + (1.0_wp - 0.25_wp*pi)*place**2), 1.0_wp], face)
-    normal = normal/norm2(normal)
+    normal = unit(cshift([place*(0.25_wp*pi + (1.0_wp - 0.25_wp*pi)*place**2), 1.0_wp], face))
   end function normal_at
+
+  !> Vector of length 1 along another one.
+  pure function unit(vector)
+    real(wp), intent(in) :: vector(3)
+    real(wp) :: unit(3)
+    unit = vector/norm2(vector)
+  end function unit
 
   !> Bounds of the stresses of a history, by its deviators: principal stresses differ by at most 2 sqrt(J2), and a normal
   !> stress is at most the hydrostatic one and 2 sqrt(J2/3).

@@ -35,7 +35,7 @@ module hc_edge_root
   !> Most iterations, and change of the moments below which they end.
   integer, parameter :: n_iteration = 30
   real(wp), parameter :: converged = 1.0e-6_wp
-  !> Largest error of the moments over pi times the slope of the root, above which it is no root.
+  !> Largest error of the moments over pi times the slope of the root, and over the moments, above which it is no root.
   real(wp), parameter :: worst = 0.015_wp
 
   !> A root about a point of the edge.
@@ -104,7 +104,7 @@ contains
       end if
     end do
     error = sqrt(min(error, new_error)/size(known))
-    root%found = error < worst*pi*sqrt(norm2(root%c(2:3))) .and. root%c(3) > 0.0_wp
+    root%found = error < worst*min(pi*sqrt(norm2(root%c(2:3))), sqrt(sum(known**2)/size(known))) .and. root%c(3) > 0.0_wp
   end subroutine fit_edge_root
 
   !> Start from the polynomial through squares at the nodes inside, by least squares.

@@ -155,7 +155,7 @@ def solved(
         with listener.following(title, case.planned_steps):
             in_background(lambda: solving.solve_into(case, store, listener, before), pipe, ends)
             if store.finished:
-                with_tables(store.path, pipe, messages, listener, late)
+                with_tables(store.path, pipe, messages, listener, late, case)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories, extent
@@ -167,13 +167,14 @@ def with_tables(
     messages: Messages,
     listener: Listener | None = None,
     late: Sequence[Interrupted] = (),
+    case: Problem | None = None,
 ) -> None:
     """Write the missing tables [[stress]] and [[fatigue]] of a result; signals end the process."""
     if not (missing := missing_stresses(output)):
         return
 
     def work() -> None:
-        for path in solving.write_stresses(output):
+        for path in solving.write_stresses(output, case, listener):
             if listener is not None:
                 listener.said("written", file=path)
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from ..text import did_you_mean, listed
 from ..variables import STRESSES
-from .kinds import Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
+from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
 from .model import Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
@@ -85,6 +85,13 @@ class Below(Table):
     )
     count: _Count | None = meaning(
         None, "points on the line, [101] if absent, or along the sides of the plane, [81, 81]"
+    )
+
+    estimate_error: Annotated[bool, Flag()] = meaning(
+        False,
+        "solve lattices of twice the spacing, too, and give largest values an estimated error; "
+        "always with [accuracy]",
+        "true",
     )
 
     @classmethod

@@ -199,6 +199,11 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
             sentence = "expected a name of a few letters, digits, - and _ that no other such table has"
             found.append(Mistake((kind, place, "name"), table.name, sentence))
         names.add(name)
+        if table.estimate_error and (not last or tables["wear"]):
+            sentence = (
+                'expected false beside [wear] and steps = "auto", whose steps differ from lattice to lattice'
+            )
+            found.append(Mistake((kind, place, "estimate_error"), True, sentence))
         wanted = table.steps if isinstance(table.steps, tuple) else ()
         if last and (lost := [n for n in wanted if n > last or (n % output.every and n != last)]):
             sentence = (

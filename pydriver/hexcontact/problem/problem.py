@@ -190,6 +190,12 @@ class Problem:
         return self.solver.algorithm == "incremental" and any(s.ramp is not None for s in self.load_steps)
 
     @property
+    def estimates_tables(self) -> bool:
+        """Whether tables [[stress]] and [[fatigue]] are computed on coarser lattices, too."""
+        tables = (*self.deck.stress, *self.deck.fatigue)
+        return any(table.estimate_error or self.accuracy for table in tables)
+
+    @property
     def planned_steps(self) -> int:
         """Number of load steps; 0 if it is open."""
         return 0 if self.adaptive or self.deck.wear else len(self.load_steps)

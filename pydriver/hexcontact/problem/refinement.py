@@ -40,6 +40,11 @@ class Trial(NamedTuple):
         return f"lattice {self.level + 1}{shifted}"
 
 
+def coarser(case: Problem, level: int = 0) -> list[Problem]:
+    """Return a case on the lattice of twice the spacing of a level, and on its shifted copies."""
+    return [Trial(level - 2, copy).case(case) for copy in range(1 + len(SHIFTS))]
+
+
 def least_and_most(case: Problem) -> tuple[list[Problem], list[Problem]]:
     """Return a case on all lattices of the shortest refinement, and of the longest within max_nodes.
 

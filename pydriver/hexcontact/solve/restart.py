@@ -95,7 +95,7 @@ def resume(
     """
     with reopened(path, case, overrides) as restart:
         if restart is None:
-            complete(path)
+            complete(path, case)
             return checked(open_result(path))
         if restart.warning:
             warn(restart.warning, UserWarning)
@@ -107,11 +107,11 @@ def resume(
     return checked(open_result(restart.store.path))
 
 
-def complete(path: str | os.PathLike[str]) -> None:
+def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
     """Write the missing stresses of a finished run, which was killed before it wrote them."""
     output = output_of(Path(path))
     if output.is_file():
-        list(write_stresses(output))
+        list(write_stresses(output, case))
 
 
 @contextlib.contextmanager

@@ -12,18 +12,22 @@ from typing import TYPE_CHECKING
 from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.overview import parameters_of
 from ..problem.problem import Problem
+from ..problem.refinement import coarser
 from ..result.history import limited_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
-from ..text import visible
+from ..text import quantity, visible
 from .events import Callback, Listener, Listeners, Stopped
+from .frictionless import require_memory
 from .log import Log
 from .progress import reporter
 from .steps import steps
 
 if TYPE_CHECKING:
+    import xarray
+
     from ..result.result import Result
 
 
@@ -161,7 +165,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     """
     solve_into(case, store, listener, before)
     if store.finished:
-        for path in write_stresses(store.path):
+        for path in write_stresses(store.path, case, listener):
             listener.said("written", file=path)
 
 
@@ -191,21 +195,52 @@ def _record_steps(case: Problem, store: Store, listener: Listener, before: Seque
         _announce_finished(step, store, listener)
 
 
-def write_stresses(output: Path) -> Iterator[Path]:
-    """Write the missing tables [[stress]] and [[fatigue]] of the deck of a result, and yield the files."""
+def write_stresses(
+    output: Path, case: Problem | None = None, listener: Listener | None = None
+) -> Iterator[Path]:
+    """Write the missing tables [[stress]] and [[fatigue]] of the deck of a result, and yield the files.
+
+    The case, by default that of the deck, is solved on coarser lattices where a table asks for errors.
+    """
     missing = missing_stresses(output)
     if not missing:
         return
-    from ..interior.tables import computed, write_netcdf
+    from ..interior.extremes import with_errors
+    from ..interior.tables import computed, tables_of, write_netcdf
     from ..result.export import kept_steps
 
     result = open_result(output)
     try:
+        refined = "trial_level" in result.dataset
+        wanted = [name for name, t in tables_of(result.deck).items() if refined or t.estimate_error]
+        asked = [name for name in missing if name in wanted]
+        others = list(_on_coarser(result, case, asked, listener or Log())) if asked else []
         for name, found in computed(result, kept_steps(result), [*missing]):
+            if name in wanted:
+                with_errors(found, result.lattice.spacing, [(h, tables[name]) for h, tables in others])
             require_free([missing[name]], overwrite=True)
             yield write_netcdf(found, missing[name])
     finally:
         result.close()
+
+
+def _on_coarser(
+    result: Result, case: Problem | None, names: list[str], listener: Listener
+) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
+    """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
+    from ..interior.tables import computed
+    from ..result.export import kept_steps
+    from ..result.result import Result
+
+    case = case or Problem.from_text(result.deck, f"deck of {result.path}")
+    level = int(result.dataset["trial_level"].max()) if "trial_level" in result.dataset else 0
+    for other in coarser(case, level):
+        text = f"estimated errors of tables: spacing {quantity(other.lattice.spacing, 'm')}"
+        listener.said("errors of tables", text, spacing=other.lattice.spacing, origin=other.lattice.origin)
+        require_memory(other, other.lattice, len(other.load_steps))
+        finished = list(steps(other, in_memory=True, listener=Listener()))
+        found = Result(partial(assemble, metadata_of(other), finished, True, None, ""))
+        yield other.lattice.spacing, dict(computed(found, kept_steps(found), names))
 
 
 def _announce_finished(step: Step, store: Store, listener: Listener) -> None:

@@ -98,7 +98,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     try:
         case = Problem.from_text(job.deck, target.name)
         if holds(target, job.hash):  # only its tables are missing
-            list(write_stresses(target))
+            list(write_stresses(target, case))
             return Outcome(job.hash, seconds=time.perf_counter() - started)
         with contextlib.ExitStack() as stack:
             restart = _interrupted(job, case, stack)
@@ -116,7 +116,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
         apart = own != target
         if apart:
             os.replace(own, target)
-        list(write_stresses(target))
+        list(write_stresses(target, case))
     except HexcontactError as error:
         _rename_journal(own, target)
         return ended(error, error.exit_code, str(error), began)

@@ -90,7 +90,7 @@ contains
       end do
       if (crowd%number == 0 .and. search%number == search%most) crowd = search
     end do
-    if (search%value > criterion%least() .and. search%loss > negligible*search%value) then
+    if (search%value > criterion%least() .and. search%loss > negligible*abs(search%value)) then
       normal = search%normal
       call climb(search, criterion, path, curvature, normal)
       do k = 1, crowd%number
@@ -114,7 +114,7 @@ contains
     integer :: newton, halving, i, j
 
     best = start
-    h = share*sqrt(2.0_wp*search%value/curvature)
+    h = share*sqrt(2.0_wp*abs(search%value)/curvature)
     do newton = 1, n_newton
       axes = tangents(best)
       do j = -1, 1

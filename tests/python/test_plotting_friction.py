@@ -927,6 +927,9 @@ strength_exponent = -0.1
 ductility = 1
 ductility_exponent = -0.5
 plane = [[-1, 0, 0], [1, 0, 0], [-1, 0, 1]]
+[[stress]]
+components = ["von_mises_stress"]
+line = [[-1, 0, 0.1], [1, 0, 0.1]]
 """
 """What the figures of the inside of the bodies need of a deck."""
 

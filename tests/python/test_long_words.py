@@ -74,7 +74,7 @@ def patterns() -> dict[tuple[str, str], str]:
             if method not in METHODS and not (by_module and method == "compile"):
                 continue
             try:
-                pattern = eval(compile(ast.Expression(of), name, "eval"), dict(names))
+                pattern = eval(compile(ast.Expression(of), f"<{name}>", "eval"), dict(names))
             except NameError:  # of a file name, or one of the constants below
                 continue
             if isinstance(pattern, re.Pattern) or (by_module and isinstance(pattern, str)):

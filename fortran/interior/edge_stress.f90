@@ -102,7 +102,7 @@ contains
 
   end function edge_correction
 
-  !> Compute what the root has beyond the hats at a point, tapered inside.
+  !> Compute the stress of the root less that of the hats at a point, tapered inside.
   pure real(wp) function difference(root, lattice, field, point)
     type(edge_root_t), intent(in) :: root
     type(lattice_t), intent(in) :: lattice

@@ -207,7 +207,7 @@ contains
     if (self%past_traction > 0.0_wp) traction_bound = tolerance + self%options%own_safety*self%past_traction
   end function traction_bound
 
-  !> Compute what a load step changes over what it may, of the stick area, of the tractions, and of their direction.
+  !> Compute the changes in a load step over their limits: of the stick area, of the tractions, and of their direction.
   !>
   !> Smaller steps cannot help against the rings of the lattice, nor against tractions that differ from before.
   pure function excess(self, change, tolerance)

@@ -293,7 +293,7 @@ class Case(Problem):
 
     @property
     def _notes(self) -> list[str]:
-        """The warnings, marked, and what is not judged."""
+        """Marked warnings, and the note on slopes that are not judged."""
         notes = [f"warning: {sentence}" for sentence in plausibility.warnings(self)]
         return [*notes, *([f"note: {note}"] if (note := plausibility.unjudged(self)) else [])]
 

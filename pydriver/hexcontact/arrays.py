@@ -18,25 +18,7 @@ _LARGEST_INTEGER = 2**31 - 1  # of the core
 
 
 def reals(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None, meaning: str = "") -> Array:
-    """Return an argument as an array of real numbers, without a copy if it is one.
-
-    Parameters
-    ----------
-    values : array_like
-        The argument.
-    name : str
-        Its name in messages.
-    shape : tuple of int, optional
-        The shape that it must have.
-    meaning : str
-        Meaning of the shape, which follows it in messages.
-
-    Raises
-    ------
-    DeckError
-        If it has another shape, or holds complex numbers, text, objects, rows of different lengths or masked
-        values.
-    """
+    """Return an argument as an array of real numbers, without a copy if it is one."""
     # numpy.ma, which takes a while, is loaded at its first use
     derived = isinstance(values, np.ndarray) and type(values) is not np.ndarray
     if derived and isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
@@ -64,13 +46,7 @@ def has_entries(values: Any) -> bool:
 
 
 def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
-    """Return arguments as arrays of real numbers of one shape, by their names.
-
-    Raises
-    ------
-    DeckError
-        If one is no array of real numbers, or their shapes do not broadcast.
-    """
+    """Return arguments as arrays of real numbers of one shape, by their names."""
     arrays = {name: reals(values, name) for name, values in coordinates.items()}
     try:
         return dict(zip(arrays, np.broadcast_arrays(*arrays.values()), strict=True))
@@ -82,22 +58,7 @@ def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
 def number(
     value: Any, name: str, expected: str = "a number", fits: Callable[[float], bool] = lambda found: True
 ) -> float:
-    """Return an argument as a real number, which may be infinite.
-
-    Parameters
-    ----------
-    value : object
-        The argument.
-    name, expected : str
-        Its name in messages, and the expected value.
-    fits : callable
-        Tests whether a number is in its range.
-
-    Raises
-    ------
-    DeckError
-        If it is no number, NaN, or out of its range.
-    """
+    """Return an argument as a real number, which may be infinite."""
     try:
         if isinstance(value, str | bytes) or np.iscomplexobj(value):
             raise TypeError(f"a value of the type {type(value).__name__}")
@@ -110,13 +71,7 @@ def number(
 
 
 def integer(value: Any, name: str, expected: str = "an integer") -> int:
-    """Return an argument as an integer of 32 bits.
-
-    Raises
-    ------
-    DeckError
-        If it is no integer, or too large.
-    """
+    """Return an argument as an integer of 32 bits."""
     try:
         found = operator.index(value)
     except TypeError as error:
@@ -127,13 +82,7 @@ def integer(value: Any, name: str, expected: str = "an integer") -> int:
 
 
 def word(value: Any, name: str, allowed: Collection[str]) -> str:
-    """Return an argument that is one of a few words.
-
-    Raises
-    ------
-    DeckError
-        If it is another.
-    """
+    """Return an argument that is one of a few words."""
     if not isinstance(value, str) or value not in allowed:
         raise DeckError(f"{name} = {_shown(value)}: expected {' or '.join(map(repr, allowed))}")
     return value

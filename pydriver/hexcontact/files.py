@@ -28,20 +28,7 @@ _ENDS = 1 << 16  # bytes at the beginning and at the end of a file, in one of wh
 
 
 def text_of(path: str | Path, expected: str) -> str:
-    """Read a text file in UTF-8.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    expected : str
-        The expected kind of file, for messages: "a deck (a TOML file)".
-
-    Raises
-    ------
-    DeckError
-        If there is no such file, it is a folder or a device, too large, or not UTF-8.
-    """
+    """Read a text file in UTF-8."""
     fault = ""
     if "\0" in str(path):
         raise DeckError(f"{path}: cannot be read (embedded null byte); expected {expected}")
@@ -85,14 +72,7 @@ def _opened(name: str, flags: int) -> int:
 
 
 def require_ordinary(path: str | os.PathLike[str], expected: str) -> None:
-    """Refuse a file that a library, which opens it by its name, would read for ever or cannot name.
-
-    Raises
-    ------
-    DeckError
-        If it is a device or a pipe, or its name is not UTF-8; missing files and folders are left to the
-        library.
-    """
+    """Refuse a file that a library, which opens it by its name, would read for ever or cannot name."""
     require_utf8(path, expected)
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise DeckError(f"{path}: is not a regular file; expected {expected}")
@@ -164,11 +144,6 @@ def require_replaceable(path: Path, begins: str = "") -> None:
     """Refuse to replace a picture, page or table that hexcontact has not made; an empty file may be replaced.
 
     A file of hexcontact has its mark, or, if that is given, begins with some text.
-
-    Raises
-    ------
-    DeckError
-        If the file is of other origin.
     """
     if not path.is_file() or not path.stat().st_size:
         return
@@ -187,18 +162,6 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
     """Yield the temporary name of a file, which then replaces `target` as a whole.
 
     At the end the file is on the disk; after an error it is deleted and `target` is unchanged.
-
-    Parameters
-    ----------
-    target : Path
-        The file to replace, which may be missing.
-    temporary : Path, optional
-        The name, in the same file system; by default one beside it that other processes do not use.
-
-    Raises
-    ------
-    DeckError
-        If `target` is a device or a pipe, which replacing would delete, or its folder is missing.
     """
     if os.path.lexists(target) and not (target.is_file() or target.is_symlink()):
         raise DeckError(f"{target} is not a regular file; choose another name")

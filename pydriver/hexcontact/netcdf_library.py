@@ -69,13 +69,7 @@ LOCK = _Lock()
 
 
 def lock_of_xarray() -> Any:
-    """Return the lock of xarray for the netCDF library; None while no other thread can read by xarray.
-
-    Raises
-    ------
-    HexcontactError
-        If this version of xarray has no such lock.
-    """
+    """Return the lock of xarray for the netCDF library; None while no other thread can read by xarray."""
     if "xarray" not in sys.modules and threading.active_count() - LOCK.waiting == 1:
         return None
     import xarray
@@ -149,19 +143,7 @@ def close(file: netCDF4.Dataset) -> None:
 
 
 def write(dataset: xarray.Dataset, path: Path, mode: Literal["w", "a"] = "w", **options: Any) -> None:
-    """Write a dataset of xarray to a file, or to a group of it.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The dataset.
-    path : Path
-        The file.
-    mode : str
-        w: a new file; a: more of a file.
-    **options
-        Those of `xarray.Dataset.to_netcdf`: format, group, encoding.
-    """
+    """Write a dataset of xarray to a file, or to a group of it."""
     from xarray.backends import NetCDF4DataStore
 
     encoding = options.pop("encoding", None)

@@ -104,18 +104,7 @@ _POWERS = {"m2": ("m²", 2), "m3": ("m³", 3)}  # units whose prefix is raised t
 
 
 def quantity(value: float, unit: str = "", digits: int = 4) -> str:
-    """Write a number with a prefix of its unit: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
-
-    Parameters
-    ----------
-    value : float
-        The number, in SI.
-    unit : str
-        A unit that takes a prefix, an area (m2) its square, a volume (m3) its cube; without a unit, or where
-        no prefix fits, the number is written plainly.
-    digits : int
-        Significant digits.
-    """
+    """Write a number with a prefix of its unit: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``."""
     if math.isnan(value):
         return "-"
     if value == 0 or math.isinf(value):
@@ -135,14 +124,6 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     """Return factor and unit that scale a quantity to 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
 
     An area is scaled to 0.1 ... 100,000, a volume to 0.01 ... 10,000,000, as by `quantity`.
-
-    Parameters
-    ----------
-    largest : float
-        Largest magnitude, SI.
-    unit : str
-        SI unit; "1" or empty for a pure number, which has no prefix. Areas and volumes take
-        the square or the cube of a prefix.
     """
     if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
         return 1.0, unit.replace("1", "")

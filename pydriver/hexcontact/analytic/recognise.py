@@ -63,15 +63,7 @@ class Exact:
 
 
 def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
-    """Return the closed solutions that hold for a load step, and a remark on them.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        That of a result.
-    number : int
-        Number of the step, from 1.
-    """
+    """Return the closed solutions that hold for a load step, and a remark on them."""
     place = int(np.flatnonzero(dataset["step"].values == number)[0])
     so_far = dataset.isel(step=slice(0, place + 1))
     load = float(so_far["normal_load"][-1])

@@ -41,11 +41,6 @@ def turning_points(loads: Iterable[float]) -> list[float]:
 
     The last is the present load. A contact in partial slip follows Masing's rules: a new slip zone that is as
     large as an older one removes its turning points.
-
-    Parameters
-    ----------
-    loads : iterable of float
-        Loads in order, monotone in between; the history begins at 0.
     """
     history = [*loads]
     if not history:
@@ -55,15 +50,7 @@ def turning_points(loads: Iterable[float]) -> list[float]:
 
 
 def superposed(first: Callable[[float], Array | float], turns: Sequence[float]) -> Array:
-    """Return a traction or motion after reversals: f(Q1) + 2 f((Q2 - Q1)/2) + 2 f((Q3 - Q2)/2) + ...
-
-    Parameters
-    ----------
-    first : callable
-        f, an odd function of a first load.
-    turns : sequence of float
-        The turning points Q1, Q2, ..., the last one is the present load.
-    """
+    """Return a traction or motion after reversals: f(Q1) + 2 f((Q2 - Q1)/2) + 2 f((Q3 - Q2)/2) + ..."""
     total = np.asarray(first(turns[0]))
     for before, after in itertools.pairwise(turns):
         total = total + 2.0 * first(0.5 * (after - before))
@@ -141,13 +128,7 @@ class ClosedForms:
         return QuadraticGap.of(self.dataset)
 
     def partial_slip(self, number: int) -> PartialSlip | None:
-        """Return the closed solution of a step with shear, None if there is none.
-
-        Parameters
-        ----------
-        number : int
-            Number of the step, from 1.
-        """
+        """Return the closed solution of a step with shear, None if there is none."""
         sheared = self.sheared(number)
         if sheared is None or self._gap is None:
             return None
@@ -163,18 +144,7 @@ class ClosedForms:
         )
 
     def sheared(self, number: int) -> tuple[History, tuple[float, float], Array] | None:
-        """Return the history of a step if similar bodies are sheared along a line at a constant normal load.
-
-        Parameters
-        ----------
-        number : int
-            Number of the step, from 1.
-
-        Returns
-        -------
-        tuple or None
-            The history, the unit vector of the line, and the loads (N) along it from the first one on.
-        """
+        """Return history, line and loads of a step if similar bodies are sheared along it at a constant P."""
         history = History(self.dataset, number, self.static)
         scale = self.friction * history.normal_load
         load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
@@ -185,13 +155,7 @@ class ClosedForms:
         return None if loads is None else (history, direction, loads)
 
     def shear_loop(self) -> tuple[Array, Array] | None:
-        """Return the curve of the shift (m) over the tangential load (N) along its direction, for spheres.
-
-        Returns
-        -------
-        tuple of ndarray or None
-            (shift, load) from the first tangential load to the last step that has a closed solution.
-        """
+        """Return the curve of the shift (m) over the tangential load (N) along its direction, for spheres."""
         for number in self.dataset["step"].values[::-1]:
             found = self.partial_slip(int(number))
             if found is not None:
@@ -200,24 +164,12 @@ class ClosedForms:
         return None
 
     def torsion_loop(self) -> tuple[Array, Array] | None:
-        """Return the curve of the twist (rad) over the torque (N m), for spheres.
-
-        Returns
-        -------
-        tuple of ndarray or None
-            (twist, torque) from the first torque to the last step that has a closed solution.
-        """
+        """Return the curve of the twist (rad) over the torque (N m), for spheres."""
         numbers = self.dataset["step"].values[::-1]
         return next((loop for number in numbers if (loop := self.torsion(int(number))) is not None), None)
 
     def torsion(self, number: int) -> tuple[Array, Array] | None:
-        """Return the same curve up to a load step; None if that step has no closed solution.
-
-        Parameters
-        ----------
-        number : int
-            Number of the step, from 1.
-        """
+        """Return the same curve up to a load step; None if that step has no closed solution."""
         if not self.apply or self._gap is None:
             return None
         history = History(self.dataset, number, self.static)

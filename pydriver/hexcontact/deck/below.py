@@ -210,20 +210,7 @@ _NOISE = 1e-4  # of the largest value of a load in the history
 
 
 def cycle_of(stages: Sequence[Stage], labels: Sequence[str]) -> tuple[int, int]:
-    """Return the indices of the first and last load step of the last closed cycle of some segments.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        The load steps, without loads that are not known yet.
-    labels : sequence of str
-        Labels of the segments.
-
-    Raises
-    ------
-    ValueError
-        With a sentence, if there are no such segments, or they make no closed cycle.
-    """
+    """Return the indices of the first and last load step of the last closed cycle of some segments."""
     known = list(dict.fromkeys(label for _, label, _ in stages if label))
     for label in labels:
         if label not in known:

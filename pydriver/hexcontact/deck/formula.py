@@ -98,13 +98,7 @@ class Formula:
             self._checked(part)
 
     def value(self, numbers: Mapping[str, float]) -> float:
-        """Return the value for the numbers of its names.
-
-        Raises
-        ------
-        ValueError
-            If there is no finite value.
-        """
+        """Return the value for the numbers of its names."""
         try:
             found = float(self._evaluated(self._tree, numbers, {}))
         except (ArithmeticError, TypeError, ValueError) as error:

@@ -122,13 +122,7 @@ class Table(BaseModel):
 
     @classmethod
     def parse(cls, data: Mapping[str, Any], source: Source) -> Self:
-        """Return the checked table of a file.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each mistake.
-        """
+        """Return the checked table of a file."""
         try:
             return cls.model_validate(data)
         except ValidationError as error:

@@ -62,26 +62,7 @@ def assemble(
     folder: Path = Path(),
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
-    """Return a deck with its included decks merged, single keys replaced, and series of loads read.
-
-    Parameters
-    ----------
-    data : mapping
-        The deck as dictionaries.
-    text : str, optional
-        The deck as text.
-    source : Source
-        Source of the deck.
-    folder : Path
-        Folder of the deck, to which names of files are relative.
-    overrides : mapping, optional
-        New values by dotted key, see `hexcontact.deck.toml.with_overrides`.
-
-    Raises
-    ------
-    DeckError
-        If an included file is missing, is no TOML or includes itself, or a key cannot be replaced.
-    """
+    """Return a deck with its included decks merged, single keys replaced, and series of loads read."""
     refuse_deep(data, source.name)
     if not ("include" in data or overrides or any(True for _ in _named_files(data))):
         return Assembled(dict(data), text, source, [])

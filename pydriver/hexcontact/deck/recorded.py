@@ -30,13 +30,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(text: str, *names: str) -> Recorded:
-    """Return the named tables of the deck of a result.
-
-    Raises
-    ------
-    DeckError
-        If it is no TOML, or one of the tables has a key or a value that this version does not know.
-    """
+    """Return the named tables of the deck of a result."""
     if not text:
         return Recorded({})
     data = parse_toml(text, _NAME)

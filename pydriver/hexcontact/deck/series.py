@@ -241,28 +241,7 @@ class _Column(NamedTuple):
 
 
 def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
-    """Return a series of loads from a file.
-
-    Parameters
-    ----------
-    path : Path
-        A netCDF file if its name ends in ``.nc`` (variables of one dimension, with the attribute ``units``),
-        else text: a line of headers, perhaps one of units, then rows, separated by commas, semicolons, tabs
-        or blanks.
-    columns : mapping of str to str, optional
-        Header of the column for each key; other columns are ignored. Without it every header has to be a key
-        of [[load]], except for ``time`` and ``step``.
-
-    Returns
-    -------
-    dict of str to list
-        The rows by key: floats in SI (twists as text with their unit), "" in rows without a value; labels.
-
-    Raises
-    ------
-    DeckError
-        With a sentence for each mistake, which names file, line and column.
-    """
+    """Return a series of loads from a file."""
     netcdf = path.suffix in (".nc", ".nc4", ".cdf")
     found, lines = (_netcdf_columns if netcdf else _text_columns)(path)
     chosen = _chosen(path, found, columns)

@@ -369,15 +369,7 @@ class Deck(Table):
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Mistake]]:
-        """Return the valid tables of a deck and its mistakes.
-
-        Returns
-        -------
-        tables : dict
-            Attributes of the deck, without tables that have mistakes or are required and absent.
-        problems : list of Mistake
-            Mistakes in single tables.
-        """
+        """Return the valid tables of a deck and its mistakes."""
         if data.keys() <= cls.model_fields.keys():
             # Each table alone: pydantic need not build the models of tables that the deck does not have.
             with suppress(ValidationError, PydanticCustomError, LookupError):

@@ -27,39 +27,13 @@ _WITH_UNIT = rf"(?<![\w.])[+-]?{DIGITS}\s*(?:[^\W\d_]+[\w/^*·]*|[%°])"
 
 
 def read_toml(path: str | Path, kind: str = "a deck") -> tuple[dict[str, Any], str]:
-    """Return the tables of a deck file without checking them.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file in UTF-8.
-    kind : str
-        Expected kind of file, for messages.
-
-    Returns
-    -------
-    data : dict
-        The tables.
-    text : str
-        Text of the file.
-
-    Raises
-    ------
-    DeckError
-        If there is no such file, it cannot be read, or it is not TOML.
-    """
+    """Return the tables of a deck file without checking them."""
     text = text_of(path, f"{kind} (a TOML file)")
     return parse_toml(text, str(path)), text
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Return the tables of a TOML text; `name` is its name in messages.
-
-    Raises
-    ------
-    DeckError
-        With the line and the mistake.
-    """
+    """Return the tables of a TOML text; `name` is its name in messages."""
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -85,20 +59,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 
 def refuse_deep(data: Mapping[str, Any], name: str) -> None:
-    """Refuse deeply nested tables, since copying or showing them may exhaust the stack.
-
-    Parameters
-    ----------
-    data : mapping
-        The deck as dictionaries; may hold itself.
-    name : str
-        Name of the deck in messages; may be empty.
-
-    Raises
-    ------
-    DeckError
-        If there are more than `DEEPEST` levels.
-    """
+    """Refuse deeply nested tables, since copying or showing them may exhaust the stack."""
     level: list[Any] = [data]
     for _ in range(DEEPEST):
         entries = [e for table in level for e in (table.values() if isinstance(table, Mapping) else table)]
@@ -109,20 +70,7 @@ def refuse_deep(data: Mapping[str, Any], name: str) -> None:
 
 
 def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a deck with single keys replaced.
-
-    Parameters
-    ----------
-    data : mapping
-        The deck as dictionaries.
-    overrides : mapping
-        New values by dotted key; entries of arrays count from 1 ("load.2.steps"). None removes a key.
-
-    Raises
-    ------
-    DeckError
-        If a key leads through a plain value, or through an absent entry of an array.
-    """
+    """Return a copy of a deck with single keys replaced."""
     result = copy.deepcopy(dict(data))
     for dotted_key, value in overrides.items():
         if bracket := re.search(_BRACKET, dotted_key):

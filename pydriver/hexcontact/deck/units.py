@@ -91,26 +91,7 @@ class UnitError(ValueError):
 
 
 def to_si(value: object, dimension: Dimension) -> float:
-    """Return a deck value as a float in SI units.
-
-    Parameters
-    ----------
-    value : object
-        A number (taken as SI), or text made of a number and a unit.
-    dimension : Dimension
-        Dimension of the value.
-
-    Returns
-    -------
-    float
-        The value in ``dimension.unit``; infinite or NaN if `value` is.
-
-    Raises
-    ------
-    UnitError
-        If the value is not a quantity of that dimension, with the reason in a few words, or without one if
-        the expected value suffices.
-    """
+    """Return a deck value as a float in SI units."""
     if isinstance(value, str):
         return _from_text(value, dimension)
     if hasattr(value, "magnitude") and hasattr(value, "units"):

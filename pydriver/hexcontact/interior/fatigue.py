@@ -125,20 +125,7 @@ def histories(
     friction: float,
     surface: Surface,
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield stress histories (points, steps, 6) of a region block by block, and which of its points they are.
-
-    Parameters
-    ----------
-    lattice, steps, bodies, body, friction, surface
-        As of `hexcontact.interior.stress.below`.
-    where : Region
-        The points, which are counted as if flattened.
-
-    Raises
-    ------
-    ResourceError
-        If there is not enough memory for tractions and a block.
-    """
+    """Yield stress histories (points, steps, 6) of a region by blocks, each with the slice of its points."""
     loads, used = tractions(lattice, steps, bodies, friction, None)
     found = _of_tractions(lattice, steps, loads, body, material(bodies, body)[0], where)
     if used == "nodes":
@@ -204,35 +191,7 @@ def parameters_below(
     friction: float,
     surface: Surface,
 ) -> xarray.Dataset:
-    """Return fatigue parameters of a body.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the steps.
-    steps : sequence of mapping of str to ndarray
-        The load steps of a closed cycle, as of `hexcontact.interior.stress.below`; with `SLIPS` for those of
-        Ruiz.
-    bodies : sequence of Body
-        The two bodies.
-    body : int
-        The one that is meant, 1 or 2.
-    where : mapping
-        Points of it: arguments of `region`.
-    criteria : Criteria
-        The parameters and their constants.
-    friction : float
-        Coefficient of friction.
-    surface : callable
-        The tractions at the surface, see `hexcontact.interior.stress.below`.
-
-    Raises
-    ------
-    DeckError
-        If the body is wrong, points lie above the surface, or there is no slip for Ruiz' parameters.
-    ResourceError
-        If there is not enough memory.
-    """
+    """Return fatigue parameters of a body."""
     import xarray
 
     found = region(lattice, **where)

@@ -23,31 +23,9 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 def at_points(
     lattice: Lattice, tractions: Array, body: int, poisson_ratio: float, points: ArrayLike, threads: int = 0
 ) -> tuple[Array, Array]:
-    """Return displacement and stress at points of a body for a history of steps.
+    """Return G u (step, n, 3) and the stress (step, n, 6; xx, yy, zz, xy, yz, xz) of a body in load steps.
 
     The influence of each node on each point is worked out once for all steps.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the tractions.
-    tractions : ndarray, shape (step, 3, n_row, n_col)
-        Pressure, and traction on body 1 along x and y, Pa.
-    body : int
-        1 or 2.
-    poisson_ratio : float
-        Its Poisson's ratio.
-    points : array_like, shape (n, 3)
-        x and y of the points, and their depths below the surface of the body, m.
-    threads : int
-        Threads to use; 0: as many as OpenMP takes.
-
-    Returns
-    -------
-    displacement : ndarray, shape (step, n, 3)
-        Along x, y, z times the shear modulus, Pa m.
-    stress : ndarray, shape (step, n, 6)
-        Components xx, yy, zz, xy, yz, xz, positive in tension, Pa.
     """
     x, y, depth = np.asarray(points, dtype=float).reshape(-1, 3).T
     if not x.size:
@@ -101,18 +79,7 @@ def planes_memory(lattice: Lattice, threads: int = 0) -> int:
 
 
 def invariants(stress: ArrayLike) -> Array:
-    """Return principal stresses (the largest first), von Mises' and Tresca's equivalent stress.
-
-    Parameters
-    ----------
-    stress : array_like, shape (..., 6)
-        Components xx, yy, zz, xy, yz, xz.
-
-    Returns
-    -------
-    ndarray, shape (..., 5)
-        The three principal stresses, von Mises, Tresca.
-    """
+    """Return the three principal stresses (largest first), von Mises and Tresca of stresses (..., 6)."""
     values = np.asarray(stress, dtype=float)
     if values.shape[-1:] != (6,):
         raise DeckError(

@@ -95,30 +95,7 @@ def region(
     box: ArrayLike | None = None,
     count: int | Sequence[int] | None = None,
 ) -> Region:
-    """Return where stresses are wanted; one of `points`, `line`, `plane` and `depths` says it.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the result.
-    points : array_like, shape (..., 3)
-        x, y and depth, m.
-    line : array_like, shape (2, 3)
-        Ends of a line, with `count` points on it.
-    plane : array_like, shape (3, 3)
-        A corner of a parallelogram and the two corners next to it, with `count` points along either side.
-    depths : array_like
-        Depths of planes whose nodes are wanted.
-    box : array_like, shape (2, 2), optional
-        With `depths`: smallest and largest x, and y; by default the whole window.
-    count : int or two int
-        Number of points; by default 101, or 81 by 81.
-
-    Raises
-    ------
-    DeckError
-        If nothing or too much is given, or numbers are not what they should be.
-    """
+    """Build the evaluation points from exactly one of `points`, `line`, `plane` and `depths`."""
     given: dict[str, Any] = {"points": points, "line": line, "plane": plane, "depths": depths}
     kinds = [name for name, value in given.items() if value is not None]
     if len(kinds) != 1:

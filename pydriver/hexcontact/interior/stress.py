@@ -62,13 +62,7 @@ def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
 
 
 def bodies_of(deck: str) -> Bodies:
-    """Return the two bodies of a deck, none if it does not tell.
-
-    Raises
-    ------
-    DeckError
-        If they touch all over, and not on the window only, or this version does not know a key of theirs.
-    """
+    """Return the two bodies of a deck; none if the deck does not define them."""
     tables, gap_given = recorded(deck, "body", "interface")
     if not tables:
         return ()
@@ -81,13 +75,7 @@ def bodies_of(deck: str) -> Bodies:
 
 
 def material(bodies: Bodies, body: int) -> tuple[float, float]:
-    """Return Poisson's ratio and shear modulus (Pa) of a body.
-
-    Raises
-    ------
-    DeckError
-        If there is no such body, or it is rigid, or unknown.
-    """
+    """Return Poisson's ratio and shear modulus (Pa) of a body."""
     if integer(body, "body") not in (1, 2):
         raise DeckError(f"body = {body}: expected 1 or 2")
     if not bodies:
@@ -107,33 +95,7 @@ def nodal_tractions(steps: Sequence[Fields]) -> Array:
 def tractions(
     lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, friction: float, source: str | None
 ) -> tuple[Array, str]:
-    """Return pressure and shear tractions of some steps as the core takes them, and where they come from.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the steps.
-    steps : sequence of mapping of str to ndarray
-        Fields of the steps.
-    bodies : sequence of Body
-        The two bodies.
-    friction : float
-        Coefficient of friction; the shear tractions stay as they are unless it is positive and finite.
-    source : str, optional
-        One of `SOURCES`; by default the edges, if gap and zone of all steps are there to find them.
-
-    Returns
-    -------
-    ndarray, shape (step, 3, n_row, n_col)
-        Pa.
-    str
-        The source.
-
-    Raises
-    ------
-    DeckError
-        If the edges cannot be found.
-    """
+    """Return the tractions (step, 3, n_row, n_col; Pa) of load steps, and their source."""
     if source is not None and source not in SOURCES:
         raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
     at_nodes = nodal_tractions(steps)
@@ -193,37 +155,7 @@ def below(
     source: str | None = None,
     surface: Surface | None = None,
 ) -> xarray.Dataset:
-    """Return quantities below the surface.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the steps.
-    steps : sequence of mapping of str to ndarray
-        Pressure and shear tractions at the nodes in some load steps, with the bulk stress if there is one.
-    bodies : sequence of Body
-        The two bodies.
-    body : int
-        The one that is meant, 1 or 2.
-    where : mapping
-        Points of it: arguments of `region`.
-    components : sequence of str
-        Names of the quantities, see `hexcontact.variables.STRESSES`; by default the six stresses and that of
-        von Mises.
-    numbers : sequence of int, optional
-        Numbers of the steps; without them there is one step, and the dataset has no such dimension.
-    friction, source : float and str, optional
-        See `tractions`.
-    surface : callable, optional
-        The tractions to the edges, which the stress at depth 0 has exactly unless `source` is the nodes.
-
-    Raises
-    ------
-    DeckError
-        If a name or the body is wrong, or points lie above the surface.
-    ResourceError
-        If there is not enough memory.
-    """
+    """Return quantities below the surface."""
     import xarray
 
     found = region(lattice, **where)
@@ -329,21 +261,7 @@ def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = Fals
 def tractions_needed(
     lattice: Lattice, steps: int, contact: int, sheared: bool, unlike: bool, source: str | None = None
 ) -> int:
-    """Return the memory (bytes) that the tractions of some steps take, with their correction at the edges.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Window of the steps.
-    steps : int
-        Number of steps.
-    contact : int
-        Nodes in contact.
-    sheared, unlike : bool
-        Whether shear tractions are corrected, and whether the materials are dissimilar.
-    source : str, optional
-        One of `SOURCES`.
-    """
+    """Return the memory (bytes) of the tractions of load steps, with their correction at the edges."""
     field = 8 * lattice.size
     loaded = field * _LOADED_ARRAYS * steps + _READ_ARRAYS * min(field * steps, _READ_KEPT)
     if source == "nodes":

@@ -26,13 +26,7 @@ STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
 
 
 def tables_of(deck: str) -> dict[str, Stress | Fatigue]:
-    """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one.
-
-    Raises
-    ------
-    DeckError
-        If one has a key or a value that this version does not know.
-    """
+    """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one."""
     tables = recorded(deck, "stress", "fatigue").tables
     found: dict[str, Stress | Fatigue] = {}
     for kind in ("stress", "fatigue"):
@@ -49,22 +43,7 @@ def files_of(deck: str, output: Path) -> dict[str, Path]:
 def computed(
     result: BelowSurface, kept: list[int], names: list[str] | None = None
 ) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield name and dataset of each table of stresses or fatigue parameters of the deck of a result.
-
-    Parameters
-    ----------
-    result : BelowSurface
-        The result.
-    kept : list of int
-        Numbers of the steps whose fields it has.
-    names : list of str, optional
-        Only these tables.
-
-    Raises
-    ------
-    DeckError
-        If the fields of a step were not kept.
-    """
+    """Yield name and dataset of each table of stresses or fatigue parameters of the deck of a result."""
     for name, table in tables_of(result.deck).items():
         if names is None or name in names:
             yield name, of_table(result, name, table, kept)

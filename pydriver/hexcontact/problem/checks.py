@@ -21,29 +21,7 @@ _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of
 
 
 def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[LoadStep]]:
-    """Check a deck, table by table and as a whole.
-
-    Parameters
-    ----------
-    given : Assembled
-        The deck as dictionaries, and its known faults.
-    gap_given : bool
-        Whether the gap is given instead of the surfaces.
-
-    Returns
-    -------
-    deck : Deck
-        The deck.
-    solver : Solver
-        Its solver, with the algorithm.
-    load_steps : sequence of LoadStep
-        Its history.
-
-    Raises
-    ------
-    DeckError
-        With all faults. A check of several tables is left out if one of them is wrong.
-    """
+    """Check a deck, table by table and as a whole."""
     found = list(given.problems)
     tables, of_tables = Deck.checked(given.data)
     blamed = {problem.key for problem in found}

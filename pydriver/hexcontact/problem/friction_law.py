@@ -26,13 +26,7 @@ _MOST_POINTS = 1_000_000  # of a map, which is text in the deck of a result
 
 
 def given_coefficient(coefficient: Any, lattice: Lattice | None) -> Any:
-    """Return a coefficient from Python as in a deck: a number, a text, or a `NodalCoefficient`.
-
-    Raises
-    ------
-    DeckError
-        If the places of its values are unknown.
-    """
+    """Return a coefficient from Python as in a deck: a number, a text, or a `NodalCoefficient`."""
     if callable(coefficient):
         return NodalCoefficient(coefficient)
     coordinates = getattr(coefficient, "coords", {})
@@ -93,13 +87,7 @@ class FrictionField:
             self.in_deck = {"x": grid.x.tolist(), "y": grid.y.tolist(), "values": grid.gap.tolist()}
 
     def over(self, lattice: Lattice) -> FrictionLaw:
-        """Return the law at the nodes of a window.
-
-        Raises
-        ------
-        DeckError
-            If a coefficient is negative or NaN somewhere, or a map ends within the window.
-        """
+        """Return the law at the nodes of a window."""
         if not self.varies:
             return FrictionLaw(self._source, **self._numbers)
         source: Callable[..., Any] | Any = self._source

@@ -23,13 +23,7 @@ GivenGap = Callable[[Array, Array], ArrayLike] | Array
 
 
 def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
-    """Return a gap as a function of x and y, or as an array over the nodes of the lattice.
-
-    Raises
-    ------
-    DeckError
-        If the places of its values are unknown.
-    """
+    """Return a gap as a function of x and y, or as an array over the nodes of the lattice."""
     if gap is None or callable(gap):
         return gap
     if hasattr(gap, "iloc") or hasattr(gap, "data_vars"):

@@ -127,13 +127,7 @@ class LoadStep:
         return self.z, self.x, self.y, self.twist
 
     def values(self, begun: Mapping[str, float]) -> tuple[float, ...]:
-        """Return the prescribed values for z, x, y and the twist.
-
-        Parameters
-        ----------
-        begun : mapping of str to float
-            Loads and motions at the beginning of the segment, by the names of `hexcontact.variables.LOADS`.
-        """
+        """Return the prescribed values for z, x, y and the twist."""
         return tuple(
             target.at(begun[LOADS[motion][target.control == "displacement"]])
             for motion, target in zip(MOTIONS, self.targets, strict=True)

@@ -65,15 +65,7 @@ def machine() -> str:
 
 
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
-    """Return the rows of an overview of a case.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    memory : callable, optional
-        Estimates the memory (bytes) of a run on a window; without it the table has no memory.
-    """
+    """Return the rows of an overview of a case."""
     lattice = case.lattice
     span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(
         lattice.basis

@@ -174,15 +174,7 @@ _STEADY = 0.05  # exponent of the radius on the load up to which a contact does 
 
 
 def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
-    """Return the known expected values at the largest load, SI.
-
-    Parameters
-    ----------
-    case : Problem
-        The case. For a gap over the nodes of a window only the friction is known.
-    estimated : bool
-        Also values that take an estimate of the contact.
-    """
+    """Return the known expected values at the largest load, SI."""
     mu = case.deck.friction.coefficient if case.deck.friction else 0.0
     known = case.estimate if estimated else None
     found: dict[str, Any] = {}

@@ -164,28 +164,7 @@ def estimate_contact(
     heights: Sequence[GapFunction] = (),
     **drive: float,
 ) -> Estimate:
-    """Estimate the contact under a normal load (N) or at an approach (m).
-
-    Parameters
-    ----------
-    pair : ElasticPair
-        The materials.
-    gap : callable
-        Initial gap over the plane.
-    center, origin : (float, float)
-        A point near the contact, and a lattice node.
-    interface : (float, float, float)
-        Coefficient (Pa/m^m) and exponent of its compliance, and stiffness (Pa/m) of its springs.
-    heights : sequence of callable
-        Heights of the surfaces of both bodies, if they are known.
-    **drive : float
-        `normal_load` or `approach`, above zero.
-
-    Raises
-    ------
-    NoContactFound
-        If nothing touches, or the contact has no end.
-    """
+    """Estimate the contact under a normal load (N) or at an approach (m)."""
     half = starting_half_size(pair, gap, center, **drive)
     lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), origin)
     enclosed, enlargements = False, 0
@@ -315,27 +294,6 @@ def check_interface(
     """Compare the stiffness of an interface with that of the bodies, E*/size.
 
     That of the interface is dp/dψ at the pressure P/size^2, or at a penetration as large as the approach.
-
-    Parameters
-    ----------
-    interface : (float, float, float)
-        Coefficient (Pa/m^m), exponent m, and stiffness (Pa/m) of tangential springs.
-    pair : ElasticPair
-        The materials.
-    size : float
-        Size (m) of the contact.
-    full : bool
-        Whether the contact is full.
-    normal_load, approach : float
-        Normal load (N), or approach (m), above zero.
-
-    Returns
-    -------
-    ratios : list of float
-        Decimal logarithms of the ratio, of the coefficient and of the springs if there are any.
-    problems : list of Mistake
-        An interface that is far softer than the bodies, or takes a penetration far beyond the size of the
-        contact, or is far stiffer in a full contact.
     """
     coefficient, exponent, springs = interface
     bodies, power, least = math.log10(pair.effective_modulus / size), 1.0, SOFTEST

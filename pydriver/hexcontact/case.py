@@ -18,8 +18,8 @@ from .errors import DeckError, PlausibilityWarning, warn
 from .problem import plausibility
 from .problem.arguments import Body, known_keywords, middle_of, refuse_unknown, with_radians
 from .problem.friction_law import given_coefficient
-from .problem.gap import GivenGap, given_gap
 from .problem.loads import LoadStep, Target
+from .problem.plane_field import GAP, FieldSource, given_field
 from .problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class Case(Problem):
         every: int | None = None,
         title: str = "",
     ) -> None:
-        own_gap = given_gap(gap, lattice)
+        own_gap = None if gap is None else given_field(gap, GAP, lattice)
         if lattice is not None:
             for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
                 if value is not None:
@@ -198,7 +198,7 @@ class Case(Problem):
             arguments = dict.fromkeys(FINENESS) | arguments
         return super().changed({**(changes or {}), **_deck_keys(arguments, None)})
 
-    def _set_up(self, given: Assembled, gap: GivenGap | None, lattice: Lattice | None) -> None:
+    def _set_up(self, given: Assembled, gap: FieldSource | None, lattice: Lattice | None) -> None:
         super()._set_up(given, gap, lattice)
         self._warned: set[str] = set()
         self._warn(plausibility.warnings(self, estimated=False))

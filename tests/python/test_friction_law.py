@@ -205,8 +205,9 @@ def test_bad_decks(friction, sentence):
     ("coefficient", "sentence"),
     [
         ("x/1e-3", "expected finite numbers of at least 0; it is -"),
-        ("sqrt(x)", "it is nan"),
+        ("sqrt(x)", "it is NaN"),
         (lambda x, y: [1.0, 2.0], "one number for each node"),
+        (lambda x, y: 0.3 if x > 0.0 else 0.2, r"takes numbers only: .*numpy\.vectorize\(coefficient\)"),
         (
             xarray.DataArray(
                 np.full((2, 2), 0.3), coords={"x": [-1e-5, 1e-5], "y": [-1e-5, 1e-5]}, dims=("x", "y")
@@ -353,7 +354,7 @@ def test_check_computes_the_friction(tmp_path):
             "coefficient = { x = [-1e-5, 1e-5], y = [-1e-5, 1e-5], values = [[0.3, 0.3], [0.3, 0.3]] }",
             "cover",
         ),
-        ('coefficient = "sqrt(x)"', "it is nan"),
+        ('coefficient = "sqrt(x)"', "it is NaN"),
         ('coefficient = "0.1 - 1e4*x"', "at least 0; it is -"),
     ):
         (tmp_path / "a.toml").write_text(deck(friction))

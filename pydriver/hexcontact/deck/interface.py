@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from ..arrays import Array
 from .formula import Formula
-from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, refuse
+from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .model import Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, to_si
 
@@ -87,13 +87,7 @@ class FrictionKind(Kind):
             return self.kind.parse(value)
         if value == FROM_PYTHON:
             refuse("the coefficient was given in Python and is not in the deck; run the script it came from")
-        try:
-            formula = Formula(value)
-        except ValueError as error:
-            refuse(f"expected {self.expected}; it is not {error}")
-        if unknown := set(formula.names) - {"x", "y"}:
-            refuse(f"expected {self.expected}; unknown: {', '.join(sorted(unknown))}")
-        return NodalCoefficient(partial(_at, formula), value)
+        return NodalCoefficient(partial(_at, formula_over_plane(value, self.expected)), value)
 
     def _of_table(self, value: Mapping[str, Any]) -> Any:
         """Return two coefficients, the name of a map, or a map from a table."""

@@ -273,6 +273,17 @@ class FileName(Text):
         return Path(text) if text else None
 
 
+def formula_over_plane(text: str, expected: str) -> Formula:
+    """Return a formula of x and y, or `refuse` another text."""
+    try:
+        formula = Formula(text)
+    except ValueError as error:
+        refuse(f"expected {expected}; it is not {error}")
+    if unknown := set(formula.names) - {"x", "y"}:
+        refuse(f"expected {expected}; unknown: {', '.join(sorted(unknown))}")
+    return formula
+
+
 class HeightFormula(Text):
     """A formula of x and y, as text."""
 
@@ -281,12 +292,7 @@ class HeightFormula(Text):
 
     def _parse(self, value: object) -> str:
         text = super()._parse(value)
-        try:
-            formula = Formula(text)
-        except ValueError as error:
-            refuse(f"expected {self.expected}; it is not {error}")
-        if not set(formula.names) <= {"x", "y"}:
-            refuse(f"expected {self.expected}; it is not a formula of x and y alone")
+        formula_over_plane(text, self.expected)
         return text
 
 

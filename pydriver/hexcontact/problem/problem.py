@@ -31,9 +31,9 @@ from . import window
 from .arguments import Body
 from .checks import checked
 from .friction_law import FrictionField
-from .gap import Gap, GivenGap
 from .height_map import HeightMap
 from .loads import LoadStep, wearing_cycle
+from .plane_field import GAP, FieldSource, PlaneField
 from .window import Estimate, NoContactFound
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
@@ -120,12 +120,12 @@ class Problem:
         return cls._made(assemble(plain(data)))
 
     @classmethod
-    def _made(cls, given: Assembled, gap: GivenGap | None = None, lattice: Lattice | None = None) -> Self:
+    def _made(cls, given: Assembled, gap: FieldSource | None = None, lattice: Lattice | None = None) -> Self:
         case = cls.__new__(cls)
         case._set_up(given, gap, lattice)
         return case
 
-    def _set_up(self, given: Assembled, gap: GivenGap | None, lattice: Lattice | None) -> None:
+    def _set_up(self, given: Assembled, gap: FieldSource | None, lattice: Lattice | None) -> None:
         self._given = given
         self.deck, self.solver, self.load_steps = checked(given, gap is not None)
         deck = self.deck
@@ -135,7 +135,7 @@ class Problem:
         self.friction_coefficient = coulomb(deck.friction, deck.interface) or 0.0
         self._friction = FrictionField(deck.friction, deck.interface)
         self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
-        self._gap = Gap(deck.body.separation if gap is None else gap)
+        self._gap = PlaneField(deck.body.separation if gap is None else gap, GAP)
         self.pair = ElasticPair.from_materials(
             one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
         )
@@ -177,7 +177,7 @@ class Problem:
     @property
     def height_map(self) -> HeightMap | None:
         """The heights of a gap that was measured on a grid."""
-        return self._gap.height_map
+        return self._gap.map
 
     @property
     def gap_given(self) -> bool:

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from hexcontact import Case, DeckError, Result, analytic
-from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere
+from hexcontact.cli.tables import against_hertz
+from hexcontact.deck.surfaces import (
+    Cone,
+    Cylinder,
+    FormulaSurface,
+    Paraboloid,
+    Power,
+    Punch,
+    RoundedPunch,
+    Sphere,
+)
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -104,6 +114,28 @@ def test_similar_bodies_sheared_have_cattaneo_and_mindlin() -> None:
     assert ratio == pytest.approx((1 - math.hypot(18, 6) / 30) ** (1 / 3))
     # before there is shear only the pressure has a solution
     assert set(found(result, step=1).values()) == {"Hertz"}
+
+
+def test_the_tables_of_the_command_follow_the_rule_of_the_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hertz holds for similar bodies with friction; of a deck of two surfaces no gap is fitted."""
+    monkeypatch.setattr(np.linalg, "lstsq", None)
+    for result in (sheared(), run(friction_coefficient=0.3, body_2=SOFT)):
+        last = result.history.to_dict("records")[-1]
+        rows = against_hertz(result.deck, result.dataset.attrs, last)
+        comparison = {entry.quantity: entry for entry in result.compare() if entry.solution == "Hertz"}
+        assert {name for name, *_ in rows} - {"contact_radius"} == comparison.keys() - {"pressure"}
+        for name, exact, computed, _ in rows:
+            entry = comparison.get(name)
+            assert entry is None or (exact, computed) == (entry.exact, entry.computed)
+
+
+def test_heights_that_are_not_shifted_count_in_the_approach() -> None:
+    """A formula with a center of its own: the lowest gap is closed before the contact."""
+    formula = FormulaSurface(expression="x**2/2e-2 + y**2/2e-2", offset=(2e-5, 0.0))
+    ball = {**STEEL, "surface": Sphere(radius=10e-3)}
+    comparison = run(body_1={**STEEL, "surface": formula}, body_2=ball, nodes_in_radius=24).compare()
+    lowest = 2 * (1e-5) ** 2 / 2e-2
+    assert abs(comparison["approach"].error) < 0.1 * lowest / comparison["approach"].exact
 
 
 @pytest.mark.parametrize("name", ["cone", "power", "rounded punch", "punch"])

@@ -837,6 +837,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
 
 def test_hertz_is_left_alone(sheared: Result) -> None:
-    assert tables.against_hertz(sphere(), sheared.history.to_dict("records")[-1]) == []
+    history = sheared.history.to_dict("records")[-1]
+    assert tables.against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
     exact = hertz_sphere(sphere().pair.effective_modulus, 1e-3, normal_load=31.5)
     assert float(sheared.max_pressure[1]) == pytest.approx(1.034 * exact.max_pressure, rel=0.01)

@@ -1,4 +1,4 @@
-"""The initial gap of a result as a quadratic form, under which Hertz's solution holds."""
+"""Hertz's solution for a result: its gap as a quadratic form, and the conditions under which it holds."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
+from ..deck.recorded import recorded
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
 from .elliptic import EllipticContact, hertz_ellipse
@@ -43,9 +44,9 @@ def is_strained(dataset: xarray.Dataset) -> bool:
     return any(bool(np.any(dataset[name])) for name in BULK_STRESS if name in dataset)
 
 
-def is_worn(dataset: xarray.Dataset) -> bool:
+def is_worn(history: Mapping[Any, Any]) -> bool:
     """Test whether wear has changed the surfaces by the last load step, so that no closed solution holds."""
-    worn = dataset.get("max_worn_depth")
+    worn = history.get("max_worn_depth")
     return worn is not None and bool(np.ravel(worn)[-1] > 0.0)
 
 
@@ -70,18 +71,24 @@ class QuadraticGap:
         Its second derivatives, 1/m.
     center : tuple of float
         Point of its minimum, m.
+    lowest : float
+        The gap there, m; not 0 for heights that are not shifted to first touch.
     """
 
     modulus: float
     hessian: Array
     center: tuple[float, float]
+    lowest: float
 
     @classmethod
     def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
         """Return the gap of a result; None if Hertz does not hold: another law or shape, a line contact."""
-        modulus = dataset.attrs.get("effective_modulus")
-        if modulus is None or "initial_gap" not in dataset or is_compliant(dataset.attrs):
-            return None
+        try:
+            known = cls.of_deck(str(dataset.attrs.get("deck", "")), dataset.attrs)
+        except DeckError:  # a surface of a later version
+            known = None
+        if known or "initial_gap" not in dataset:
+            return known
         gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
         if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
             return None
@@ -93,12 +100,45 @@ class QuadraticGap:
             return None
         hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
         try:
-            hertz_ellipse(float(modulus), hessian, normal_load=1.0)
-        except DeckError:  # a line contact
+            lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
+        except np.linalg.LinAlgError:
             return None
-        lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
-        return cls(float(modulus), hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])))
+        height = float(coefficients[0] + 0.5 * lowest @ coefficients[1:3] / size)
+        center = (float(x.mean() + lowest[0]), float(y.mean() + lowest[1]))
+        return cls._elliptic(dataset.attrs, hessian, center, height)
+
+    @classmethod
+    def of_deck(cls, deck: str, attributes: Mapping[Any, Any]) -> QuadraticGap | None:
+        """Return the gap of the surfaces of a deck; None if they are unknown, or as of `of`."""
+        separation = recorded(deck).separation
+        if separation is None or separation.quadratic is None:
+            return None
+        hessian, center = separation.quadratic
+        return cls._elliptic(attributes, hessian, center, float(separation(*center)))
+
+    @classmethod
+    def _elliptic(
+        cls, attributes: Mapping[Any, Any], hessian: Array, center: tuple[float, float], lowest: float
+    ) -> QuadraticGap | None:
+        """Return the gap if it and the law of contact lead to an ellipse."""
+        modulus = attribute_of(attributes, "effective_modulus")
+        try:
+            hertz_ellipse(modulus, hessian, normal_load=1.0)
+        except DeckError:  # a line contact, or an unknown modulus
+            return None
+        return None if is_compliant(attributes) else cls(modulus, hessian, center, lowest)
 
     def contact(self, load: float) -> EllipticContact:
         """Return Hertz's solution under a load (N) above 0."""
         return hertz_ellipse(self.modulus, self.hessian, normal_load=load)
+
+    def approach(self, load: float) -> float:
+        """Return the approach (m) from the height zero of the surfaces under a load (N)."""
+        return self.contact(load).approach + self.lowest
+
+
+def hertzian_gap(deck: str, attributes: Mapping[Any, Any], history: Mapping[Any, Any]) -> QuadraticGap | None:
+    """Return the gap of a deck of two surfaces if Hertz holds for a load step; else None."""
+    gap = QuadraticGap.of_deck(deck, attributes)
+    holds = float(history["normal_load"]) > 0.0 and not is_worn(history)
+    return gap if holds and pressure_is_frictionless(attributes) else None

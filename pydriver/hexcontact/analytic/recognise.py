@@ -16,21 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..deck.recorded import recorded
-from ..deck.surfaces import Surface
-from ..errors import DeckError
+from ..deck.surfaces import Punch
 from . import friction
 from .frictionless import AxisymmetricContact, cone, flat_punch, power_law, rounded_punch
-from .hertz_gap import (
-    SIMILAR,
-    QuadraticGap,
-    attribute_of,
-    friction_of,
-    is_compliant,
-    is_strained,
-    is_worn,
-    pressure_is_frictionless,
-)
+from .hertz_gap import SIMILAR, is_compliant, is_strained, is_worn, pressure_is_frictionless
 from .shear import ClosedForms, is_circular, superposed, turning_points
 
 if TYPE_CHECKING:
@@ -73,16 +62,12 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
         return [], "no closed-form solution is known for a compliant interface"
     if is_worn(so_far):
         return [], "no closed-form solution is known for worn surfaces"
-    known = [
-        *_normal(so_far, load),
-        *_shear(so_far, number),
-        *_torsion(so_far, number),
-        *([] if is_strained(so_far) else _dissimilar(so_far, load)),
-    ]
+    closed = ClosedForms(so_far)
+    known = [*_normal(closed, load), *_shear(closed, number), *_torsion(closed, number)]
+    known += [] if is_strained(so_far) else _dissimilar(closed, load)
     if known:
-        from_python = 'shape = "python"' in str(dataset.attrs.get("deck", ""))
         note = "the gap was given in Python; the solutions are those of its values at the nodes"
-        return known, note if from_python else ""
+        return known, note if "surface" in closed.deck.given else ""
     if pressure_is_frictionless(so_far.attrs):
         return [], "no closed-form solution is known for these surfaces"
     return [], (
@@ -94,26 +79,24 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
 # --- pressure -----------------------------------------------------------------------------------------------
 
 
-def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
+def _normal(closed: ClosedForms, load: float) -> list[Exact]:
     """Return the contact without friction: Hertz for a quadratic gap, else by the shape of the surface."""
-    if not pressure_is_frictionless(dataset.attrs):
+    if not pressure_is_frictionless(closed.dataset.attrs):
         return []
-    without_friction = friction_of(dataset.attrs) == 0.0  # else shear stores energy, too
-    gap = QuadraticGap.of(dataset)
-    if gap is not None:
+    without_friction = closed.friction == 0.0  # else shear stores energy, too
+    if (gap := closed.gap) is not None:
         hertz = gap.contact(load)
-        values = {"max_pressure": hertz.max_pressure, "approach": hertz.approach}
+        values = {"max_pressure": hertz.max_pressure, "approach": gap.approach(load)}
         values["contact_radius_fit"] = hertz.radius
         if without_friction:
             values["elastic_energy"] = 0.4 * load * hertz.approach
         x0, y0 = gap.center
         fields = {"pressure": lambda x, y: hertz.pressure(x - x0, y - y0)}
         return [Exact("Hertz", values, fields, {"pressure": hertz.max_pressure})]
-    surface = _only_surface(dataset)
-    shape = _SHAPES.get(surface.shape) if surface is not None else None
-    if surface is None or shape is None:
+    surface, shape = _shape_of(closed)
+    if shape is None:
         return []
-    contact = shape.contact(surface, attribute_of(dataset.attrs, "effective_modulus"), load)
+    contact = shape.contact(surface, closed.modulus, load)
     values = {"max_pressure": contact.max_pressure, "approach": contact.approach}
     if not shape.rim:
         values["contact_radius_fit"] = contact.contact_radius
@@ -167,30 +150,22 @@ _SHAPES = {
 }
 
 
-def _only_surface(dataset: xarray.Dataset) -> Surface | None:
-    """Return the only surface of the deck that is not flat; None without one."""
-    try:
-        tables, gap_given = recorded(str(dataset.attrs.get("deck", "")), "body")
-    except DeckError:  # a surface of a later version
-        return None
-    if gap_given or not tables:
-        return None
-    bodies = tables["body"]
-    curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s is not None]
-    return curved[0] if len(curved) == 1 else None
+def _shape_of(closed: ClosedForms) -> tuple[Any, _Shape | None]:
+    """Return the only surface that is not flat, and its shape if that has a closed solution."""
+    surface = closed.surface
+    return surface, _SHAPES.get(surface.shape) if surface is not None else None
 
 
 # --- similar bodies, sheared or twisted ---------------------------------------------------------------------
 
 
-def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
+def _shear(closed: ClosedForms, number: int) -> list[Exact]:
     """Return Cattaneo-Mindlin, or Mindlin-Deresiewicz after reversals."""
-    slip = ClosedForms(dataset).partial_slip(number)
+    slip = closed.partial_slip(number)
     if slip is None:
-        return _shear_of_shape(dataset, number)
-    radius = slip.contact.contact_radius
+        return _shear_of_shape(closed, number)
+    radius, sliding = slip.contact.contact_radius, slip.contact.sliding_load
     values = {}
-    sliding = slip.contact.sliding_load
     if abs(slip.turns[-1]) < (1.0 - _STEADY) * sliding:
         values["stick_radius_fit"] = slip.stick_ratio * radius
         if is_circular(slip.ellipse):
@@ -206,12 +181,11 @@ def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
     return [Exact(slip.name, values, fields, dict.fromkeys(fields, scale))]
 
 
-def _shear_of_shape(dataset: xarray.Dataset, number: int) -> list[Exact]:
+def _shear_of_shape(closed: ClosedForms, number: int) -> list[Exact]:
     """Return the superposition of contacts without friction, if the shape of the surface has them."""
-    closed, surface = ClosedForms(dataset), _only_surface(dataset)
-    shape = _SHAPES.get(surface.shape) if surface is not None else None
-    sheared = closed.sheared(number) if surface is not None and shape is not None else None
-    if sheared is None or surface is None or shape is None:
+    surface, shape = _shape_of(closed)
+    sheared = closed.sheared(number) if shape is not None else None
+    if sheared is None or shape is None:
         return []
     history, direction, loads = sheared
     contact = friction.SuperposedContact(
@@ -240,10 +214,10 @@ def _shear_of_shape(dataset: xarray.Dataset, number: int) -> list[Exact]:
     return [Exact("Jaeger, Ciavarella", values, fields, dict.fromkeys(fields, closed.friction * peak))]
 
 
-def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
+def _torsion(closed: ClosedForms, number: int) -> list[Exact]:
     """Return Lubkin's twist, if it holds up to this step and the contact does not slide."""
-    torque = float(dataset["torque"][-1]) if "torque" in dataset else 0.0
-    loop = ClosedForms(dataset).torsion(number) if torque else None
+    torque = float(closed.dataset["torque"][-1]) if "torque" in closed.dataset else 0.0
+    loop = closed.torsion(number) if torque else None
     if loop is None or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
         return []
     return [Exact("Lubkin", {"twist": float(loop[0][-1])})]
@@ -252,15 +226,14 @@ def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
 # --- dissimilar bodies, pressed -----------------------------------------------------------------------------
 
 
-def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
+def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
     """Return closed solutions for dissimilar bodies under a growing normal load alone."""
-    beta, mu = attribute_of(dataset.attrs, "dundurs_beta"), friction_of(dataset.attrs)
-    goodman = dataset.attrs.get("coupling") == "goodman"
-    if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(dataset, mu * load):
+    beta, mu, attributes = closed.beta, closed.friction, closed.dataset.attrs
+    goodman = attributes.get("coupling") == "goodman"
+    if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(closed.dataset, mu * load):
         return []
-    gap, surface = QuadraticGap.of(dataset), _only_surface(dataset)
-    hertz = gap.contact(load) if gap is not None else None
-    incremental = dataset.attrs.get("algorithm") == "incremental"
+    hertz = closed.gap.contact(load) if closed.gap is not None else None
+    incremental = attributes.get("algorithm") == "incremental"
     sphere = hertz if hertz is not None and is_circular(hertz) and incremental else None
     if math.isinf(mu) and not goodman and abs(beta) <= 0.5:
         kappa, chi = friction.no_slip_constants(beta)
@@ -270,8 +243,8 @@ def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
                 "contact_radius": (kappa * chi) ** (-1.0 / 3.0) * sphere.semi_major,
             }
             return [Exact("Mossakovskii, Spence", values)]
-        if surface is not None and surface.shape == "punch":
-            stiffness = 2.0 * attribute_of(dataset.attrs, "effective_modulus") * surface.radius  # type: ignore[attr-defined]
+        if isinstance(closed.surface, Punch):
+            stiffness = 2.0 * closed.modulus * closed.surface.radius
             return [Exact("Mossakovskii", {"approach": load / (kappa * stiffness)})]
     if math.isfinite(mu) and goodman and sphere is not None:
         ratio = friction.goodman_stick_ratio(beta, mu)

@@ -19,6 +19,9 @@ import numpy as np
 from ..arrays import Array
 from ..core.analytic import flat
 from ..core.measures import line_of
+from ..deck.recorded import recorded
+from ..deck.surfaces import Surface
+from ..errors import DeckError
 from .elliptic import EllipticContact
 from .friction import LubkinTorsion, MindlinContact
 from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, is_strained, is_worn
@@ -119,28 +122,39 @@ class ClosedForms:
         self.friction = friction_of(dataset.attrs)
         self.modulus = attribute_of(dataset.attrs, "effective_modulus")
         self.gamma = attribute_of(dataset.attrs, "tangential_compliance_ratio")
+        self.beta = attribute_of(dataset.attrs, "dundurs_beta")
         self.static = dataset.attrs.get("algorithm") == "static"
-        similar = abs(attribute_of(dataset.attrs, "dundurs_beta")) <= SIMILAR
+        self.deck = recorded(str(dataset.attrs.get("deck", "")))
+        similar = abs(self.beta) <= SIMILAR
         self.apply = similar and 0.0 < self.friction < math.inf and not is_strained(dataset)
 
     @cached_property
-    def _gap(self) -> QuadraticGap | None:
+    def gap(self) -> QuadraticGap | None:
+        """The gap, if it is a quadratic form."""
         return QuadraticGap.of(self.dataset)
+
+    @property
+    def surface(self) -> Surface | None:
+        """The only surface that is not flat; None without one, or if this version does not know it."""
+        try:
+            return self.deck.only_surface
+        except DeckError:
+            return None
 
     def partial_slip(self, number: int) -> PartialSlip | None:
         """Return the closed solution of a step with shear, None if there is none."""
         sheared = self.sheared(number)
-        if sheared is None or self._gap is None:
+        if sheared is None or self.gap is None:
             return None
         history, direction, loads = sheared
-        hertz = self._gap.contact(history.normal_load)
+        hertz = self.gap.contact(history.normal_load)
         contact = MindlinContact(
             self.friction, history.normal_load, hertz.radius, 4.0 / self.modulus * (1.0 + 0.5 * self.gamma)
         )
         if np.abs(history["twist"]).max() * contact.contact_radius > _ASIDE * contact.sliding_shift:
             return None
         return PartialSlip(
-            contact, hertz, self._gap.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
+            contact, hertz, self.gap.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
         )
 
     def sheared(self, number: int) -> tuple[History, tuple[float, float], Array] | None:
@@ -170,7 +184,7 @@ class ClosedForms:
 
     def torsion(self, number: int) -> tuple[Array, Array] | None:
         """Return the same curve up to a load step; None if that step has no closed solution."""
-        if not self.apply or self._gap is None:
+        if not self.apply or self.gap is None:
             return None
         history = History(self.dataset, number, self.static)
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
@@ -178,7 +192,7 @@ class ClosedForms:
             return None
         if history.is_worn:
             return None
-        hertz = self._gap.contact(history.normal_load)
+        hertz = self.gap.contact(history.normal_load)
         contact = LubkinTorsion(
             self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
         )

@@ -7,6 +7,7 @@ scripts are in the template data/report.html.
 from __future__ import annotations
 
 import base64
+import contextlib
 import datetime
 import hashlib
 import io
@@ -21,19 +22,20 @@ import numpy as np
 
 from .._version import __version__
 from ..deck.below import Fatigue, Stress
-from ..errors import DeckError, NotInResult
+from ..deck.recorded import recorded
+from ..errors import DeckError, HexcontactError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
 from ..interior.tables import read_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
+from ..problem.problem import Problem
 from ..result.history import energy_table, load_or_motion, worth_showing
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
 from . import tables
 
 if TYPE_CHECKING:
-    from ..problem.problem import Problem
     from ..result.result import Result
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
@@ -96,7 +98,7 @@ def report(result: Result) -> str:
         made_by=MADE_BY,
         notes=[_unfinished(result), *summary.remarks],
         kept=_kept(len(numbers), len(histories)),
-        inputs=_inputs(result, summary.case),
+        inputs=_inputs(result, _problem_of(result.deck)),
         loads=_loads(histories),
         energies=energy_table(histories, _MOST_PARTS),
         below=_below(result),
@@ -128,6 +130,14 @@ def _kept(shown: int, steps: int) -> str:
     if shown == 0:
         return "The fields of this run were not kept (output.fields), so that there are no maps."
     return f"Maps of {shown} of {steps} load steps: those in the result, evenly chosen if there are many."
+
+
+def _problem_of(deck: str) -> Problem | None:
+    """Return the problem of a result; None with parts from Python, or if its deck is not understood."""
+    with contextlib.suppress(HexcontactError):
+        if deck and not recorded(deck).given:
+            return Problem.from_text(deck, "deck of the result")
+    return None
 
 
 def _inputs(result: Result, case: Problem | None) -> list[tuple[str, ...]]:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import DeckError, HexcontactError
+from ..errors import DeckError
 from ..result.history import (
     contact_size,
     cycles,
@@ -92,20 +92,17 @@ class Summary(NamedTuple):
         History of each load step.
     parameters : mapping
         Parameters of the case, or attributes of the result.
-    case : Problem or None
-        The case, if it is known; without it there is no comparison with Hertz.
+    deck : str
+        The deck; without it there is no comparison with Hertz.
     result : Result or None
         The result, if it was read from a file.
-    fault : str
-        Reason why its deck is not understood; empty if it is, or has parts from Python.
     """
 
     title: str
     histories: Sequence[History]
     parameters: Mapping[str, Any]
-    case: Problem | None
+    deck: str
     result: Result | None = None
-    fault: str = ""
     extent: Extent | None = None
 
     @classmethod
@@ -121,26 +118,34 @@ class Summary(NamedTuple):
 
         found = histories_of(refined) if refined is not None else histories
         extent = extent if refined is None else extent_of(refined.step(-1))
-        return cls(case.title, found, parameters_of(case), case, refined, extent=extent)
+        return cls(case.title, found, parameters_of(case), case.deck_text, refined, extent)
 
     @classmethod
     def of_result(cls, result: Result) -> Summary:
         """Summarize a file."""
         histories, attributes = histories_of(result), result.dataset.attrs
-        case, fault = _recorded_case(result.deck)
         extent = extent_of(result.step(-1))
-        return cls(result.case_title, histories, attributes, case, result, fault, extent)
+        return cls(result.case_title, histories, attributes, result.deck, result, extent)
 
     @property
     def remarks(self) -> list[str]:
         """Sentences about doubtful steps."""
         found = remarks(self.histories, self.parameters)
-        return [*found, f"not compared with Hertz: {self.fault}"] if self.fault else found
+        from ..deck.recorded import recorded
+
+        try:
+            recorded(self.deck).tables("body")
+        except DeckError as error:  # of a later version, or of an earlier one that allowed more
+            found.append(f"not compared with Hertz: {str(error).splitlines()[0]}")
+        return found
 
     @property
     def hertz(self) -> list[tuple[str, float, float, str]]:
         """The last step compared with Hertz, see `against_hertz`."""
-        return against_hertz(self.case, self.histories[-1]) if self.case is not None else []
+        try:
+            return against_hertz(self.deck, self.parameters, self.histories[-1])
+        except DeckError:  # see `remarks`
+            return []
 
     def print(self, whole_file: bool = False) -> None:
         """Print the history, the last step, its comparison with Hertz, lattices and errors.
@@ -221,21 +226,6 @@ def fields_of(result: Result) -> list[str]:
     return [str(name) for name, values in result.dataset.data_vars.items() if values.ndim == 3]
 
 
-def _recorded_case(deck: str) -> tuple[Problem | None, str]:
-    """Return the case of the deck in a result, or why there is none; no reason if parts are from Python."""
-    from ..deck.recorded import given_in_python
-    from ..deck.toml import parse_toml
-    from ..problem.problem import Problem
-
-    name = "deck of the result"
-    try:
-        if not deck or given_in_python(parse_toml(deck, name)):
-            return None, ""
-        return Problem.from_text(deck, name), ""
-    except HexcontactError as error:  # of a later version, or of an earlier one that allowed more
-        return None, str(error).splitlines()[0]
-
-
 # --- the history ----------------------------------------------------------------------------------
 
 
@@ -292,45 +282,20 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
 # --- against Hertz --------------------------------------------------------------------------------
 
 
-def against_hertz(case: Problem, history: History) -> list[tuple[str, float, float, str]]:
-    """Compare a load step with Hertz's solution.
+def against_hertz(
+    deck: str, parameters: Mapping[str, Any], history: History
+) -> list[tuple[str, float, float, str]]:
+    """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail."""
+    from ..analytic.hertz_gap import hertzian_gap
 
-    Parameters
-    ----------
-    case : Problem
-        The case.
-    history : mapping
-        History of one of its steps.
-
-    Returns
-    -------
-    list of (str, float, float, str)
-        Name of the quantity in histories, Hertz, computed, unit; empty where Hertz does not apply: with
-        friction, a compliant interface, surfaces that are not quadratic or touch along a line, without load.
-    """
-    load = float(history["normal_load"])
-    surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
-    curvatures = [curvature for surface in surfaces if (curvature := surface.curvature) is not None]
-    quadratic = len(curvatures) == len(surfaces)
-    if any(surface.shape == "formula" for surface in surfaces):  # heights are not shifted to first touch
-        quadratic &= len({surface.offset for surface in surfaces}) == 1
-    if case.deck.interface or case.frictional or load <= 0 or not quadratic:
+    if (gap := hertzian_gap(deck, parameters, history)) is None:
         return []
-    import numpy as np
-
-    from ..analytic import hertz_ellipse
-
-    try:
-        hessian = np.sum([np.zeros((2, 2)), *curvatures], axis=0)
-        hertz = hertz_ellipse(case.pair.effective_modulus, hessian, normal_load=load)
-    except DeckError:  # contact along a line or all over, or a gap given in Python
-        return []
-    radius = math.sqrt(hertz.semi_major * hertz.semi_minor)
-    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (hertz.approach, "m")}
+    hertz = gap.contact(load := float(history["normal_load"]))
+    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (gap.approach(load), "m")}
     if half_axes(history):
         known |= {f"contact_semi_{n}": (getattr(hertz, f"semi_{n}"), "m") for n in ("major", "minor")}
     else:
-        known |= {"contact_radius_fit": (radius, "m"), "contact_radius": (radius, "m")}
+        known |= {"contact_radius_fit": (hertz.radius, "m"), "contact_radius": (hertz.radius, "m")}
     return [
         (name, exact, float(history[name]), unit)
         for name, (exact, unit) in known.items()

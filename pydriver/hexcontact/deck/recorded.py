@@ -1,57 +1,71 @@
-"""Tables of the deck in a result, which another version may have written."""
+"""The deck of a result, which another version may have written: the one reader of its tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+import functools
+from typing import Any
 
 from .._version import __version__
-from .faults import Source, deck_error
+from .faults import Mistake, Source, deck_error
 from .interface import FROM_PYTHON
+from .surfaces import Separation, Surface
 from .tables import Deck
 from .toml import parse_toml
 
-_NAME = "deck of the result"
 
-
-class Recorded(NamedTuple):
-    """Tables of the deck of a result, by the attributes of `Deck`; none without a deck.
+class RecordedDeck:
+    """The tables of the deck of a result; none without a text.
 
     Attributes
     ----------
-    tables : dict
-        The tables.
-    gap_given : bool
-        Whether the gap was given in Python, in the place of surfaces.
+    given : frozenset of str
+        Parts that were given in Python: "surface" for the gap, "friction".
     """
 
-    tables: dict[str, Any]
-    gap_given: bool = False
+    def __init__(self, text: str, name: str) -> None:
+        self._source = Source(name, text)
+        self._data = parse_toml(text, name) if text else {}
+        places = {"surface": ("body", "1", "surface", "shape"), "friction": ("friction", "coefficient")}
+        self.given = frozenset(part for part, keys in places.items() if self._value(keys) == FROM_PYTHON)
+        if "surface" in self.given:
+            del self._data["body"]["1"]["surface"]
+
+    def _value(self, keys: tuple[str, ...]) -> Any:
+        value: Any = self._data
+        for key in keys:
+            value = value.get(key) if isinstance(value, dict) else None
+        return value
+
+    @functools.cached_property
+    def _checked(self) -> tuple[dict[str, Any], list[Mistake]]:
+        return Deck.checked(self._data) if self._data else ({}, [])
+
+    def tables(self, *names: str) -> dict[str, Any]:
+        """Return the named tables; refuse a key or a value in them that this version does not know."""
+        found, mistakes = self._checked
+        if wrong := [mistake for mistake in mistakes if mistake.key and mistake.key[0] in names]:
+            error = deck_error(wrong, self._source)
+            error.add_note(
+                f"this is hexcontact {__version__}; open the result with the version that wrote it"
+            )
+            raise error
+        return {name: found[name] for name in names if name in found}
+
+    @property
+    def separation(self) -> Separation | None:
+        """The gap of the two surfaces; None if it was given in Python, or without a deck."""
+        bodies = None if "surface" in self.given else self.tables("body").get("body")
+        return bodies.separation if bodies else None
+
+    @property
+    def only_surface(self) -> Surface | None:
+        """The surface of a body on a flat one; None if there is none, or both have one."""
+        bodies = None if "surface" in self.given else self.tables("body").get("body")
+        curved = [body.surface for body in (bodies.body_1, bodies.body_2) if body.surface] if bodies else []
+        return curved[0] if len(curved) == 1 else None
 
 
-def recorded(text: str, *names: str) -> Recorded:
-    """Return the named tables of the deck of a result."""
-    if not text:
-        return Recorded({})
-    data = parse_toml(text, _NAME)
-    given = "surface" in given_in_python(data)
-    if given:
-        del data["body"]["1"]["surface"]
-    tables, mistakes = Deck.checked(data)
-    if wrong := [mistake for mistake in mistakes if mistake.key and mistake.key[0] in names]:
-        error = deck_error(wrong, Source(_NAME, text))
-        error.add_note(f"this is hexcontact {__version__}; open the result with the version that wrote it")
-        raise error
-    return Recorded({name: tables[name] for name in names if name in tables}, given)
-
-
-def given_in_python(deck: Mapping[str, Any]) -> set[str]:
-    """Return the parts of a deck that were given in Python: "surface" for the gap, "friction"."""
-    places = {"surface": ("body", "1", "surface", "shape"), "friction": ("friction", "coefficient")}
-    return {part for part, keys in places.items() if _value(deck, keys) == FROM_PYTHON}
-
-
-def _value(deck: Any, keys: Sequence[str]) -> Any:
-    for key in keys:
-        deck = deck.get(key) if isinstance(deck, Mapping) else None
-    return deck
+@functools.lru_cache(16)
+def recorded(text: str, name: str = "deck of the result") -> RecordedDeck:
+    """Return the deck of a result by its text; `name` stands for it in messages."""
+    return RecordedDeck(text, name)

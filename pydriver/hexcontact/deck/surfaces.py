@@ -418,16 +418,20 @@ class Separation:
             return (*two.offset, 0.0)
         if isinstance(two, Flat | FormulaSurface):
             return (*one.offset, 0.0)
-        if one.curvature is not None and two.curvature is not None:
-            # Both quadratic: (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders. Solved about
-            # o1, so that large offsets cost no digits.
-            apart = np.subtract(two.offset, one.offset)
-            total = one.curvature + two.curvature
-            point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
-            x, y = float(point[0]), float(point[1])
-        else:
-            x, y = self._search()
+        x, y = self.quadratic[1] if self.quadratic else self._search()
         return x, y, float(self._sum(x, y))
+
+    @cached_property
+    def quadratic(self) -> tuple[Array, tuple[float, float]] | None:
+        """Second derivatives (1/m) and lowest point (m) of a gap that is a quadratic form; None of others."""
+        one, two = self.surface_1, self.surface_2
+        if one.curvature is None or two.curvature is None:
+            return None
+        # (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders; solved about o1, so that large
+        # offsets cost no digits
+        apart, total = np.subtract(two.offset, one.offset), one.curvature + two.curvature
+        point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
+        return total, (float(point[0]), float(point[1]))
 
     def _sum(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.surface_1.height(x, y) + self.surface_2.height(x, y)

@@ -63,11 +63,11 @@ def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
 
 def bodies_of(deck: str) -> Bodies:
     """Return the two bodies of a deck; none if the deck does not define them."""
-    tables, gap_given = recorded(deck, "body", "interface")
-    if not tables:
+    known = recorded(deck)
+    if not (tables := known.tables("body", "interface")):
         return ()
     bodies = tables["body"]
-    if tables["interface"] and not gap_given and bodies.separation.flat:
+    if tables["interface"] and known.separation and known.separation.flat:
         raise NotInResult(
             "there is no stress to compute below the window of a full contact, which has no end"
         )

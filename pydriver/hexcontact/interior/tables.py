@@ -27,7 +27,7 @@ STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
 
 def tables_of(deck: str) -> dict[str, Stress | Fatigue]:
     """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one."""
-    tables = recorded(deck, "stress", "fatigue").tables
+    tables = recorded(deck).tables("stress", "fatigue")
     found: dict[str, Stress | Fatigue] = {}
     for kind in ("stress", "fatigue"):
         for number, table in enumerate(tables.get(kind, []), 1):

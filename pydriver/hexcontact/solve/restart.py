@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .._version import __version__
-from ..deck.recorded import given_in_python
-from ..deck.toml import parse_toml
+from ..deck.recorded import recorded
 from ..errors import DeckError, HexcontactError, PlausibilityWarning, warn
 from ..problem import plausibility
 from ..problem.problem import Problem
@@ -199,7 +198,7 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
         return case
     if not metadata.deck:
         raise DeckError(f"the journal of {path} holds no deck")
-    if "surface" in given_in_python(parse_toml(metadata.deck, f"deck of {path}")):
+    if "surface" in recorded(metadata.deck, f"deck of {path}").given:
         raise DeckError(
             f"the gap of {path} was given in Python; resume there: "
             f"hexcontact.resume({str(path)!r}, case=case)"

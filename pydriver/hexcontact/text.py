@@ -191,24 +191,12 @@ def _numbers(cells: Iterable[str]) -> bool:
 
 
 class TextTable(NamedTuple):
-    """A table for terminals; columns of names and labels may wrap, those of numbers do not.
+    """A table for terminals; columns of names and labels may wrap, those of numbers do not."""
 
-    Attributes
-    ----------
-    title : str
-        Its title.
-    headers : sequence of str
-        Headers of its columns; none if all are empty.
-    rows : sequence of Row
-        Its cells.
-    tight : bool
-        Whether its columns stand closer.
-    """
-
-    title: str
-    headers: Sequence[str]
-    rows: Sequence[Row]
-    tight: bool = False
+    title: str  # its title
+    headers: Sequence[str]  # headers of its columns; none if all are empty
+    rows: Sequence[Row]  # its cells
+    tight: bool = False  # whether its columns stand closer
 
     def plain(self, width: int) -> str | None:
         """Return the table as `__rich__` looks without colors, in a hundredth of the time.

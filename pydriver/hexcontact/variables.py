@@ -24,73 +24,38 @@ NOT_KEPT = -1  # zone of a step whose fields are not in the output (output.every
 
 
 class Variable(NamedTuple):
-    """One quantity of the result.
+    """One quantity of the result."""
 
-    Attributes
-    ----------
-    dims : tuple of str
-        Some of ``step``, ``row``, ``col``, ``trial``.
-    units : str
-        SI unit, ``"1"`` for a pure number, empty for text.
-    long_name : str
-        Its meaning in words.
-    padding : float or int
-        Value at nodes outside the window that a step was solved on.
-    dtype : str
-        numpy type in the file; ``"str"`` for text.
-    flags : mapping of int to str
-        Meaning of each value, for a quantity that is a code.
-    symbol : str
-        Symbol of the theory; empty if tables and messages use words.
-    title : str
-        Title of its panel (history) or map (field); quantities of one title share it.
-    motion : str
-        Rigid motion (``z``, ``x``, ``y``, ``twist``), also of the load that drives it.
-    scale : tuple of str and int
-        Quantity, and power of the contact radius: noise is small beside their product; ``("", 0)``: none.
-    least : float
-        Smallest value of a solution, but for noise beside `scale`.
-    most : float or str
-        Largest value: a number, the quantity of the history that it is part of, or ``"window"``, the area of
-        all nodes.
-    summary : int
-        Place in the summary of a load step, after loads and motions; 0: none.
-    required : str
-        Whether files must have it: ``"always"``, ``"friction"``; empty: never.
-    frictional : bool
-        Whether it is a field, or a measure of one, that a contact without friction does not have.
-    estimated : bool
-        Whether its discretization error is estimated: a value by step of the solution, not of the work.
-    rough : bool
-        Whether it depends on a few nodes at the edge of a zone, so that its error decreases like the root of
-        the spacing.
-    slip_zone : bool
-        Whether it depends on the width of the slip zone, so that its error decreases slowly while that is
-        narrower than the lattice resolves.
-    core : str
-        Array of fortran/python/f2py_friction.f90 or f2py_states.f90 that holds it: ``"fields"``, ``"zone"``,
-        ``"numbers"``, ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of
-        cycles that wear.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    padding: float | int = NAN
-    dtype: str = "f8"
-    flags: Mapping[int, str] = MappingProxyType({})
-    symbol: str = ""
-    title: str = ""
-    motion: str = ""
+    dims: tuple[str, ...]  # some of ``step``, ``row``, ``col``, ``trial``
+    units: str  # SI unit, ``"1"`` for a pure number, empty for text
+    long_name: str  # its meaning in words
+    padding: float | int = NAN  # value at nodes outside the window that a step was solved on
+    dtype: str = "f8"  # numpy type in the file; ``"str"`` for text
+    flags: Mapping[int, str] = MappingProxyType({})  # meaning of each value, for a quantity that is a code
+    symbol: str = ""  # symbol of the theory; empty if tables and messages use words
+    title: str = ""  # title of its panel (history) or map (field); quantities of one title share it
+    motion: str = ""  # rigid motion (``z``, ``x``, ``y``, ``twist``), also of the load that drives it
+    # quantity, and power of the contact radius: noise is small beside their product; ``("", 0)``: none
     scale: tuple[str, int] = ("", 0)
-    least: float = -LARGEST
+    least: float = -LARGEST  # smallest value of a solution, but for noise beside `scale`
+    # largest value: a number, the quantity of the history that it is part of, or ``"window"``, the area of
+    # all nodes
     most: float | str = LARGEST
-    summary: int = 0
-    required: str = ""
+    summary: int = 0  # place in the summary of a load step, after loads and motions; 0: none
+    required: str = ""  # whether files must have it: ``"always"``, ``"friction"``; empty: never
+    # whether it is a field, or a measure of one, that a contact without friction does not have
     frictional: bool = False
+    # whether its discretization error is estimated: a value by step of the solution, not of the work
     estimated: bool = False
+    # whether it depends on a few nodes at the edge of a zone, so that its error decreases like the root of
+    # the spacing
     rough: bool = False
+    # whether it depends on the width of the slip zone, so that its error decreases slowly while that is
+    # narrower than the lattice resolves
     slip_zone: bool = False
+    # array of fortran/python/f2py_friction.f90 or f2py_states.f90 that holds it: ``"fields"``, ``"zone"``,
+    # ``"numbers"``, ``"residuals"``; the order there is that of the rows here. ``"wear"``: a field of cycles
+    # that wear
     core: str = ""
 
     @property

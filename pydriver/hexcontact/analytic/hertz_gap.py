@@ -61,24 +61,12 @@ def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
 
 @dataclass(frozen=True)
 class QuadraticGap:
-    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid.
+    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid."""
 
-    Attributes
-    ----------
-    modulus : float
-        E*, Pa.
-    hessian : ndarray, shape (2, 2)
-        Its second derivatives, 1/m.
-    center : tuple of float
-        Point of its minimum, m.
-    lowest : float
-        The gap there, m; not 0 for heights that are not shifted to first touch.
-    """
-
-    modulus: float
-    hessian: Array
-    center: tuple[float, float]
-    lowest: float
+    modulus: float  # E*, Pa
+    hessian: Array  # its second derivatives, 1/m, (2, 2)
+    center: tuple[float, float]  # point of its minimum, m
+    lowest: float  # the gap there, m; not 0 for heights that are not shifted to first touch
 
     @classmethod
     def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:

@@ -31,24 +31,13 @@ _STEADY = 1e-6  # share of the sliding load, or of a motion, that is none
 
 @dataclass(frozen=True)
 class Exact:
-    """Values and fields of a closed solution for a load step.
+    """Values and fields of a closed solution for a load step."""
 
-    Attributes
-    ----------
-    solution : str
-        Name of the solution.
-    values : mapping of str to float
-        Its values (SI), by the names of the quantities of a result.
-    fields : mapping of str to callable
-        Fields as functions of x and y (m), by their names.
-    scales : mapping of str to float
-        Scales of the errors of the fields.
-    """
-
-    solution: str
-    values: Mapping[str, float]
+    solution: str  # name of the solution
+    values: Mapping[str, float]  # its values (SI), by the names of the quantities of a result
+    # fields as functions of x and y (m), by their names
     fields: Mapping[str, Callable[[Array, Array], Array]] = field(default_factory=dict)
-    scales: Mapping[str, float] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)  # scales of the errors of the fields
 
 
 def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
@@ -112,24 +101,13 @@ def _normal(closed: ClosedForms, load: float) -> list[Exact]:
 
 @dataclass(frozen=True)
 class _Shape:
-    """A surface of revolution with a closed solution.
+    """A surface of revolution with a closed solution."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the solution.
-    contact : callable
-        The contact of a surface of this shape with an effective modulus (Pa) under a load (N).
-    energy : callable
-        Its elastic energy over load times approach; 0: unknown.
-    rim : bool
-        Whether the contact ends at a sharp rim.
-    """
-
-    name: str
+    name: str  # name of the solution
+    # the contact of a surface of this shape with an effective modulus (Pa) under a load (N)
     contact: Callable[[Any, float, float], AxisymmetricContact]
-    energy: Callable[[Any], float]
-    rim: bool = False
+    energy: Callable[[Any], float]  # its elastic energy over load times approach; 0: unknown
+    rim: bool = False  # whether the contact ends at a sharp rim
 
 
 _SHAPES = {

@@ -65,29 +65,15 @@ class PartialSlip:
     """Similar bodies sheared along one line under a constant normal load, over a Hertz circle or ellipse.
 
     Over an ellipse the tractions have the same form as over a circle: stick and contact area are similar.
-
-    Attributes
-    ----------
-    contact : MindlinContact
-        Spheres with a contact of the same area.
-    ellipse : EllipticContact
-        Hertz contact.
-    center : tuple of float
-        Its center, m.
-    direction : tuple of float
-        Unit vector of the tangential load.
-    turns : tuple of float
-        Turning points of the tangential load along `direction`, N; the last is the present load.
-    loads : tuple of float
-        All loads along `direction`, N.
     """
 
-    contact: MindlinContact
-    ellipse: EllipticContact
-    center: tuple[float, float]
-    direction: tuple[float, float]
+    contact: MindlinContact  # spheres with a contact of the same area
+    ellipse: EllipticContact  # Hertz contact
+    center: tuple[float, float]  # its center, m
+    direction: tuple[float, float]  # unit vector of the tangential load
+    # turning points of the tangential load along `direction`, N; the last is the present load
     turns: tuple[float, ...]
-    loads: tuple[float, ...]
+    loads: tuple[float, ...]  # all loads along `direction`, N
 
     @property
     def name(self) -> str:

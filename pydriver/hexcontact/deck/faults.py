@@ -17,46 +17,24 @@ MISSING: Any = object()
 
 
 class Mistake(NamedTuple):
-    """A mistake in a deck.
+    """A mistake in a deck."""
 
-    Attributes
-    ----------
-    key : tuple
-        Path of the key; entries of arrays count from 0 here and from 1 in messages.
-    value : object
-        Value in the deck, or `MISSING`.
-    sentence : str
-        Expected value.
-    """
-
-    key: tuple[str | int, ...]
-    value: object
-    sentence: str
+    key: tuple[str | int, ...]  # path of the key; entries of arrays count from 0 here and from 1 in messages
+    value: object  # value in the deck, or `MISSING`
+    sentence: str  # expected value
 
 
 @dataclass(frozen=True)
 class Source:
-    """The file and text of a deck, for the places in messages.
+    """The file and text of a deck, for the places in messages."""
 
-    Attributes
-    ----------
-    name : str
-        File name; empty for a case that was built in Python.
-    text : str
-        Text of the deck.
-    overrides : frozenset of str
-        Dotted keys whose values are not from the text.
-    included : tuple of (str, str)
-        Names and texts of the files that the deck includes, the one that counts most first.
-    of_override : str
-        Prefix of the keys of overrides.
-    """
-
-    name: str = ""
-    text: str = ""
+    name: str = ""  # file name; empty for a case that was built in Python
+    text: str = ""  # text of the deck
+    # dotted keys whose values are not from the text
     overrides: frozenset[str] = field(default_factory=frozenset)
+    # names and texts of the files that the deck includes, the one that counts most first
     included: tuple[tuple[str, str], ...] = ()
-    of_override: str = "override: "
+    of_override: str = "override: "  # prefix of the keys of overrides
 
     def found(self, key: str) -> tuple[str, Place | None]:
         """Return the file of a dotted key and the place in it; no file for overrides and cases of Python."""

@@ -25,19 +25,12 @@ _GRID = ("x", "y", "values")
 
 @dataclass(frozen=True)
 class NodalCoefficient:
-    """A coefficient of friction that differs from node to node.
+    """A coefficient of friction that differs from node to node."""
 
-    Attributes
-    ----------
-    source : callable, ndarray or Path
-        A function of x and y (m), values over the nodes of a window, the file of a map, or its points and
-        values.
-    in_deck : str or dict
-        Value in a deck.
-    """
-
+    # a function of x and y (m), values over the nodes of a window, the file of a map, or its points and
+    # values
     source: Any = field(compare=False)
-    in_deck: Any = FROM_PYTHON
+    in_deck: Any = FROM_PYTHON  # value in a deck
 
     def __str__(self) -> str:
         """Return the text of a deck; of a map only its size."""

@@ -26,24 +26,12 @@ MOST_SERIES = 1000  # files of series
 
 
 class Assembled(NamedTuple):
-    """A deck assembled from its sources.
+    """A deck assembled from its sources."""
 
-    Attributes
-    ----------
-    data : dict
-        The tables, without `include` and without files of series.
-    text : str or None
-        Text of the whole deck, or None if it has several sources.
-    source : Source
-        Places of the keys.
-    problems : list of Mistake
-        Mistakes in series, which stay as they were.
-    """
-
-    data: dict[str, Any]
-    text: str | None
-    source: Source
-    problems: list[Mistake]
+    data: dict[str, Any]  # the tables, without `include` and without files of series
+    text: str | None  # text of the whole deck, or None if it has several sources
+    source: Source  # places of the keys
+    problems: list[Mistake]  # mistakes in series, which stay as they were
 
     @property
     def remark(self) -> str:

@@ -26,26 +26,14 @@ from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 
 class Driven(NamedTuple):
-    """A load or motion with its own key in decks and files of series.
+    """A load or motion with its own key in decks and files of series."""
 
-    Attributes
-    ----------
-    kind : Quantity
-        Kind of its values.
-    of_segment, of_row : str
-        Meaning of the key in [[load]] and in a series.
-    header, rows : str
-        Examples of the header of a column and of an array of values in a deck.
-    example : str
-        Example of a value, if that of its dimension does not suit.
-    """
-
-    kind: Quantity
-    of_segment: str
+    kind: Quantity  # kind of its values
+    of_segment: str  # meaning of the key in [[load]] and in a series
     of_row: str
-    header: str
+    header: str  # examples of the header of a column and of an array of values in a deck
     rows: str
-    example: str = ""
+    example: str = ""  # example of a value, if that of its dimension does not suit
 
 
 _FORCES, _LENGTHS = '["1 N", "2 N"]', '["1 um", "2 um"]'

@@ -19,24 +19,12 @@ if TYPE_CHECKING:
 
 
 class Dimension(NamedTuple):
-    """The dimension of a number.
+    """The dimension of a number."""
 
-    Attributes
-    ----------
-    name : str
-        Noun with its article, for messages: "a length".
-    unit : str
-        The SI unit, spelt for pint; "" for a pure number.
-    example : str
-        Example of a value, with quotes.
-    bare : bool
-        Whether a number without a unit is taken as SI.
-    """
-
-    name: str
-    unit: str
-    example: str
-    bare: bool = True
+    name: str  # noun with its article, for messages: "a length"
+    unit: str  # the SI unit, spelt for pint; "" for a pure number
+    example: str  # example of a value, with quotes
+    bare: bool = True  # whether a number without a unit is taken as SI
 
 
 LENGTH = Dimension("a length", "m", '"1 mm"')

@@ -28,21 +28,11 @@ _MEANING = {
 
 @dataclass(frozen=True)
 class Region:
-    """Where stresses are wanted.
+    """Where stresses are wanted."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (..., 3)
-        x, y and depth of points (m); those of all nodes and planes for a box.
-    dims : tuple of str
-        Dimensions of the points.
-    lattice : Lattice or None
-        The nodes of a box, of which `depths` are the planes.
-    """
-
-    points: Array
-    dims: tuple[str, ...]
-    lattice: Lattice | None = None
+    points: Array  # x, y and depth of points (m); those of all nodes and planes for a box, (..., 3)
+    dims: tuple[str, ...]  # dimensions of the points
+    lattice: Lattice | None = None  # the nodes of a box, of which `depths` are the planes
     depths: Array = dataclasses.field(default_factory=lambda: np.empty(0))
 
     @property

@@ -25,22 +25,14 @@ Stress = tuple[float, float, float]
 
 
 class Target(NamedTuple):
-    """The prescribed load or displacement of one rigid motion in one load step.
+    """The prescribed load or displacement of one rigid motion in one load step."""
 
-    Attributes
-    ----------
-    control : "force" or "displacement"
-        The prescribed one of a conjugate pair: normal load or approach, tangential load or shift, torque or
-        twist.
-    value : float
-        The prescribed value (N, N m, m or rad), or the known part of it.
-    from_start : float
-        Share of the value that this quantity had at the beginning of the segment. It is not zero only within
-        a segment of several steps after the other control, since that value is a result, not an input.
-    """
-
+    # the prescribed one of a conjugate pair: normal load or approach, tangential load or shift, torque or
+    # twist
     control: Control
-    value: float
+    value: float  # the prescribed value (N, N m, m or rad), or the known part of it
+    # share of the value that this quantity had at the beginning of the segment; it is not zero only within a
+    # segment of several steps after the other control, since that value is a result, not an input
     from_start: float = 0.0
 
     def at(self, start: float) -> float:
@@ -49,24 +41,12 @@ class Target(NamedTuple):
 
 
 class Ramp(NamedTuple):
-    """A segment in increments that are chosen during its solution (``steps = "auto"``).
+    """A segment in increments that are chosen during its solution (``steps = "auto"``)."""
 
-    Attributes
-    ----------
-    segment : Segment
-        The segment of the deck.
-    start : mapping of str to Target
-        Target of each motion at its beginning.
-    virgin : bool
-        Whether all is zero at its beginning.
-    bulk : tuple of float
-        Bulk stress at its beginning (Pa).
-    """
-
-    segment: Segment
-    start: Mapping[Motion, Target]
-    virgin: bool
-    bulk: Stress = (0.0, 0.0, 0.0)
+    segment: Segment  # the segment of the deck
+    start: Mapping[Motion, Target]  # target of each motion at its beginning
+    virgin: bool  # whether all is zero at its beginning
+    bulk: Stress = (0.0, 0.0, 0.0)  # bulk stress at its beginning (Pa)
 
     @property
     def largest(self) -> float:
@@ -84,36 +64,18 @@ class Ramp(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadStep:
-    """One load step, or a segment whose load steps are chosen during its solution.
+    """One load step, or a segment whose load steps are chosen during its solution."""
 
-    Attributes
-    ----------
-    index : int
-        Counts from 0 over the whole history.
-    segment : int
-        Counts from 0; each turn of a repeated path is a segment of its own.
-    label : str
-        Name of the segment, may be empty.
-    z, x, y, twist : Target
-        Targets of the normal motion, the two tangential ones and the rotation about z.
-    fraction : float
-        Fraction of the segment at the end of the step.
-    ramp : Ramp or None
-        The ramp of a segment in chosen increments.
-    bulk : tuple of float
-        Bulk stress xx, yy, xy (Pa).
-    """
-
-    index: int
-    segment: int
-    label: str
-    z: Target
+    index: int  # counts from 0 over the whole history
+    segment: int  # counts from 0; each turn of a repeated path is a segment of its own
+    label: str  # name of the segment, may be empty
+    z: Target  # targets of the normal motion, the two tangential ones and the rotation about z
     x: Target
     y: Target
     twist: Target
-    fraction: float = 1.0
-    ramp: Ramp | None = None
-    bulk: Stress = (0.0, 0.0, 0.0)
+    fraction: float = 1.0  # fraction of the segment at the end of the step
+    ramp: Ramp | None = None  # the ramp of a segment in chosen increments
+    bulk: Stress = (0.0, 0.0, 0.0)  # bulk stress xx, yy, xy (Pa)
 
     def until(self, fraction: float) -> LoadStep:
         """Return the part of an adaptive segment that ends at a fraction of it."""

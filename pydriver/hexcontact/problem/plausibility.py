@@ -30,24 +30,12 @@ if TYPE_CHECKING:
 
 
 class Limit(NamedTuple):
-    """A limit of an expected value.
+    """A limit of an expected value."""
 
-    Attributes
-    ----------
-    quantity : str
-        One of `expected`.
-    least, most : float
-        Range without a warning.
-    words : str
-        The warning, with quantities in braces.
-    reason : str
-        Reason for the limit, with its source.
-    """
-
-    quantity: str
-    words: str
-    reason: str
-    least: float = -math.inf
+    quantity: str  # one of `expected`
+    words: str  # the warning, with quantities in braces
+    reason: str  # reason for the limit, with its source
+    least: float = -math.inf  # range without a warning
     most: float = math.inf
 
     @property

@@ -16,18 +16,10 @@ SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794)
 
 
 class Trial(NamedTuple):
-    """A lattice of a refinement.
+    """A lattice of a refinement."""
 
-    Parameters
-    ----------
-    level : int
-        How often it was refined.
-    copy : int
-        0: the lattice itself, else the number of its shifted copy.
-    """
-
-    level: int
-    copy: int = 0
+    level: int  # how often it was refined
+    copy: int = 0  # 0: the lattice itself, else the number of its shifted copy
 
     def case(self, case: Problem) -> Problem:
         """Return the case on this lattice."""

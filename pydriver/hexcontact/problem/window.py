@@ -43,37 +43,19 @@ class NoContactFound(Exception):
 
 
 class Estimate(NamedTuple):
-    """Rough place and size of the contact.
+    """Rough place and size of the contact."""
 
-    Attributes
-    ----------
-    radius : float
-        Radius (m) of the disc as large as the contact area.
-    half_width : float
-        Smaller semi-axis (m) of the ellipse with the second moments of the contact area.
-    lower, upper : ndarray, (2,)
-        Smallest and largest lattice coordinates (m along the first and second basis vector, from the origin)
-        of nodes in contact.
-    cell : float
-        Coarse spacing (m); the edge of the contact is within one cell of the bounds.
-    size : ndarray, (2,)
-        Extent (m) of the contact in x and in y.
-    max_pressure : float
-        Largest pressure (Pa).
-    slope : float
-        Largest slope of the gap within the contact.
-    body_slopes : tuple of float
-        Those of the surfaces of body 1 and body 2; empty if only their gap is known.
-    """
-
-    radius: float
-    half_width: float
+    radius: float  # radius (m) of the disc as large as the contact area
+    half_width: float  # smaller semi-axis (m) of the ellipse with the second moments of the contact area
+    # smallest and largest lattice coordinates (m along the first and second basis vector, from the origin) of
+    # nodes in contact, (2,)
     lower: Array
     upper: Array
-    cell: float
-    size: Array
-    max_pressure: float
-    slope: float
+    cell: float  # coarse spacing (m); the edge of the contact is within one cell of the bounds
+    size: Array  # extent (m) of the contact in x and in y, (2,)
+    max_pressure: float  # largest pressure (Pa)
+    slope: float  # largest slope of the gap within the contact
+    # those of the surfaces of body 1 and body 2; empty if only their gap is known
     body_slopes: tuple[float, ...] = ()
 
     @property

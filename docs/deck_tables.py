@@ -11,9 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hexcontact.deck import series, surfaces, tables
+from hexcontact.deck import keys as deck_keys
+from hexcontact.deck import series, surfaces
 from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Several, Text, Whole, Word, WordOr
-from hexcontact.deck.model import Table, expectation, kind_of
+from hexcontact.deck.table_base import Table, expectation, kind_of
 from hexcontact.problem import plausibility
 from hexcontact.study.backends.dask import Dask
 from hexcontact.study.tables import Parameter, StudyFile
@@ -22,21 +23,21 @@ from hexcontact.text import shown
 PAGE = Path(__file__).with_name("deck.md")
 PAGES = (PAGE, PAGE.with_name("studies.md"), PAGE.with_name("theory") / "expected_errors.md")
 TABLES: dict[str, type[Table]] = {
-    "deck": tables.Deck,
-    "body": tables.Body,
-    "interface": tables.Interface,
-    "friction": tables.Friction,
-    "bulk": tables.Bulk,
-    "grid": tables.Grid,
-    "solver": tables.Solver,
-    "load": tables.Load,
+    "deck": deck_keys.Deck,
+    "body": deck_keys.Body,
+    "interface": deck_keys.Interface,
+    "friction": deck_keys.Friction,
+    "bulk": deck_keys.Bulk,
+    "grid": deck_keys.Grid,
+    "solver": deck_keys.Solver,
+    "load": deck_keys.Load,
     "series": series.Series,
     "columns": series.Columns,
-    "accuracy": tables.Accuracy,
-    "wear": tables.Wear,
-    "output": tables.Output,
-    "stress": tables.Stress,
-    "fatigue": tables.Fatigue,
+    "accuracy": deck_keys.Accuracy,
+    "wear": deck_keys.Wear,
+    "output": deck_keys.Output,
+    "stress": deck_keys.Stress,
+    "fatigue": deck_keys.Fatigue,
     "study": StudyFile,
     "parameter": Parameter,
     "dask": Dask,

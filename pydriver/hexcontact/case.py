@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array
 from .core.lattice import Lattice
+from .deck.keys import FINENESS, Grid, Solver
 from .deck.read import Assembled, assemble
-from .deck.tables import FINENESS, Grid, Solver
 from .deck.toml import refuse_deep, with_overrides
 from .deck.write import plain
 from .errors import DeckError, PlausibilityWarning, warn

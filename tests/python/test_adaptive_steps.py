@@ -14,7 +14,7 @@ from validation.hard_problems import errors_over_bounds
 from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables
 from hexcontact.core.steps import LEAST
-from hexcontact.deck.schema import deck_schema
+from hexcontact.deck.json_schema import deck_schema
 from hexcontact.problem import estimates, overview
 from hexcontact.result import history
 from hexcontact.result.history import describe

@@ -18,7 +18,7 @@ from hexcontact.analytic import hertz_ellipse
 from hexcontact.case import Body, Case
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.lattice import Lattice
-from hexcontact.deck import tables
+from hexcontact.deck import keys as tables
 from hexcontact.deck.faults import Source
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
 from hexcontact.deck.write import STARTERS, starter, written

@@ -9,11 +9,11 @@ from typing import Any, get_args
 
 import pytest
 
-from hexcontact.deck import tables
+from hexcontact.deck import keys as tables
 from hexcontact.deck.faults import Source, places
-from hexcontact.deck.model import Table, kind_of
+from hexcontact.deck.keys import Deck, Load, Segment
 from hexcontact.deck.surfaces import SHAPES, Sphere, Surface
-from hexcontact.deck.tables import Deck, Load, Segment
+from hexcontact.deck.table_base import Table, kind_of
 from hexcontact.deck.toml import parse_toml, read_toml, with_overrides
 from hexcontact.errors import DeckError
 from hexcontact.problem.loads import History, LoadStep, Target, load_steps

@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 from hexcontact import Case
 from hexcontact.cli.app import app
 from hexcontact.deck.faults import Source
+from hexcontact.deck.keys import Deck
 from hexcontact.deck.series import read_series
-from hexcontact.deck.tables import Deck
 from hexcontact.deck.write import written
 from hexcontact.errors import DeckError
 from hexcontact.problem.estimates import operator_applications, seconds

@@ -23,7 +23,7 @@ from hexcontact import DeckError, PathWarning, fatigue, open_result, plotting
 from hexcontact.cli.app import app
 from hexcontact.deck.below import cycle_of, steps_fault
 from hexcontact.interior import stress as stress_below
-from hexcontact.interior.tables import read_table
+from hexcontact.interior.files import read_table
 from hexcontact.plotting import trailing_edge
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 41)

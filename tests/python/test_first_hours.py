@@ -24,7 +24,7 @@ import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.case import Body
 from hexcontact.cli.app import app
-from hexcontact.deck import model
+from hexcontact.deck import table_base
 from hexcontact.deck.surfaces import SHAPES
 from hexcontact.deck.write import starter
 from hexcontact.surfaces import Sphere
@@ -367,7 +367,7 @@ def test_a_diameter_names_the_radius(folder: Path, size: str, words: str) -> Non
 )
 def test_features_that_are_not_included_point_to_the_limits(folder: Path, key: str) -> None:
     page = (Path(__file__).parents[2] / "docs/limits.md").read_text(encoding="utf-8")
-    for name in model._NOT_INCLUDED:
+    for name in table_base._NOT_INCLUDED:
         assert any(word[:10] in page for word in name.split() if word not in ("and", "bodies"))
     with pytest.raises(DeckError, match=r"unknown key; [a-z ]+: not included \(docs/limits\.md says"):
         Case.from_toml("deck.toml", {f"body.1.{key}": 1})

@@ -20,11 +20,11 @@ from pydantic_core import PydanticCustomError
 import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.options import setting, steps_of
+from hexcontact.deck.keys import Deck
 from hexcontact.deck.kinds import Kind
-from hexcontact.deck.model import Table, kind_of, parts_of
 from hexcontact.deck.series import read_series
 from hexcontact.deck.surfaces import SHAPES
-from hexcontact.deck.tables import Deck
+from hexcontact.deck.table_base import Table, kind_of, parts_of
 from hexcontact.deck.write import starter
 from hexcontact.study.tables import StudyFile
 

@@ -13,8 +13,8 @@ from numpy.testing import assert_array_equal
 
 import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, Result, Step, StopRun, open_result
+from hexcontact.deck.keys import Load
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.deck.tables import Load
 from hexcontact.result.journal import journal_of
 from hexcontact.solve import run
 

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 from hexcontact.cli.app import app
 from hexcontact.deck.faults import Source
-from hexcontact.deck.schema import deck_schema
-from hexcontact.deck.tables import Deck
+from hexcontact.deck.json_schema import deck_schema
+from hexcontact.deck.keys import Deck
 from hexcontact.deck.write import STARTERS, starter
 
 ROOT = Path(__file__).parents[2]

@@ -27,7 +27,7 @@ import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck.kinds import Whole
-from hexcontact.deck.model import extended, meaning
+from hexcontact.deck.table_base import extended, meaning
 from hexcontact.deck.toml import with_overrides
 from hexcontact.deck.write import starter
 from hexcontact.problem.problem import Problem

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hexcontact.case import Case
+from hexcontact.deck.json_schema import deck_schema
+from hexcontact.deck.keys import Body
 from hexcontact.deck.kinds import Quantity
-from hexcontact.deck.model import meaning
-from hexcontact.deck.schema import deck_schema
 from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
@@ -28,7 +28,7 @@ from hexcontact.deck.surfaces import (
     principal_curvatures,
     shape,
 )
-from hexcontact.deck.tables import Body
+from hexcontact.deck.table_base import meaning
 from hexcontact.deck.units import NUMBER
 from hexcontact.errors import DeckError
 

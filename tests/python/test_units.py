@@ -140,7 +140,7 @@ def test_lengths_in_messages_are_readable(length: float, text: str) -> None:
 
 def test_pint_is_imported_only_for_unusual_units() -> None:
     script = (
-        "import sys; import hexcontact.deck.tables as d; from hexcontact.deck.units import *;"
+        "import sys; import hexcontact.deck.keys as d; from hexcontact.deck.units import *;"
         "to_si('3 mm', LENGTH), to_si('2 GPa', PRESSURE), to_si('1 kN', FORCE), to_si('3 deg', ANGLE);"
         "to_si('2 N mm', TORQUE);"
         "assert not {'pint', 'scipy', 'xarray', 'matplotlib', 'netCDF4'} & set(sys.modules), 'early import';"

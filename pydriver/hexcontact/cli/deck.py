@@ -74,7 +74,7 @@ def schema(
     study: Annotated[bool, flag("study", "Write the schema of study files instead.")] = False,
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
-    from ..deck.schema import deck_schema
+    from ..deck.json_schema import deck_schema
     from ..study.tables import study_schema
 
     text = json.dumps(study_schema() if study else deck_schema(), indent=2, ensure_ascii=False) + "\n"

@@ -26,7 +26,7 @@ from ..deck.recorded import recorded
 from ..errors import DeckError, HexcontactError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
-from ..interior.tables import read_table, tables_of
+from ..interior.files import read_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
 from ..problem.problem import Problem

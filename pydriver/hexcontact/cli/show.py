@@ -13,7 +13,7 @@ from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_
 @command("hexcontact info hertz_spheres.nc")
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
-    from ..interior.tables import content_of, description
+    from ..interior.files import content_of, description
     from ..result.store import open_result
     from ..study import shown
     from . import tables
@@ -73,7 +73,7 @@ def export(
     """Write a result for other programs; of a study the table of its cases, of a table its values."""
     if not (vtk or ugrid or csv or histories):
         raise DeckError("expected --vtk, --ugrid, --csv or --histories")
-    from ..interior.tables import read_table
+    from ..interior.files import read_table
     from ..result import export as write
     from ..result.store import open_result
     from ..study import shown

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 from ..text import did_you_mean, listed
 from ..variables import STRESSES
 from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
-from .model import Table, meaning
+from .table_base import Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
 

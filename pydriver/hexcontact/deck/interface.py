@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 from ..arrays import Array
 from .formula import Formula
 from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
-from .model import Table, meaning
+from .table_base import Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, to_si
 
 FROM_PYTHON = "python"  # in the deck of a case with a coefficient from Python

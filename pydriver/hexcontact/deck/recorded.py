@@ -8,8 +8,8 @@ from typing import Any
 from .._version import __version__
 from .faults import Mistake, Source, deck_error
 from .interface import FROM_PYTHON
+from .keys import Deck
 from .surfaces import Separation, Surface
-from .tables import Deck
 from .toml import parse_toml
 
 

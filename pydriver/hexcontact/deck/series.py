@@ -21,7 +21,7 @@ from ..files import is_defect, require_ordinary, text_of
 from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
-from .model import Table, extended, meaning
+from .table_base import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 

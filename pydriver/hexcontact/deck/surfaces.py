@@ -37,7 +37,7 @@ from .kinds import (
     Word,
     refuse,
 )
-from .model import Argument, meaning, refuse_key
+from .table_base import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")

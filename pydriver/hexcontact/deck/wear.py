@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 from .kinds import Quantity, Text, Whole, WordOr
-from .model import Table, meaning
+from .table_base import Table, meaning
 from .units import NUMBER, Dimension
 
 COEFFICIENT = Dimension("a coefficient of wear", "m^2/N", '"1e-15 m^2/N"')

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .model import Table
-from .tables import Deck
+from .keys import Deck
+from .table_base import Table
 
 STARTERS = (
     *("sphere", "fretting", "paraboloid", "crossed_cylinders"),

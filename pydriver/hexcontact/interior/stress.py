@@ -19,8 +19,8 @@ from ..core.contact import ElasticPair
 from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
+from ..deck.keys import Body
 from ..deck.recorded import recorded
-from ..deck.tables import Body
 from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
 from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS

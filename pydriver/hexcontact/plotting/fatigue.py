@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from ..arrays import Array
 from ..deck.below import Fatigue
 from ..errors import NotInResult
-from ..interior.tables import at_hand, tables_of
+from ..interior.files import at_hand, tables_of
 from ..result.result import Result
 from ..result.view import StepView, title_of
 from ..text import scaled

@@ -8,11 +8,11 @@ from collections.abc import Callable, Collection, Iterable
 from typing import Any, ParamSpec, TypeVar
 
 from ..core.lattice import Lattice
-from ..deck import tables
+from ..deck import keys as deck_keys
 from ..deck.interface import Interface
-from ..deck.model import SYMBOLS, Argument, Table, not_included
 from ..deck.series import DRIVEN
 from ..deck.surfaces import Surface
+from ..deck.table_base import SYMBOLS, Argument, Table, not_included
 from ..deck.wear import Wear
 from ..deck.write import plain
 from ..text import listed, nearest
@@ -20,12 +20,12 @@ from ..text import listed, nearest
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _TABLES: dict[str, type[Table]] = {  # of arguments that take one
-    "body_1": tables.Body,
-    "bulk": tables.Bulk,
+    "body_1": deck_keys.Body,
+    "bulk": deck_keys.Bulk,
     "interface": Interface,
-    "accuracy": tables.Accuracy,
+    "accuracy": deck_keys.Accuracy,
     "wear": Wear,
-    "loads": tables.Load,
+    "loads": deck_keys.Load,
 }
 
 
@@ -59,7 +59,7 @@ def refuse_unknown(keywords: Iterable[str], known: Collection[str], title: str) 
     raise TypeError(f"{name}: unknown argument of {title}; {not_included(name) or hint}")
 
 
-class Body(Argument, tables.Body):
+class Body(Argument, deck_keys.Body):
     """One of the two bodies, an argument of `hexcontact.Case`.
 
     Attributes
@@ -82,7 +82,7 @@ class Body(Argument, tables.Body):
         rigid: bool = False,
         surface: Surface | None = None,
     ) -> None:
-        keys = {name: value for name, value in locals().items() if name in tables.Body.model_fields}
+        keys = {name: value for name, value in locals().items() if name in deck_keys.Body.model_fields}
         super().__init__(**plain(keys))
 
 

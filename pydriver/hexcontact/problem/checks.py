@@ -9,9 +9,9 @@ from typing import Any
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import Friction, Interface, TwoCoefficients, coulomb
+from ..deck.keys import Deck, Output, Solver
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
-from ..deck.tables import Deck, Output, Solver
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, LOADS, WORN

@@ -13,9 +13,9 @@ from itertools import takewhile
 from typing import Any, Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
+from ..deck.keys import Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
 from ..deck.series import MOST_STEPS
-from ..deck.tables import Bulk, Load, Segment
 from ..variables import BULK_STRESS, LOADS
 
 Control = Literal["force", "displacement"]

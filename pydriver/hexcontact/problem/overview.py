@@ -11,9 +11,9 @@ from typing import Any
 
 from ..core.lattice import Lattice
 from ..deck.interface import FROM_PYTHON, NodalCoefficient, TwoCoefficients
+from ..deck.keys import Body, Bulk
 from ..deck.kinds import Quantity
 from ..deck.surfaces import Surface
-from ..deck.tables import Body, Bulk
 from ..text import Row, percent, quantity
 from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility

@@ -20,9 +20,9 @@ from ..core.measures import bulk_strain
 from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.interface import FROM_PYTHON, coulomb
+from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.tables import BULK_STATES, Accuracy, Grid
 from ..deck.write import as_toml, plain
 from ..errors import DeckError
 from ..text import listed

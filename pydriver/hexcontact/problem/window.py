@@ -18,7 +18,7 @@ from ..arrays import Array, Mask, reals
 from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
 from ..core.lattice import Lattice
 from ..deck.faults import MISSING, Mistake
-from ..deck.tables import Grid
+from ..deck.keys import Grid
 from ..deck.units import readable
 
 GapFunction = Callable[[Array, Array], Array]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.lattice import Lattice
-from ..deck.tables import BULK_STATES
+from ..deck.keys import BULK_STATES
 from ..variables import (
     FIELDS,
     FIXED,

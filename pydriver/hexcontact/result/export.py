@@ -17,8 +17,8 @@ from .._version import __version__
 from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
+from ..interior.files import as_volume, at_hand, tables_of
 from ..interior.stress import TENSOR
-from ..interior.tables import as_volume, at_hand, tables_of
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh

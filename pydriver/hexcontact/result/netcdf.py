@@ -231,7 +231,7 @@ def stress_files(deck: str, output: Path) -> dict[str, Path]:
     """Return the files beside an output that hold the tables [[stress]] and [[fatigue]], by their names."""
     if not any(name in deck for name in _BELOW):
         return {}
-    from ..interior.tables import files_of
+    from ..interior.files import files_of
 
     return files_of(deck, output)
 

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from ..deck.formula import Formula
 from ..deck.interface import FrictionKind, NodalCoefficient, TwoCoefficients
 from ..deck.kinds import Kind, OrShare, Quantity, Share, Whole, WordOr
-from ..deck.model import Table, kind_of
+from ..deck.table_base import Table, kind_of
 from ..deck.units import NUMBER, UnitError, to_si
 from ..errors import DeckError
 from ..text import shown

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from ..deck.faults import Source
+from ..deck.keys import Deck
 from ..deck.read import assemble
-from ..deck.tables import Deck
 from ..deck.toml import with_overrides
 from ..deck.write import as_toml
 from ..errors import DeckError

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from ..deck.formula import Formula
+from ..deck.json_schema import schema_of
 from ..deck.kinds import Kind, Schema, Several, Text, Whole, Word, refuse
-from ..deck.model import Table, extended, meaning
-from ..deck.schema import schema_of
+from ..deck.table_base import Table, extended, meaning
 from . import backends  # noqa: F401 (each registers its key)
 from .backend import KEYS
 from .job import MOST_CASES

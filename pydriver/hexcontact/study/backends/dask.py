@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ...deck.kinds import Text, Whole, Word
-from ...deck.model import Table, meaning
+from ...deck.table_base import Table, meaning
 from ...errors import DeckError, ResourceError
 from ..backend import Backend, OptionTable, arrived, backend
 from ..job import MOST_CASES, Job, Outcome, solve_case

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from ...deck.model import meaning, refuse_key
+from ...deck.table_base import meaning, refuse_key
 from ...errors import DeckError
 from ..backend import OptionTable, backend
 

@@ -34,9 +34,9 @@ from .kinds import (
     WordOr,
     refuse,
 )
-from .model import Table, extended, kind_of, meaning, parts_of, problems_of
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
+from .table_base import Table, extended, kind_of, meaning, parts_of, problems_of
 from .units import LENGTH, NUMBER, PRESSURE
 from .wear import Wear
 

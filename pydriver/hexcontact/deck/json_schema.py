@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 from pydantic.json_schema import GenerateJsonSchema
 
+from .keys import Deck
 from .kinds import Schema
-from .model import Table, kind_of
-from .tables import Deck
+from .table_base import Table, kind_of
 
 
 class _Generator(GenerateJsonSchema):

@@ -294,9 +294,12 @@ def test_parameters_are_those_of_the_stresses_block_by_block(
         assert found.attrs["tractions"] == stress.attrs["tractions"] == "edges"
     monkeypatch.setattr("hexcontact.interior.fatigue._BLOCK", 1)
     monkeypatch.setattr("hexcontact.interior.fatigue._AT_ONCE", 3)
-    monkeypatch.setattr("hexcontact.interior.fatigue.tractions", _light)
+    monkeypatch.setattr("hexcontact.interior.stress.tractions", _light)
     assert result.fatigue(*names, **CYCLE).equals(surface)
     assert result.fatigue("findley", findley_slope=0.3, **CYCLE, **plane).equals(section)
+
+
+TRACTIONS = stress_below.tractions
 
 
 class _Light(np.ndarray):
@@ -306,7 +309,7 @@ class _Light(np.ndarray):
 
 
 def _light(*given: object) -> tuple[np.ndarray, str]:
-    loads, source = stress_below.tractions(*given)
+    loads, source = TRACTIONS(*given)
     return loads.view(_Light), source
 
 

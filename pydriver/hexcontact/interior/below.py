@@ -18,7 +18,7 @@ from ..variables import EDGES, INTERFACE, TRACTIONS
 from .extremes import with_places
 from .fatigue import SLIPS, histories, parameters_below, tabulated
 from .region import region
-from .stress import LOADED, Surface, below, bodies_of, nodal_tractions
+from .stress import LOADED, Loaded, below, bodies_of, nodal_tractions
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -84,14 +84,16 @@ class BelowSurface(ABC):
         if not numbers:
             raise DeckError("step: expected the number of a step, or some of them")
         several = None if one else numbers
-        steps = self._loaded(numbers, edges=source != "nodes")
-        given = bodies_of(self.deck), body, where, components, several
-        more: dict[str, Any] = {"friction": self._friction, "source": source}
-        return with_places(below(self.lattice, steps, *given, **more, surface=self._surface(numbers)))
+        loaded = self._body(body, numbers, edges=source != "nodes")
+        return with_places(below(loaded, where, components, several, source))
 
-    def _surface(self, numbers: Sequence[int]) -> Surface:
-        """Return what gives the tractions over the surface of some steps, to the edges."""
-        return lambda place: self.traction_field(numbers[place], "edges")
+    def _body(
+        self, body: int, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = True
+    ) -> Loaded:
+        """Return a body under the tractions of some steps."""
+        steps = self._loaded(numbers, more, edges)
+        given = self.lattice, steps, bodies_of(self.deck), body, self._friction
+        return Loaded(*given, surface=lambda place: self.traction_field(numbers[place], "edges"))
 
     @property
     def _friction(self) -> float:
@@ -143,11 +145,8 @@ class BelowSurface(ABC):
                 "adaptive steps a smaller solver.step_tolerance",
                 PathWarning,
             )
-        loaded = self._loaded(numbers, SLIPS if "ruiz" in parameters else (), edges=True)
-        where = given or Fatigue.default_region
-        bodies, friction = bodies_of(self.deck), self._friction
-        surface = self._surface(numbers)
-        found = parameters_below(self.lattice, loaded, bodies, body, where, criteria, friction, surface)
+        loaded = self._body(body, numbers, SLIPS if "ruiz" in parameters else ())
+        found = parameters_below(loaded, given or Fatigue.default_region, criteria)
         about: dict[str, Any] = {"steps": np.array(numbers, dtype="i4")}
         if (change := self._change_over(numbers)) is not None:
             about["change_over_cycle"] = change
@@ -167,9 +166,7 @@ class BelowSurface(ABC):
         """
         numbers = self.cycle_steps(segment, steps)
         found = region(self.lattice, **(where or Fatigue.default_region))
-        loaded = self._loaded(numbers, edges=True)
-        given = bodies_of(self.deck), body, found, self._friction, self._surface(numbers)
-        for part, history in histories(self.lattice, loaded, *given):
+        for part, history in histories(self._body(body, numbers), found):
             yield tabulated(found, part, history, numbers)
 
     def cycle_steps(

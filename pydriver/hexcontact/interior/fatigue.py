@@ -18,18 +18,7 @@ from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError
 from . import fields
 from .region import Region, region
-from .stress import (
-    Bodies,
-    Fields,
-    NearSurface,
-    Surface,
-    add_bulk,
-    material,
-    source_of,
-    summed,
-    tractions,
-    window_over,
-)
+from .stress import Fields, Loaded, NearSurface, add_bulk, source_of, summed, window_over
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -116,32 +105,23 @@ def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
     return 2 * loads + block + besides + 104 * where.count
 
 
-def histories(
-    lattice: Lattice,
-    steps: Sequence[Fields],
-    bodies: Bodies,
-    body: int,
-    where: Region,
-    friction: float,
-    surface: Surface,
-) -> Iterator[tuple[slice, Array]]:
+def histories(loaded: Loaded, where: Region) -> Iterator[tuple[slice, Array]]:
     """Yield stress histories (points, steps, 6) of a region by blocks, each with the slice of its points."""
-    loads, used = tractions(lattice, steps, bodies, friction, None)
-    found = _of_tractions(lattice, steps, loads, body, material(bodies, body)[0], where)
+    loads, used = loaded.tractions()
+    found = _of_tractions(loaded, loads, where)
     if used == "nodes":
         yield from found
         return
-    near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
+    near_surface = NearSurface(loaded, loads)
     points = where.nodes.reshape(-1, 3)
     for part, history in found:
         near_surface.correct(np.swapaxes(history, 0, 1), points[part])
         yield part, history
 
 
-def _of_tractions(
-    lattice: Lattice, steps: Sequence[Fields], loads: Array, body: int, poisson_ratio: float, where: Region
-) -> Iterator[tuple[slice, Array]]:
+def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple[slice, Array]]:
     """Yield the histories that follow from the tractions of the lattice."""
+    lattice, steps, body, poisson_ratio = loaded.lattice, loaded.steps, loaded.body, loaded.material[0]
     block = max(_BLOCK, loads.nbytes)
     most = max(block // (48 * len(steps)), 1)
     memory.require(
@@ -181,26 +161,17 @@ def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
     return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
 
 
-def parameters_below(
-    lattice: Lattice,
-    steps: Sequence[Fields],
-    bodies: Bodies,
-    body: int,
-    where: Mapping[str, Any],
-    criteria: Criteria,
-    friction: float,
-    surface: Surface,
-) -> xarray.Dataset:
+def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteria) -> xarray.Dataset:
     """Return fatigue parameters of a body."""
     import xarray
 
-    found = region(lattice, **where)
-    nu, shear_modulus = material(bodies, body)
+    found = region(loaded.lattice, **where)
+    nu, shear_modulus = loaded.material
     moduli = {"young_modulus": 2.0 * shear_modulus * (1.0 + nu), "poisson_ratio": nu}
     moduli["shear_modulus"] = shear_modulus
-    slip = _surface_slip(lattice, steps, found) if "ruiz" in criteria.parameters else None
+    slip = _surface_slip(loaded.lattice, loaded.steps, found) if "ruiz" in criteria.parameters else None
     values: dict[str, Array] = {}
-    for part, history in histories(lattice, steps, bodies, body, found, friction, surface):
+    for part, history in histories(loaded, found):
         nodal = None if slip is None else slip[..., part]
         block: dict[str, Array] = {}
         for name in sorted(set(criteria.parameters), key=list(NEEDS).index):  # life after its parameter
@@ -213,7 +184,7 @@ def parameters_below(
             for key, some in values.items()
         },
         coords=found.coordinates,
-        attrs={"body": np.int32(body), "tractions": source_of(steps)},
+        attrs={"body": np.int32(loaded.body), "tractions": source_of(loaded.steps)},
     )
 
 

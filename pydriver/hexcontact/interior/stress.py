@@ -86,6 +86,27 @@ def material(bodies: Bodies, body: int) -> tuple[float, float]:
     return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
 
+@dataclasses.dataclass(frozen=True)
+class Loaded:
+    """One of the two bodies under the tractions of load steps."""
+
+    lattice: Lattice  # window of the steps
+    steps: Sequence[Fields]  # tractions at the nodes, bulk stress, and the fields of `EDGES` if they are kept
+    bodies: Bodies
+    body: int  # 1 or 2
+    friction: float = 0.0
+    surface: Surface | None = None  # tractions to the edges, which the stress at depth 0 has exactly
+
+    @property
+    def material(self) -> tuple[float, float]:
+        """Poisson's ratio and shear modulus (Pa) of the body."""
+        return material(self.bodies, self.body)
+
+    def tractions(self, source: str | None = None) -> tuple[Array, str]:
+        """Return the tractions of the steps, and their source."""
+        return tractions(self.lattice, self.steps, self.bodies, self.friction, source)
+
+
 def nodal_tractions(steps: Sequence[Fields]) -> Array:
     """Return pressure and shear tractions of some steps as the core takes them, (step, 3, n_row, n_col)."""
     zero = np.zeros_like(np.asarray(steps[0]["pressure"], dtype=float))
@@ -143,25 +164,20 @@ def bulk_stresses(steps: Sequence[Fields], body: int) -> Array:
 
 
 def below(
-    lattice: Lattice,
-    steps: Sequence[Fields],
-    bodies: Bodies,
-    body: int,
+    loaded: Loaded,
     where: Mapping[str, Any],
     components: Sequence[str] = (),
     numbers: Sequence[int] | None = None,
-    *,
-    friction: float = 0.0,
     source: str | None = None,
-    surface: Surface | None = None,
 ) -> xarray.Dataset:
-    """Return quantities below the surface."""
+    """Return quantities below the surface; without `numbers` of steps there is one, and no such dimension."""
     import xarray
 
+    lattice, steps, body = loaded.lattice, loaded.steps, loaded.body
     found = region(lattice, **where)
     names = chosen_components(components)
-    nu, shear_modulus = material(bodies, body)
-    loads, used = tractions(lattice, steps, bodies, friction, source)
+    nu, shear_modulus = loaded.material
+    loads, used = loaded.tractions(source)
     if found.lattice is None or summed(lattice, found):
         moved, stress = _at_points(lattice, loads, body, nu, found)
     else:
@@ -172,7 +188,7 @@ def below(
     add_bulk(stress, steps, body)
     about: dict[str, Any] = {"body": np.int32(body), "tractions": used}
     if used == "edges":
-        near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
+        near_surface = NearSurface(loaded, loads)
         stress = np.ascontiguousarray(stress)
         near_surface.correct(stress.reshape(len(steps), -1, len(TENSOR)), found.nodes.reshape(-1, 3))
         about["edge_without_root"] = near_surface.refused
@@ -202,38 +218,29 @@ def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
 class NearSurface:
     """What the stress of hats misses next to the surface: roots at the edges, the tractions at depth 0."""
 
-    def __init__(
-        self,
-        lattice: Lattice,
-        steps: Sequence[Fields],
-        loads: Array,
-        bodies: Bodies,
-        body: int,
-        friction: float,
-        surface: Surface | None,
-    ) -> None:
-        self._lattice, self._steps, self._loads, self._surface = lattice, steps, loads, surface
-        self._body, self._poisson_ratio = body, material(bodies, body)[0]
-        self._law = _friction_of(loads[0, 0], friction)
+    def __init__(self, loaded: Loaded, loads: Array) -> None:
+        self._of, self._loads, self._poisson_ratio = loaded, loads, loaded.material[0]
+        self._law = _friction_of(loads[0, 0], loaded.friction)
         self.refused = 0.0  # largest share of an edge without a root
 
     def correct(self, stress: Array, points: Array) -> None:
         """Correct the stress (step, point, 6) at points (point, 3), m."""
-        near = points[:, 2] < NEAR * self._lattice.spacing
+        lattice, surface = self._of.lattice, self._of.surface
+        near = points[:, 2] < NEAR * lattice.spacing
         if near.any():
-            for k, (step, loads) in enumerate(zip(self._steps, self._loads, strict=True)):
+            for k, (step, loads) in enumerate(zip(self._of.steps, self._loads, strict=True)):
                 [nodal] = nodal_tractions([step])
-                more, refused = _edges(self._lattice, nodal, step).stress(
+                more, refused = _edges(lattice, nodal, step).stress(
                     *(nodal[1:], np.asarray(step["zone"]) == _STICK, self._law, loads),
-                    *(self._body, self._poisson_ratio, points[near]),
+                    *(self._of.body, self._poisson_ratio, points[near]),
                 )
                 stress[k, near] += more
                 self.refused = max(self.refused, refused)
         free = points[:, 2] == 0.0
-        if self._surface is not None and free.any():
+        if surface is not None and free.any():
             x, y, _ = points[free].T
             for k in range(len(stress)):
-                for name, load in zip(_AT_SURFACE, self._surface(k)(x, y), strict=True):
+                for name, load in zip(_AT_SURFACE, surface(k)(x, y), strict=True):
                     stress[k, free, TENSOR.index(name)] = 0.0 - load  # no sign on zero
 
 

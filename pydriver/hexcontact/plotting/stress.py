@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
 from ..errors import NotInResult
-from ..interior.stress import LOADED, below, bodies_of
+from ..interior.stress import LOADED, Loaded, below, bodies_of
 from ..result.interpolate import tractions_of
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
@@ -147,7 +147,6 @@ def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
     fields = {name: view.data[name].values for name in wanted if view.has(name)}
     bodies = bodies_of(str(view.data.attrs.get("deck", "")))
     body = 2 if bodies and bodies[0].rigid else 1
-    given = view.lattice, [fields], bodies, body, {"points": points}, names
-    return below(
-        *given, friction=view.friction, surface=lambda _: tractions_of(view.data, view.lattice, "edges")
-    )
+    given = view.lattice, [fields], bodies, body, view.friction
+    loaded = Loaded(*given, surface=lambda _: tractions_of(view.data, view.lattice, "edges"))
+    return below(loaded, {"points": points}, names)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
-from ..deck.interface import Friction, Interface, TwoCoefficients, coulomb
-from ..deck.keys import Deck, Output, Solver
+from ..deck.interface import TwoCoefficients, coulomb
+from ..deck.keys import Deck, Solver
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
 from ..errors import DeckError
@@ -18,6 +18,10 @@ from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, LOADS, WORN
 from .loads import MOTIONS, LoadStep, cycle_entries, load_steps
 
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
+
+
+Found = Iterator[tuple[tuple[str | int, ...], str]]
+"""Key and sentence of each mistake; the value is that of the key."""
 
 
 def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[LoadStep]]:
@@ -33,132 +37,116 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[L
     solver: Any = tables.get("solver")
     steps: tuple[LoadStep, ...] = ()
     if {"friction", "interface", "solver", "bulk"} <= tables.keys():
-        friction, layer = tables["friction"], tables["interface"]
-        given_mu = coulomb(friction, layer)
-        if friction and layer and layer.friction_coefficient is not None:
-            sentence = "expected nothing, since [friction] has a coefficient; or no [friction]"
-            found.append(Mistake(("interface", "friction_coefficient"), layer.friction_coefficient, sentence))
-        algorithm, against = _algorithm(given_mu, solver)
+        mu = coulomb(tables["friction"], tables["interface"])
+        algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
         solver = solver.model_copy(update={"algorithm": algorithm})
-        found += against
-        found += _iteration_problems(solver, friction, layer)
+        found += _mistakes(tables, _law_problems(tables, mu, algorithm))
+        found += _mistakes(tables, _iteration_problems(tables, algorithm))
         if "load" in tables:
-            mu = None if algorithm == "frictionless" else 0.0 if given_mu is None else given_mu
-            steps, against = load_steps(tables["load"], mu, tables.get("bulk"))
+            known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
+            steps, against = load_steps(tables["load"], known, tables.get("bulk"))
             found += against
         if {"output", "wear"} <= tables.keys():
-            found += _field_problems(tables["output"], algorithm, tables["wear"] is not None)
+            found += _mistakes(tables, _field_problems(tables, algorithm))
     if steps and tables.get("wear"):
-        found += _wear_problems(tables, solver)
+        found += _mistakes(tables | {"solver": solver}, _wear_problems(tables, solver))
     if {"stress", "fatigue", "body", "output"} <= tables.keys():
-        found += _problems_below(tables, steps)
+        found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
-        bodies = tables["body"]
-        if (bulk := tables.get("bulk")) and (bodies.body_1, bodies.body_2)[bulk.body - 1].rigid:
-            sentence = f"expected an elastic body; body {bulk.body} is rigid"
-            found.append(Mistake(("bulk", "body"), bulk.body, sentence))
-        if not gap_given and bodies.separation.flat and tables.get("interface"):
-            found += _full_contact_problems(tables, steps)
-        elif not gap_given:
-            found += _touching_problems(bodies.separation)
-        elif bodies.body_1.surface or bodies.body_2.surface:
-            sentence = "expected either a gap or surfaces of the bodies, not both"
-            found.append(Mistake(("gap",), MISSING, sentence))
+        found += _mistakes(tables, _body_problems(tables, steps, gap_given))
     if found:
         raise deck_error(found, given.source)
     return Deck.model_construct(**tables), solver, steps
 
 
-def _algorithm(mu: float | None, solver: Solver) -> tuple[str, list[Mistake]]:
-    """Return the algorithm of a deck, and its conflicts with friction."""
-    algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
-    problems = []
+def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
+    """Yield mistakes with the values of their keys, unless these are absent or tables."""
+    for key, sentence in found:
+        value: Any = tables
+        for part in key:
+            value = value[part] if isinstance(part, int) else dict(value or {}).get(part)
+        plain = isinstance(value, str | bool | int | float | tuple)
+        yield Mistake(key, value if plain else MISSING, sentence)
+
+
+def _law_problems(tables: Mapping[str, Any], mu: float | None, algorithm: str) -> Found:
+    """Yield conflicts of the law of friction with the interface and the algorithm."""
+    friction, layer = tables["friction"], tables["interface"]
+    if friction and layer and layer.friction_coefficient is not None:
+        sentence = "expected nothing, since [friction] has a coefficient; or no [friction]"
+        yield ("interface", "friction_coefficient"), sentence
+    needed = f'since solver.algorithm = "{algorithm}"'
     if algorithm == "frictionless" and mu:
-        sentence = 'expected 0, since solver.algorithm = "frictionless"'
-        problems.append(Mistake(("friction", "coefficient"), mu, sentence))
+        yield ("friction", "coefficient"), f"expected 0, {needed}"
     if algorithm != "frictionless" and mu is None:
-        sentence = (
-            f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
-        )
-        problems.append(Mistake(("friction", "coefficient"), MISSING, sentence))
-    return algorithm, problems
+        yield ("friction", "coefficient"), f"missing; expected a number of at least 0 (or inf), {needed}"
 
 
-def _iteration_problems(solver: Solver, friction: Friction | None, layer: Interface | None) -> list[Mistake]:
-    """Return what the iteration of the dissertation cannot do: it is for comparison only."""
+def _iteration_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
+    """Yield what the iteration of the dissertation cannot do: it is for comparison only."""
+    solver, friction, needed = tables["solver"], tables["friction"], 'since solver.iteration = "dissertation"'
     if solver.iteration == "newton":
-        return []
-    needed = 'since solver.iteration = "dissertation"'
+        return
     if solver.method != "direct":
-        return [Mistake(("solver", "method"), solver.method, f'expected "direct", {needed}')]
-    if solver.algorithm == "frictionless":
-        return [Mistake(("solver", "iteration"), solver.iteration, 'expected "newton" without friction')]
-    if layer:
-        return [Mistake(("interface",), MISSING, f"expected nothing, {needed}")]
-    if friction and isinstance(friction.coefficient, TwoCoefficients):
-        return [Mistake(("friction", "coefficient"), MISSING, f"expected one coefficient, {needed}")]
-    return []
+        yield ("solver", "method"), f'expected "direct", {needed}'
+    elif algorithm == "frictionless":
+        yield ("solver", "iteration"), 'expected "newton" without friction'
+    elif tables["interface"]:
+        yield ("interface",), f"expected nothing, {needed}"
+    elif friction and isinstance(friction.coefficient, TwoCoefficients):
+        yield ("friction", "coefficient"), f"expected one coefficient, {needed}"
 
 
-def _wear_problems(tables: dict[str, Any], solver: Solver) -> list[Mistake]:
-    """Return faults of wear: nodes that cannot slip, a history with another end, unknown steps."""
-    wear, friction = tables["wear"], tables.get("friction")
-    cycle, found = cycle_entries(tables["load"], wear.cycle), []
+def _wear_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
+    """Yield faults of wear: nodes that cannot slip, a history with another end, unknown steps."""
+    wear, friction, loads = tables["wear"], tables.get("friction"), tables["load"]
+    cycle = cycle_entries(loads, wear.cycle)
     mu = coulomb(friction, tables.get("interface"))
     if mu is None or mu in (0.0, math.inf):
         words = "without slip" if mu else "without friction"
-        sentence = f"nothing wears {words}; expected a finite friction.coefficient above 0"
-        return [Mistake(("wear",), MISSING, sentence)]
+        yield ("wear",), f"nothing wears {words}; expected a finite friction.coefficient above 0"
+        return
     needed = "beside [wear], whose law needs a shear traction of mu p where nodes slip"
     if friction is None:
-        sentence = f"expected nothing {needed}"
-        found.append(Mistake(("interface", "friction_coefficient"), MISSING, sentence))
+        yield ("interface", "friction_coefficient"), f"expected nothing {needed}"
     elif friction.shear_limit is not None:
-        sentence = f"expected nothing {needed}"
-        found.append(Mistake(("friction", "shear_limit"), friction.shear_limit, sentence))
+        yield ("friction", "shear_limit"), f"expected nothing {needed}"
     elif isinstance(friction.coefficient, TwoCoefficients):
-        sentence = f"expected one coefficient {needed}"
-        found.append(Mistake(("friction", "coefficient"), MISSING, sentence))
+        yield ("friction", "coefficient"), f"expected one coefficient {needed}"
     if solver.algorithm != "incremental":
-        found.append(Mistake(("solver", "algorithm"), solver.algorithm, "expected incremental with [wear]"))
+        yield ("solver", "algorithm"), "expected incremental with [wear]"
     if tables.get("accuracy"):
-        sentence = "expected nothing beside [wear]: jumps differ from lattice to lattice"
-        found.append(Mistake(("accuracy",), MISSING, sentence))
-    for place, load in enumerate(tables["load"]):
+        yield ("accuracy",), "expected nothing beside [wear]: jumps differ from lattice to lattice"
+    for place, load in enumerate(loads):
         if "auto" in (load.steps, *(segment.steps for segment in load.path or ())):
             sentence = "expected a number of steps with [wear]: all cycles need the same load steps"
-            found.append(Mistake(("load", place, "steps"), "auto", sentence))
+            yield ("load", place, "steps"), sentence
         if load.repeat and load in cycle:
             sentence = "expected no repeat of the segments of wear.cycle, which wear.cycles repeats"
-            found.append(Mistake(("load", place, "repeat"), load.repeat, sentence))
+            yield ("load", place, "repeat"), sentence
     if not cycle:
-        labels = [load.label for load in tables["load"] if load.label]
-        known = f"; the last one has {shown(labels[-1]) if tables['load'][-1].label else 'no label'}"
+        labels = [load.label for load in loads if load.label]
+        known = f"; the last one has {shown(labels[-1]) if loads[-1].label else 'no label'}"
         hint = "" if wear.cycle in labels else did_you_mean(wear.cycle, labels)
-        sentence = f"expected the label of the last entries of [[load]]{hint or known}"
-        found.append(Mistake(("wear", "cycle"), wear.cycle, sentence))
-    elif len(cycle) == len(tables["load"]):
-        sentence = "expected an entry of [[load]] before the cycle, which presses the bodies"
-        found.append(Mistake(("wear", "cycle"), wear.cycle, sentence))
-    return found
+        yield ("wear", "cycle"), f"expected the label of the last entries of [[load]]{hint or known}"
+    elif len(cycle) == len(loads):
+        yield ("wear", "cycle"), "expected an entry of [[load]] before the cycle, which presses the bodies"
 
 
-def _field_problems(output: Output, algorithm: str, wears: bool) -> list[Mistake]:
-    """Return fields that a run without friction, or without wear, does not have."""
+def _field_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
+    """Yield fields that a run without friction, or without wear, does not have."""
+    fields = tables["output"].fields or ()
     known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
-    missing = [name for name in output.fields or () if name not in known]
-    if not missing:
-        if wears or not (missing := [name for name in output.fields or () if name in WORN]):
-            return []
-        sentence = f"a run without [wear] has no {', '.join(missing)}"
-        return [Mistake(("output", "fields"), output.fields, sentence)]
-    sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
-    return [Mistake(("output", "fields"), output.fields, sentence)]
+    if missing := [name for name in fields if name not in known]:
+        sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
+        yield ("output", "fields"), sentence
+    elif not tables["wear"] and (missing := [name for name in fields if name in WORN]):
+        yield ("output", "fields"), f"a run without [wear] has no {', '.join(missing)}"
 
 
-def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[Mistake]:
-    """Return faults of stresses: of a rigid body, without the fields of the surface, of equal names."""
-    found, names = [], set()
+def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
+    """Yield faults of stresses: of a rigid body, without the fields of the surface, of equal names."""
+    names: set[str] = set()
     last = 0 if any(step.ramp is not None for step in steps) else len(steps)
     stages = [stage_of(step) for step in steps] if tables["fatigue"] else []
     output, bodies = tables["output"], tables["body"]
@@ -169,45 +157,41 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
     below = [(kind, place, table) for kind in kinds for place, table in enumerate(tables[kind])]
     for kind, place, table in below:
         if (bodies.body_1, bodies.body_2)[table.body - 1].rigid:
-            sentence = f"body {table.body} is rigid: there is no stress to compute in it"
-            found.append(Mistake((kind, place, "body"), table.body, sentence))
+            yield (kind, place, "body"), f"body {table.body} is rigid: there is no stress to compute in it"
         name = table.name or f"{kind}_{place + 1}"
         plain = name.replace("_", "").replace("-", "").isalnum() and len(name.encode()) <= _LONGEST_NAME
         if name in names or not plain:
             sentence = "expected a name of a few letters, digits, - and _ that no other such table has"
-            found.append(Mistake((kind, place, "name"), table.name, sentence))
+            yield (kind, place, "name"), sentence
         names.add(name)
         if table.estimate_error and (not last or tables["wear"]):
             sentence = (
                 'expected false beside [wear] and steps = "auto", whose steps differ from lattice to lattice'
             )
-            found.append(Mistake((kind, place, "estimate_error"), True, sentence))
+            yield (kind, place, "estimate_error"), sentence
         wanted = table.steps if isinstance(table.steps, tuple) else ()
         if last and (lost := [n for n in wanted if n > last or (n % output.every and n != last)]):
             sentence = (
                 f"there are no fields of step {lost[0]}: {last} load steps, output.every = {output.every}"
             )
-            found.append(Mistake((kind, place, "steps"), table.steps, sentence))
+            yield (kind, place, "steps"), sentence
         if kind == "fatigue":
-            found += _fatigue_problems(table, place, stages, output.every, frictional, numbered=last > 0)
+            for key, sentence in _cycle_problems(table, stages, output.every, frictional, numbered=last > 0):
+                yield (kind, place, key), sentence
             ruiz = "ruiz" in table.parameters
             needed += [name for name in known if ruiz and name.startswith("slip_increment")]
     if below and output.fields and (lost := [n for n in needed if n not in output.fields]):
         words = listed(list(dict.fromkeys(lost)), "and")
-        sentence = f"expected {words} among the fields, which the stresses are computed from"
-        found.append(Mistake(("output", "fields"), output.fields, sentence))
-    return found
+        yield ("output", "fields"), f"expected {words} among the fields, which the stresses are computed from"
 
 
-def _fatigue_problems(
-    table: Fatigue, place: int, stages: Sequence[Stage], every: int, frictional: bool, *, numbered: bool
-) -> list[Mistake]:
-    """Return segments or steps that make no closed cycle, as far as loads tell, and Ruiz off the surface."""
-    found = []
+def _cycle_problems(
+    table: Fatigue, stages: Sequence[Stage], every: int, frictional: bool, *, numbered: bool
+) -> Iterator[tuple[str, str]]:
+    """Yield segments or steps that make no closed cycle, as far as loads tell, and Ruiz off the surface."""
     elsewhere = table.depths not in (None, (0.0,)) or table.points or table.line or table.plane
     if "ruiz" in table.parameters and (elsewhere or not frictional):
-        sentence = "ruiz: expected a contact with friction, and the nodes of the surface"
-        found.append(Mistake(("fatigue", place, "parameters"), table.parameters, sentence))
+        yield "parameters", "ruiz: expected a contact with friction, and the nodes of the surface"
     fault = f"expected steps, since output.every = {every} leaves steps of the cycle out" if every > 1 else ""
     if table.segment and stages and not fault:
         try:
@@ -215,10 +199,9 @@ def _fatigue_problems(
         except ValueError as error:
             fault = str(error)
     if table.segment and fault:
-        found.append(Mistake(("fatigue", place, "segment"), table.segment, fault))
+        yield "segment", fault
     if table.steps and numbered and (fault := steps_fault(stages, table.steps)):
-        found.append(Mistake(("fatigue", place, "steps"), table.steps, fault))
-    return found
+        yield "steps", fault
 
 
 def stage_of(step: LoadStep) -> Stage:
@@ -228,18 +211,31 @@ def stage_of(step: LoadStep) -> Stage:
     return step.segment, step.label, known | dict(zip(BULK_STRESS, step.bulk, strict=True))
 
 
-def _touching_problems(gap: Separation) -> list[Mistake]:
-    """Return surfaces that do not touch, or touch along a line or everywhere, without end."""
+def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_given: bool) -> Found:
+    """Yield faults of the surfaces, and a bulk stress of a rigid body."""
+    bodies = tables["body"]
+    if (bulk := tables.get("bulk")) and (bodies.body_1, bodies.body_2)[bulk.body - 1].rigid:
+        yield ("bulk", "body"), f"expected an elastic body; body {bulk.body} is rigid"
+    if not gap_given and bodies.separation.flat and tables.get("interface"):
+        yield from _full_contact_problems(tables, steps)
+    elif not gap_given:
+        yield from _touching_problems(bodies.separation)
+    elif bodies.body_1.surface or bodies.body_2.surface:
+        yield ("gap",), "expected either a gap or surfaces of the bodies, not both"
+
+
+def _touching_problems(gap: Separation) -> Found:
+    """Yield surfaces that do not touch, or touch along a line or everywhere, without end."""
     try:
         gap.first_touch  # noqa: B018 (computed here, cached)
     except DeckError as error:
-        return [Mistake(("body", "2", "surface"), MISSING, str(error))]
-    one, two = gap.surface_1.curvature, gap.surface_2.curvature
-    if one is None or two is None:
-        return []
-    smaller, larger, _ = principal_curvatures(one + two)
+        yield ("body", "2", "surface"), str(error)
+        return
+    if gap.quadratic is None:
+        return
+    smaller, larger, _ = principal_curvatures(gap.quadratic[0])
     if smaller > 1e-12 * larger:
-        return []
+        return
     sentence = (
         "the two surfaces touch along a line, so the contact has no end; expected a shape that bounds it: "
         "a paraboloid with a large radius along the line, as in cases/long_cylinder.toml, or a formula with "
@@ -256,25 +252,23 @@ def _touching_problems(gap: Separation) -> list[Mistake]:
             'pressure; expected a shape that bounds it, or [interface] with law = "power"; a periodic '
             "boundary, the way with no layer, is not available yet"
         )
-    return [Mistake(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]
+    yield ("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), sentence
 
 
-def _full_contact_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...]) -> list[Mistake]:
-    """Return what differs between the nodes of two flats on an interface, whose area the window is."""
-    found, grid, friction = [], tables.get("grid"), tables.get("friction")
-    whole = "flat on flat has one unknown"
+def _full_contact_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...]) -> Found:
+    """Check that nothing varies over the window of a flat-on-flat contact."""
+    grid, friction, whole = tables.get("grid"), tables.get("friction"), "flat on flat has one unknown"
     if grid is not None and (grid.spacing is None or grid.window is None):
         sentence = f"{whole}: expected spacing and window, whose nodes are the area that shares the loads"
-        found.append(Mistake(("grid",), MISSING, sentence))
+        yield ("grid",), sentence
     if any(step.twist.value or step.twist.control == "force" for step in steps):
-        found.append(Mistake(("load",), MISSING, f"{whole}: expected no torque and no twist"))
+        yield ("load",), f"{whole}: expected no torque and no twist"
     by_force = any(t.value for step in steps for t in (step.x, step.y) if t.control == "force")
     if by_force and not tables["interface"].tangential_stiffness:
-        sentence = f"missing; {whole}: without springs nothing says how its nodes share the tangential load"
-        found.append(Mistake(("interface", "tangential_stiffness"), MISSING, sentence))
+        sentence = f"missing; {whole}: without tangential springs the shear distribution is undetermined"
+        yield ("interface", "tangential_stiffness"), sentence
     if friction and not isinstance(friction.coefficient, float | int):
-        found.append(Mistake(("friction", "coefficient"), MISSING, f"{whole}: expected a number"))
+        yield ("friction", "coefficient"), f"{whole}: expected a number"
     for name in ("bulk", "stress", "accuracy"):
         if tables.get(name):
-            found.append(Mistake((name,), MISSING, f"{whole}: expected no table of this name with it"))
-    return found
+            yield (name,), f"{whole}: expected no table of this name with it"

@@ -265,14 +265,14 @@ class Step:
         self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
     ) -> xarray.Dataset:
         """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
-        from ..interior.stress import below
+        from ..interior.stress import Loaded, below
 
         loaded: dict[str, Any] = {**self.history, **self.fields}
         if not self.sharp:
             loaded = {name: values for name, values in loaded.items() if name not in EDGES}
-        given = self.bodies, body, {"points": points}, components
-        more: dict[str, Any] = {"friction": self.friction, "source": source}
-        return below(self.lattice, [loaded], *given, **more, surface=lambda _: self.traction_field("edges"))
+        given = self.lattice, [loaded], self.bodies, body, self.friction
+        of = Loaded(*given, surface=lambda _: self.traction_field("edges"))
+        return below(of, {"points": points}, components, source=source)
 
     # --- display --------------------------------------------------------------------------------------------
 

@@ -298,7 +298,7 @@ class Case(Problem):
         return [*notes, *([f"note: {note}"] if (note := plausibility.unjudged(self)) else [])]
 
     def _repr_html_(self) -> str:
-        from .problem.overview import case_rows
+        from .problem.preview import case_rows
         from .solve.frictionless import peak_memory
         from .text import html_table
 

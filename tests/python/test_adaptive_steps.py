@@ -15,7 +15,7 @@ from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables
 from hexcontact.core.steps import LEAST
 from hexcontact.deck.json_schema import deck_schema
-from hexcontact.problem import estimates, overview
+from hexcontact.problem import preview
 from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.journal import Journal, journal_of
@@ -349,10 +349,10 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     rows = dict(history.step_rows(result.history.iloc[-1].to_dict()))
     assert rows["load steps"].startswith("stick area within ")
     console = Console(file=io.StringIO(), width=150)
-    console.print(tables.pairs("", overview.case_rows(case)))
+    console.print(tables.pairs("", preview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "chosen on the way in 2 segments (step_tolerance 0.1)" in text
-    assert "a third or three times as much" in estimates.work(case)
+    assert "uncertain by a factor of 3" in preview.work(case)
     assert result.dataset.attrs["planned_steps"] == len(result)
     assert result.dataset.attrs["step_tolerance"] == 0.1
     assert result.step_limited.attrs["flag_meanings"] == "not_adaptive within_tolerance no_smaller_step_helps"

@@ -23,7 +23,7 @@ from hexcontact.deck.faults import Source
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
 from hexcontact.deck.write import STARTERS, starter, written
 from hexcontact.errors import DeckError
-from hexcontact.problem.overview import case_rows
+from hexcontact.problem.preview import case_rows
 from hexcontact.problem.window import estimate_contact, grown, rim_sides
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -23,8 +23,7 @@ from hexcontact.deck.keys import Deck
 from hexcontact.deck.series import read_series
 from hexcontact.deck.write import written
 from hexcontact.errors import DeckError
-from hexcontact.problem.estimates import operator_applications, seconds
-from hexcontact.problem.overview import case_rows
+from hexcontact.problem.preview import case_rows, operator_applications, seconds
 
 ROOT = Path(__file__).parents[2]
 
@@ -532,7 +531,7 @@ def test_the_time_is_estimated_to_its_order_of_magnitude() -> None:
     program = f"""
         import time
         from hexcontact import Case
-        from hexcontact.problem.estimates import seconds
+        from hexcontact.problem.preview import seconds
         Case.from_toml({str(ROOT / "cases/hertz_spheres.toml")!r}).run()  # imports
         for name, spacing in ("dissimilar_fretting", "3.5 um"), ("hertz_spheres", "0.004 mm"):
             case = Case.from_toml(f"{ROOT / "cases"}/{{name}}.toml", {{"grid.spacing": spacing}})

@@ -36,7 +36,7 @@ from hexcontact.errors import (
     PathWarning,
     ResourceError,
 )
-from hexcontact.problem import overview
+from hexcontact.problem import preview
 from hexcontact.problem.loads import LoadStep, Target
 from hexcontact.result import history
 from hexcontact.result.history import describe
@@ -786,9 +786,9 @@ def test_the_last_step_in_words(sheared: Result) -> None:
 
 
 def test_a_case_in_words() -> None:
-    rows = dict(overview.case_rows(sphere(friction_coefficient=math.inf, coupling="goodman")))
+    rows = dict(preview.case_rows(sphere(friction_coefficient=math.inf, coupling="goodman")))
     assert rows["friction"] == "no slip (coefficient inf), incremental, shear does not move the pressure"
-    rows = dict(overview.case_rows(sphere(algorithm="static")))
+    rows = dict(preview.case_rows(sphere(algorithm="static")))
     assert rows["friction"] == "coefficient 0.1, static"
     assert rows["pair"].endswith("beta = -0.1891, gamma = 0.4706")
     assert rows["load steps"] == "5 in 2 segments"

@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 from hexcontact import Case, DeckError, open_result, resume
-from hexcontact.problem import estimates
+from hexcontact.problem import preview
 from hexcontact.solve.progress import Lines
 
 BODIES = """
@@ -97,12 +97,12 @@ def test_what_is_said_of_a_run_with_wear() -> None:
     case = Case.from_text(given)
     without = Case.from_text(given[: given.index("[wear]")])
     # 11 cycles of 7 load steps
-    added = estimates.operator_applications(case) - estimates.operator_applications(without)  # type: ignore[operator]
+    added = preview.operator_applications(case) - preview.operator_applications(without)  # type: ignore[operator]
     spent = case.run().dataset
     cycles = spent["wear_cycles"].values >= 0
-    assert cycles.sum() == estimates.cycles(case) == 11
+    assert cycles.sum() == preview.cycles(case) == 11
     assert added == pytest.approx(float(spent["operator_applications"][cycles].sum()), rel=0.5)
-    assert "cycles" in estimates.work(Case.from_text(BODIES + WEAR))
+    assert "cycles" in preview.work(Case.from_text(BODIES + WEAR))
     lines = io.StringIO()
     shown = Lines(lines)
     shown.begun("wear", case.planned_steps)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Check a deck, report all its faults, and print a summary of the case."""
     from ..problem import plausibility
-    from ..problem.overview import case_rows
+    from ..problem.preview import case_rows
     from ..problem.refinement import least_and_most
     from ..solve.frictionless import peak_memory, require_memory
     from . import tables
@@ -41,15 +41,14 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
 
 def case_content(case: Problem, output: Path) -> dict[str, Any]:
     """Return a case as the object that ``check --json`` prints."""
-    from ..problem import estimates, plausibility
-    from ..problem.overview import largest_loads, parameters_of
+    from ..problem import plausibility, preview
     from ..solve.frictionless import peak_memory
 
     lattice = case.lattice
     return {
         "title": case.title,
         "output": output,
-        **parameters_of(case),
+        **preview.parameters_of(case),
         "method": case.method_for(lattice),
         "spacing": lattice.spacing,
         "rows": lattice.n_row,
@@ -58,10 +57,10 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
         "window_fixed": case.window_fixed,
         "load_steps": case.planned_steps or None,
         "segments": case.load_steps[-1].segment + 1,
-        "largest_loads": largest_loads(case),
+        "largest_loads": preview.largest_loads(case),
         "memory": peak_memory(case, lattice),
-        "operator_applications": estimates.operator_applications(case),
-        "seconds": estimates.seconds(case),
+        "operator_applications": preview.operator_applications(case),
+        "seconds": preview.seconds(case),
         "expected": plausibility.expected(case),
         "limits": plausibility.limits(),
         "warnings": plausibility.warnings(case),

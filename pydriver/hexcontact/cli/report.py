@@ -28,7 +28,7 @@ from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
 from ..interior.files import read_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
-from ..problem.overview import case_rows
+from ..problem.preview import case_rows
 from ..problem.problem import Problem
 from ..result.history import energy_table, load_or_motion, worth_showing
 from ..text import quantity, visible

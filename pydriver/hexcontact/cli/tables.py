@@ -114,7 +114,7 @@ class Summary(NamedTuple):
         extent: Extent | None = None,
     ) -> Summary:
         """Summarize a run; the finest lattice of a refined one, with errors, is read from its result."""
-        from ..problem.overview import parameters_of
+        from ..problem.preview import parameters_of
 
         found = histories_of(refined) if refined is not None else histories
         extent = extent if refined is None else extent_of(refined.step(-1))

@@ -1,4 +1,4 @@
-"""What a result says about the inside of its bodies: stresses, fatigue parameters, stress histories."""
+"""Stress, fatigue parameters and stress histories below the surface of a result."""
 
 from __future__ import annotations
 

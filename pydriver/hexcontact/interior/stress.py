@@ -36,7 +36,7 @@ Surface = Callable[[int], TractionField]
 """The tractions over the surface, to the edges, of the step of a place in a list."""
 
 LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
-"""What the stress below the surface comes from."""
+"""Fields from which the stress below the surface is computed."""
 # fields of each step, as read and for the core; corrected ones, while others follow and in all
 _LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
 # fields as floats that are read for them, and bytes of each that the netCDF library keeps

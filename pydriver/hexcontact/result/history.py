@@ -424,7 +424,7 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
     histories : sequence of mapping
         History of each load step, from the first on.
     parameters : mapping
-        Parameters of the run, `hexcontact.problem.overview.parameters_of`, or attributes of the result.
+        Parameters of the run, `hexcontact.problem.preview.parameters_of`, or attributes of the result.
     """
     tolerance = float(parameters.get("tolerance", 0.0))
     static = parameters.get("algorithm") == "static"

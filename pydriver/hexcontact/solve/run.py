@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyWarning, HexcontactError, warn
-from ..problem.overview import parameters_of
+from ..problem.preview import parameters_of
 from ..problem.problem import Problem
 from ..problem.refinement import coarser
 from ..result.history import limited_steps

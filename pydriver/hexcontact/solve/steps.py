@@ -14,7 +14,7 @@ from ..core.lattice import Lattice
 from ..errors import DeckError, PathWarning, warn
 from ..problem import plausibility
 from ..problem.loads import LoadStep
-from ..problem.overview import machine
+from ..problem.preview import machine
 from ..problem.problem import Problem
 from ..result.history import unasked_path
 from ..result.step import Step

@@ -62,7 +62,7 @@ class DeckError(HexcontactError, ValueError):
 
 
 class NotInResult(DeckError):
-    """A result does not have what is asked for: fields that were not kept, zones without friction."""
+    """A result lacks the data: fields that were not kept, zones without friction."""
 
 
 class NoSuchStep(DeckError, IndexError):

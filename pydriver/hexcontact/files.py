@@ -120,7 +120,7 @@ def is_defect(error: Exception) -> bool:
 
 
 def require_kinds(values: Any, **kinds: type) -> None:
-    """Raise ValueError unless what was read is a table that has entries of these kinds."""
+    """Raise ValueError unless a value is a table that has entries of these kinds."""
     if not isinstance(values, dict):
         raise ValueError("it holds no table")
     for name, kind in kinds.items():
@@ -186,7 +186,7 @@ def temporary_of(target: Path) -> Path:
 
 
 def remove_stale(target: Path) -> None:
-    """Delete what killed processes left of a file under the names of `temporary_of`.
+    """Delete temporary files of killed processes, under the names of `temporary_of`.
 
     A file that was written to a moment ago may be that of a process on another machine.
     """

@@ -20,7 +20,7 @@ _HEAD = f"{_CELL};border-bottom:1px solid currentColor;font-weight:600"
 _TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-side:top"
 
 # Control characters but tab and ends of lines, separators of lines, marks that change the direction of
-# reading, halves of surrogate pairs, and what is no character: terminals obey them, XML forbids most.
+# reading, halves of surrogate pairs, and non-characters: terminals obey them, XML forbids most.
 _UNSEEN = re.compile(
     "[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
     "|\r(?!\n)"
@@ -30,7 +30,7 @@ _DOUBTFUL = re.compile("[^ -~\u00a1-\u00ac\u00ae-\u02ff]")  # not one column wid
 
 
 def visible(text: str) -> str:
-    r"""Replace what a terminal would obey and XML forbids: an escape character becomes ``\u001b``."""
+    r"""Replace control characters, which XML forbids: an escape character becomes ``\u001b``."""
     return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 

@@ -65,7 +65,7 @@ class Variable(NamedTuple):
 
     @property
     def missing(self) -> float | int:
-        """Value that says "not kept"."""
+        """Value of a quantity that was not kept."""
         return NAN if self.dtype == "f8" else NOT_KEPT
 
     @property
@@ -88,7 +88,7 @@ class Variable(NamedTuple):
 _Row = Callable[..., Variable]
 _node: _Row = partial(Variable, ("step", "row", "col"))  # a value at each node, by step
 _shear: _Row = partial(_node, frictional=True, core="fields")  # a field of the state with friction
-_work: _Row = partial(Variable, ("step",))  # a value by step, of solving or of what is prescribed
+_work: _Row = partial(Variable, ("step",))  # a value by step, of the solution or of prescribed quantities
 _scalar: _Row = partial(_work, estimated=True)  # a value of the solution, whose lattice error is estimated
 _measure: _Row = partial(_scalar, core="measures")
 _stick: _Row = partial(_measure, frictional=True)
@@ -114,7 +114,7 @@ _ALWAYS, _FRICTION = {"required": "always"}, {"required": "friction"}
 _ZONES = {NOT_KEPT: "not_kept", 0: "separated", 1: "stick", 2: "slip"}
 _LIMITS = {NOT_KEPT: "not_adaptive", 0: "within_tolerance", 1: "no_smaller_step_helps"}
 _PLANE = ("row", "col")
-_LOAD, _APPROACH = ("normal_load", 0), ("approach", 0)  # what shear is noise beside
+_LOAD, _APPROACH = ("normal_load", 0), ("approach", 0)  # scales of noise in shear
 _WORK = ("normal_load", 1)
 _AREA = {"least": 0.0, "most": "window"}
 _FROM_0: dict[str, Any] = {"least": 0.0}
@@ -356,7 +356,7 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
 INTERFACE = ("interface_coefficient", "interface_exponent", "interface_tangential_stiffness")
 SHEAR_LIMIT = "shear_limit"  # parameter of a case with a bound of the shear traction
 TRACTIONS = ("pressure", "traction_x", "traction_y")
-EDGES = ("gap", "zone")  # fields that, with the tractions, tell where the edges of contact and stick are
+EDGES = ("gap", "zone")  # fields that, with the tractions, locate the edges of contact and stick
 FIELDS = names_where(lambda v: v.is_field)
 FIXED = tuple(name for name in names_where(lambda v: v.dims == _PLANE) if name not in ("x", "y"))
 """Fields with one value at every node for all steps."""
@@ -375,7 +375,7 @@ BULK_STRESS = names_where(lambda v: v.long_name.startswith("bulk stress "))
 """Components of the bulk strain and of the bulk stress, xx, yy, xy."""
 
 LOADS = grouped(lambda name, v: v.motion)
-"""What drives each rigid motion: a load or a displacement. Decks have keys of the same names."""
+"""The load and the displacement that drive each rigid motion. Decks have keys of the same names."""
 
 SUMMARY = tuple(sorted(names_where(lambda v: v.summary), key=lambda name: VARIABLES[name].summary))
 RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.core == "residuals")}

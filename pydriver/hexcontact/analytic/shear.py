@@ -121,7 +121,7 @@ class ClosedForms:
 
     @property
     def surface(self) -> Surface | None:
-        """The only surface that is not flat; None without one, or if this version does not know it."""
+        """The only surface that is not flat; None without one, or for a shape of a later version."""
         try:
             return self.deck.only_surface
         except DeckError:

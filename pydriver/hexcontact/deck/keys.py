@@ -406,5 +406,5 @@ def _table(data: Mapping[str, Any], name: str, info: Any) -> Any:
 
 @functools.cache
 def _adapter(deck: type[Deck], name: str) -> TypeAdapter[Any]:
-    """Return what checks one table of a deck alone."""
+    """Return the validator of one table of a deck."""
     return TypeAdapter(cast(Any, deck.model_fields[name].annotation))

@@ -98,7 +98,7 @@ def spelled(text: str) -> str:
 
 
 def _plain(unit: str, dimension: Dimension) -> str:
-    """Return a unit as a product of names that pint knows, without brackets: mm^3/N/m for mm^3/(N m)."""
+    """Return a unit as a product of names of pint, without brackets: mm^3/N/m for mm^3/(N m)."""
     known = _SPELLED.get(dimension.unit, {})
 
     def name(word: re.Match[str]) -> str:

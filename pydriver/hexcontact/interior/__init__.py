@@ -1,1 +1,1 @@
-"""Stress and displacement below the surface: where they are wanted, and what is computed there."""
+"""Stress, displacement and fatigue parameters below the surface."""

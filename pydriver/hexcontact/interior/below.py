@@ -75,7 +75,7 @@ class BelowSurface(ABC):
 
         `components` are names of `hexcontact.variables.STRESSES`; several numbers of a step give the dataset
         the dimension ``step``; `where` is one of ``points``, ``line``, ``plane`` and ``depths``, see
-        `hexcontact.interior.region`; `source` says of which tractions: ``"edges"``, corrected at the edges
+        `hexcontact.interior.region`; `source` names the tractions: ``"edges"``, corrected at the edges
         of contact and stick, or ``"nodes"``, as they are. Raises DeckError, IndexError or ResourceError.
         """
         one = not has_entries(step)
@@ -195,7 +195,7 @@ class BelowSurface(ABC):
     def _loaded(
         self, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = False
     ) -> list[dict[str, Any]]:
-        """Return tractions, bulk stress and other fields of some steps, on demand what tells the edges."""
+        """Return tractions, bulk stress and other fields of steps; with `edges` those of `EDGES`."""
         bulk = [name for name in LOADED if name not in TRACTIONS and name in self.dataset]
         names = [name for name in (*TRACTIONS, *more) if name in self.dataset]
         return [
@@ -206,7 +206,7 @@ class BelowSurface(ABC):
         ]
 
     def _edges_of(self, number: int) -> dict[str, Any]:
-        """Return the fields that tell where the edges are; none if not kept, or without sharp edges."""
+        """Return the fields that locate the edges; none if not kept, or without sharp edges."""
         if INTERFACE[0] in self.dataset.attrs:
             return {}
         try:

@@ -30,7 +30,7 @@ _AT_ONCE = 8  # steps whose stress on a plane is held besides
 
 
 class Meaning(NamedTuple):
-    """What a parameter is: unit, name in words, definition, source."""
+    """Unit, name in words, definition and source of a parameter."""
 
     units: str
     long_name: str

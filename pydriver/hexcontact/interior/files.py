@@ -36,7 +36,7 @@ def tables_of(deck: str) -> dict[str, Stress | Fatigue]:
 
 
 def files_of(deck: str, output: Path) -> dict[str, Path]:
-    """Return the files beside an output that hold what its deck wants, by the names of the tables."""
+    """Return the files beside an output for the tables of its deck, by their names."""
     return {name: output.with_name(f"{output.stem}_{name}.nc") for name in tables_of(deck)}
 
 
@@ -52,7 +52,7 @@ def computed(
 def at_hand(
     result: BelowSurface, kept: list[int], names: list[str] | None = None
 ) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield what `computed` does; tables that the run has written are read from their files."""
+    """Yield the same as `computed`; tables that the run has written are read from their files."""
     run, path = result.dataset.attrs.get("run"), Path(result.path)
     files = files_of(result.deck, path) if path.name else {}
     for name, table in tables_of(result.deck).items():
@@ -67,7 +67,7 @@ def at_hand(
 def of_table(
     result: BelowSurface, name: str, table: Stress | Fatigue, kept: list[int] | None = None
 ) -> xarray.Dataset:
-    """Return what a table of a deck wants; arguments and errors as of `computed`."""
+    """Compute a table of a deck; arguments and errors as of `computed`."""
     if isinstance(table, Fatigue):
         try:
             found = of_cycle(result, table)
@@ -92,7 +92,7 @@ def of_table(
 
 
 def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
-    """Return the fatigue parameters that a table wants."""
+    """Return the fatigue parameters of a table."""
     constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
     given = {key: value for key, value in constants.items() if value is not None}
     cycle = {"segment": table.segment, "steps": table.steps}

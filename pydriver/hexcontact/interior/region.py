@@ -1,4 +1,4 @@
-"""Where stresses below the surface are wanted: points, lines, planes of any orientation, boxes."""
+"""Evaluation points of stresses: points, lines, planes of any orientation, boxes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MEANING = {
 
 @dataclass(frozen=True)
 class Region:
-    """Where stresses are wanted."""
+    """Evaluation points."""
 
     points: Array  # x, y and depth of points (m); those of all nodes and planes for a box, (..., 3)
     dims: tuple[str, ...]  # dimensions of the points

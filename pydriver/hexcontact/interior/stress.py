@@ -53,7 +53,7 @@ _DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
 
 
 def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the quantities that are wanted; by default the six stresses and von Mises'."""
+    """Return the checked names of quantities; by default the six stresses and von Mises'."""
     for name in components:
         if not isinstance(name, str) or name not in STRESSES:
             hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
@@ -142,7 +142,7 @@ def _friction_of(field: Array, friction: float) -> Array:
 
 
 def source_of(steps: Sequence[Fields]) -> str:
-    """Return the source of tractions taken by default: the edges, if all steps tell where they are."""
+    """Return the source of tractions taken by default: the edges, if all steps have their fields."""
     return "edges" if all(name in step for step in steps for name in EDGES) else "nodes"
 
 
@@ -216,7 +216,7 @@ def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
 
 
 class NearSurface:
-    """What the stress of hats misses next to the surface: roots at the edges, the tractions at depth 0."""
+    """Correction of the stress of hats next to the surface: roots at the edges, tractions at depth 0."""
 
     def __init__(self, loaded: Loaded, loads: Array) -> None:
         self._of, self._loads, self._poisson_ratio = loaded, loads, loaded.material[0]
@@ -251,7 +251,7 @@ def summed(lattice: Lattice, box: Region) -> bool:
 
 
 def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = False) -> int:
-    """Return the memory (bytes) that the stress of some steps takes; with what is `kept` for the next one."""
+    """Return the memory (bytes) of the stress of steps; `kept`: with the spectra for the next one."""
     if where.lattice is None or summed(lattice, where):
         return 8 * steps * (6 * lattice.size + 30 * where.count)
     whole, count = window_over(lattice, where.lattice)[0], steps * where.depths.size

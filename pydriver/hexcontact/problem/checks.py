@@ -83,7 +83,7 @@ def _law_problems(tables: Mapping[str, Any], mu: float | None, algorithm: str) -
 
 
 def _iteration_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
-    """Yield what the iteration of the dissertation cannot do: it is for comparison only."""
+    """Yield features that the iteration of the dissertation lacks: it is for comparison only."""
     solver, friction, needed = tables["solver"], tables["friction"], 'since solver.iteration = "dissertation"'
     if solver.iteration == "newton":
         return
@@ -188,7 +188,7 @@ def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fou
 def _cycle_problems(
     table: Fatigue, stages: Sequence[Stage], every: int, frictional: bool, *, numbered: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield segments or steps that make no closed cycle, as far as loads tell, and Ruiz off the surface."""
+    """Yield segments or steps without a closed cycle, if loads are known, and Ruiz below the surface."""
     elsewhere = table.depths not in (None, (0.0,)) or table.points or table.line or table.plane
     if "ruiz" in table.parameters and (elsewhere or not frictional):
         yield "parameters", "ruiz: expected a contact with friction, and the nodes of the surface"

@@ -97,7 +97,7 @@ class LoadStep:
 
 
 class _Stretch(NamedTuple):
-    """A segment with its key in the deck, its label, and whether it continues the one before."""
+    """A segment with its key in the deck, its label, and whether it continues the segment before it."""
 
     key: tuple[str | int, ...]
     segment: Segment
@@ -177,7 +177,7 @@ class History:
             self._now, self._stress = now, bulk
             for part in _WATCHED if ramp else (1.0,):
                 problems = list(_overload(key, stretch.segment, step.until(part), self._mu))
-                # a load that is too large at the beginning of a segment is a fault of the one before
+                # a load that is too large at the beginning of a segment is a fault of the segment before it
                 if not self._overloaded or self._overloaded == key:
                     for problem in problems:
                         self._complain(problem)

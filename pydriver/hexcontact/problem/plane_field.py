@@ -154,7 +154,7 @@ class PlaneField:
         raise DeckError(f"{self.rule.key}: expected {self.rule.expected}; it is {shown} at {where}")
 
     def fault_near(self, lattice: Lattice, chosen: Mask) -> str:
-        """Return what a contact at some nodes of a window comes too near to: the end of a map, or a hole."""
+        """Return why a contact at nodes of a window is doubtful: near the end of a map, or a hole."""
         return self.map.fault_near(lattice.spacing, lattice.x[chosen], lattice.y[chosen]) if self.map else ""
 
     def __eq__(self, other: object) -> bool:

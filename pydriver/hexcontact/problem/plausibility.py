@@ -269,7 +269,7 @@ def row(case: Problem) -> str:
 
 
 def unjudged(case: Problem) -> str:
-    """Return a note on what the warnings cannot judge; empty if there is nothing."""
+    """Return a note on limits that the warnings do not check; empty without one."""
     if not case.gap_given:
         return ""
     return (

@@ -1,4 +1,4 @@
-"""Preview of a problem before its run: a table of what is solved, what is expected, and the work."""
+"""Preview of a problem before its run: its table, its parameters, its work."""
 
 from __future__ import annotations
 

@@ -389,7 +389,7 @@ class Problem:
     # --- the window -----------------------------------------------------------------------------------------
 
     def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
-        """Return what prevents a refinement of three lattices, which estimates of errors need."""
+        """Return the obstacles to a refinement of three lattices, which error estimates need."""
         if self._gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]

@@ -18,27 +18,31 @@ class RecordedDeck:
 
     Attributes
     ----------
+    data : dict
+        The tables as they are written, unchecked.
     given : frozenset of str
         Parts that were given in Python: "surface" for the gap, "friction".
     """
 
     def __init__(self, text: str, name: str) -> None:
         self._source = Source(name, text)
-        self._data = parse_toml(text, name) if text else {}
+        self.data = parse_toml(text, name) if text else {}
         places = {"surface": ("body", "1", "surface", "shape"), "friction": ("friction", "coefficient")}
         self.given = frozenset(part for part, keys in places.items() if self._value(keys) == FROM_PYTHON)
-        if "surface" in self.given:
-            del self._data["body"]["1"]["surface"]
 
     def _value(self, keys: tuple[str, ...]) -> Any:
-        value: Any = self._data
+        value: Any = self.data
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
         return value
 
     @functools.cached_property
     def _checked(self) -> tuple[dict[str, Any], list[Mistake]]:
-        return Deck.checked(self._data) if self._data else ({}, [])
+        data = self.data
+        if "surface" in self.given:
+            one = {key: value for key, value in data["body"]["1"].items() if key != "surface"}
+            data = {**data, "body": {**data["body"], "1": one}}
+        return Deck.checked(data) if data else ({}, [])
 
     def tables(self, *names: str) -> dict[str, Any]:
         """Return the named tables; refuse a key or a value in them that this version does not know."""

@@ -150,18 +150,22 @@ class Problem:
             raise deck_error(problems, given.source)
 
     @cached_property
-    def deck_text(self) -> str:
-        """The whole deck of the case, with included files, overrides, and series of loads from files."""
-        given = self._given
-        if given.text:
-            return given.text
-        data = plain(given.data)
+    def deck_tables(self) -> dict[str, Any]:
+        """The tables of `deck_text`."""
+        if self._given.text:
+            return self._given.data
+        data = plain(self._given.data)
         if self._gap.given:
             # this shape is refused in a deck
             data["body"]["1"]["surface"] = {"shape": FROM_PYTHON}
         if self._friction.varies:
             data["friction"]["coefficient"] = self._friction.in_deck
-        return given.remark + as_toml(data)
+        return dict(data)
+
+    @cached_property
+    def deck_text(self) -> str:
+        """The whole deck of the case, with included files, overrides, and series of loads from files."""
+        return self._given.text or self._given.remark + as_toml(self.deck_tables)
 
     def bulk(self, stress: tuple[float, float, float]) -> tuple[Array, Array]:
         """Return the whole bulk stress xx, yy, xy (Pa), and its strain, of body 1 less that of body 2."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
+from ..deck.recorded import recorded
 from ..variables import (
     FIELDS,
     FIXED,
@@ -382,7 +383,7 @@ def fault_of_sequence(before: Metadata, after: Metadata) -> str:
 
 def physics(deck: str) -> dict[str, Any]:
     """Return the tables of a deck that belong to the problem, without those of solution and output."""
-    tables = tomllib.loads(deck)
+    tables = recorded(deck).data
     solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
     return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 

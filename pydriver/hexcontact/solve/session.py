@@ -6,7 +6,6 @@ import copy
 import dataclasses
 import functools
 import threading
-import tomllib
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -346,7 +345,7 @@ class Session:
     def _loads_so_far(self) -> list[dict[str, Any]]:
         """Return the loads that iteration applied: those of the case, or one for each solved step."""
         if self._whole and not self.case.adaptive:
-            return list(tomllib.loads(self.case.deck_text)["load"])
+            return list(self.case.deck_tables["load"])
         return self._resolved(self._steps)
 
     def _resting_in(self, step: Step) -> frozenset[str]:
@@ -397,7 +396,7 @@ class Session:
 
     def _described(self, loads: Sequence[dict[str, Any]], count: int) -> Metadata:
         """Return the metadata of the result with a deck of these loads, and the number of their steps."""
-        tables = tomllib.loads(self.case.deck_text)
+        tables = self.case.deck_tables
         lattice = self._steps[-1].lattice if self._steps else self.case.lattice
         # the same nodes, whatever the largest load is
         grid = {key: value for key, value in tables["grid"].items() if key not in _FINENESS}

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexcontact.deck import units
+from hexcontact.deck.keys import WEAR_COEFFICIENT as COEFFICIENT
 from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, to_si
-from hexcontact.deck.wear import COEFFICIENT
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from ..deck.interface import Interface
 from ..deck.series import DRIVEN
 from ..deck.surfaces import Surface
 from ..deck.table_base import SYMBOLS, Argument, Table, not_included
-from ..deck.wear import Wear
 from ..deck.write import plain
 from ..text import listed, nearest
 
@@ -24,7 +23,7 @@ _TABLES: dict[str, type[Table]] = {  # of arguments that take one
     "bulk": deck_keys.Bulk,
     "interface": Interface,
     "accuracy": deck_keys.Accuracy,
-    "wear": Wear,
+    "wear": deck_keys.Wear,
     "loads": deck_keys.Load,
 }
 

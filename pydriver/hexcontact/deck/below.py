@@ -7,53 +7,37 @@ from typing import Annotated, Any, ClassVar
 
 from ..text import did_you_mean, listed
 from ..variables import STRESSES
-from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
+from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr
 from .table_base import Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
 
-class _Point(Several):
-    """A point of a body: x, y and its depth below the surface."""
-
-    def _parse(self, value: object) -> tuple[float, ...]:
-        point = super()._parse(value)
-        if point[2] < 0.0:
-            refuse("expected a point of the body: a depth of at least 0, whichever body it is")
-        return point
+def _above(point: Sequence[float]) -> str:
+    """Return the fault of a point above the surface."""
+    return "expected a point of the body: a depth of at least 0, whichever body it is" * (point[2] < 0.0)
 
 
-class _Side(Several):
-    """The smallest and the largest coordinate of a box along an axis."""
-
-    def _parse(self, value: object) -> tuple[float, ...]:
-        low, high = super()._parse(value)
-        if low >= high:
-            refuse("expected the smaller coordinate first")
-        return low, high
+def _falling(side: Sequence[float]) -> str:
+    """Return the fault of a side of a box."""
+    return "expected the smaller coordinate first" * (side[0] >= side[1])
 
 
-class _Corners(Several):
-    """The ends of a line, or three corners of a parallelogram."""
-
-    def _parse(self, value: object) -> tuple[Any, ...]:
-        points = super()._parse(value)
-        sides = [[b - a for a, b in zip(points[0], point, strict=True)] for point in points[1:]]
-        if len(points) == 2 and not any(sides[0]):
-            refuse("expected two different points")
-        if len(points) == 3 and all(
-            sides[0][i - 1] * sides[1][i] == sides[0][i] * sides[1][i - 1] for i in range(3)
-        ):
-            refuse("expected three points that are not on one line")
-        return points
+def _degenerate(points: Sequence[Sequence[float]]) -> str:
+    """Return the fault of the ends of a line, or of three corners of a parallelogram."""
+    one, two = ([b - a for a, b in zip(points[0], point, strict=True)] for point in (points[1], points[-1]))
+    if len(points) == 2:
+        return "" if any(one) else "expected two different points"
+    on_a_line = all(one[i - 1] * two[i] == one[i] * two[i - 1] for i in range(3))
+    return "expected three points that are not on one line" * on_a_line
 
 
-_POINT = _Point(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', count=3)
-_SIDE = _Side(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2)
+_POINT = Several(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', 3, _above)
+_SIDE = Several(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2, _falling)
 _ENDS = '[["0 mm", "0 mm", "0 um"], ["0 mm", "0 mm", "2 mm"]]'
 _CORNERS = "[[-1e-3, 0, 0], [1e-3, 0, 0], [-1e-3, 0, 1e-3]]"
 _Points = Annotated[tuple[Any, ...], Several(_POINT, "points", '[["0 mm", "0 mm", "20 um"]]')]
-_Line = Annotated[tuple[Any, ...], _Corners(_POINT, "points", _ENDS, 2)]
-_Plane = Annotated[tuple[Any, ...], _Corners(_POINT, "points", _CORNERS, 3)]
+_Line = Annotated[tuple[Any, ...], Several(_POINT, "points", _ENDS, 2, _degenerate)]
+_Plane = Annotated[tuple[Any, ...], Several(_POINT, "points", _CORNERS, 3, _degenerate)]
 _DEPTHS = Several(Quantity(LENGTH, at_least=0), "depths", '["10 um", "20 um", "50 um"]')
 _BOX = Several(_SIDE, "pairs of lengths", '[["-1 mm", "1 mm"], ["-1 mm", "1 mm"]]', 2)
 _Count = Annotated[tuple[int, ...], Several(Whole(2, 100_000), "whole numbers", "[81, 41]")]

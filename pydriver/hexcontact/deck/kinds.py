@@ -6,7 +6,7 @@ import contextlib
 import math
 import operator
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeGuard, TypeVar
@@ -215,13 +215,13 @@ class Whole(Kind):
 
     def _parse(self, value: object) -> int:
         try:
-            number = -1 if isinstance(value, bool) else operator.index(value)  # type: ignore[arg-type]
+            number = operator.index(value)  # type: ignore[arg-type]
         except TypeError:
             number = self.at_least - 1
+        if isinstance(value, bool) or number < self.at_least:
+            refuse(f"expected {self.expected}")
         if number > self.at_most:
             refuse(f"expected a whole number of at most {self.at_most}")
-        if number < self.at_least or isinstance(value, bool):
-            refuse(f"expected {self.expected}")
         return number
 
     def _schema(self) -> Schema:
@@ -327,15 +327,13 @@ class RadiusOfCurvature(Quantity):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Several(Kind):
-    """An array of values of one kind: `count` of them, or at least one.
-
-    `plural` is the noun for them, `example` an array as in a deck.
-    """
+    """An array of values of one kind: `count` of them, or at least one."""
 
     kind: Kind
-    plural: str
-    example: str
+    plural: str  # noun for them
+    example: str  # an array as in a deck
     count: int | None = None
+    fault_of: Callable[[Any], str] = lambda _: ""  # sentence about values that do not fit together
 
     def _expected(self) -> str:
         number = {None: "an array of", 2: "two", 3: "three"}[self.count]
@@ -353,6 +351,8 @@ class Several(Kind):
                 parsed.append(self.kind.parse(entry))
             except PydanticCustomError as error:
                 refuse(f"expected {self.expected}; entry {number}, {shown(entry)}: {error.message()}")
+        if fault := self.fault_of(parsed):
+            refuse(fault)
         return tuple(parsed)
 
     def written(self, value: Any) -> list[Any]:

@@ -69,7 +69,7 @@ class RecordedDeck:
         return curved[0] if len(curved) == 1 else None
 
 
-@functools.lru_cache(16)
+@functools.lru_cache(4)
 def recorded(text: str, name: str = "deck of the result") -> RecordedDeck:
     """Return the deck of a result by its text; `name` stands for it in messages."""
     return RecordedDeck(text, name)

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexcontact.deck import units
@@ -117,12 +117,14 @@ DIRECT = [
 
 
 @pytest.mark.parametrize(("dimension", "unit"), [*DIRECT, *((ANGLE, unit) for unit in units._ANGLES)])
+@settings(deadline=None)
 @given(number=st.floats(allow_nan=False, allow_infinity=False, width=32))
 def test_units_without_pint_agree_with_it(dimension: units.Dimension, unit: str, number: float) -> None:
     by_pint = units._by_pint(number, unit, dimension)
     assert to_si(f"{number!r} {unit}", dimension) == pytest.approx(by_pint, rel=5e-16, abs=1e-320)
 
 
+@settings(deadline=None)
 @given(st.text(max_size=30))
 def test_any_text_is_a_quantity_or_a_unit_error(text: str) -> None:
     for dimension in (LENGTH, ANGLE, NUMBER):

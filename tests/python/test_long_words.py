@@ -157,7 +157,7 @@ def kinds(table: type[Table]) -> Iterator[tuple[str, Kind]]:
 
 @pytest.mark.parametrize("unit", ["9", " ", "a(", "9.", "m "])
 def test_each_key_reads_a_long_word_in_proportion_to_its_length(unit: str) -> None:
-    """Times are of the processor; ten times the length takes at most twenty times as long."""
+    """Ten times the length takes ten to twenty times as long, under load more; a hundred at quadratic cost."""
 
     def time_of(kind: Kind, text: str) -> float:
         start = time.process_time()
@@ -170,7 +170,7 @@ def test_each_key_reads_a_long_word_in_proportion_to_its_length(unit: str) -> No
     for before, (key, kind) in itertools.product(("", "1 ", "1 m"), known.items()):
         short, long = (before + unit * (size // len(unit)) for size in (100_000, 1_000_000))
         if time_of(kind, long) > 0.02:
-            assert least(time_of, kind, long) < 20.0 * least(time_of, kind, short), key
+            assert least(time_of, kind, long) < 40.0 * least(time_of, kind, short), key
 
 
 LINES = {

@@ -116,6 +116,26 @@ def test_next_to_no_tension_has_its_plane_about_any_axes(seed: int, numbers: tup
         assert value.min() > (1.0 - 1e-5) * max(best, value.max()), number
 
 
+@pytest.mark.parametrize("across", [0.0, 0.2, 0.7])
+@pytest.mark.parametrize("shear", [1e-3, 1e-4])
+def test_pressure_with_next_to_no_shear_has_its_plane(across: float, shear: float) -> None:
+    """Pressures p across x and z, shear t in the planes y: the tension t^2/p is that of a narrow range of planes.
+
+    Cells found no tension at all, or 9 % less.
+    """
+    pressure, young, nu = np.array([100e6, 160e6, 130e6]), 72e9, 0.33
+    stress = np.zeros((3, 3, 3))
+    stress[:, 0, 0], stress[:, 2, 2] = -across * pressure, -pressure
+    side = 0 if across else 2
+    stress[:, 1, side] = stress[:, side, 1] = shear * 100e6
+    tension = shear**2 * 100e6 / (across or 1.0)
+    exact = tension * nu * (1.0 + across) * 60e6 / (2.0 * young)
+    turns = Rotation.random(20, random_state=2).as_matrix()
+    turned = turns[:, None] @ stress @ np.swapaxes(turns, 1, 2)[:, None]
+    found = fatigue.smith_watson_topper(critical_planes._listed(turned), young, nu).value
+    np.testing.assert_allclose(found, exact, rtol=1e-4)
+
+
 def test_tension_and_shear_out_of_phase_have_the_plane_across_the_tension() -> None:
     stress = np.zeros((41, 3, 3))
     stress[:, 0, 0] = 50e6 + 120e6 * np.sin(PHASE)

@@ -141,7 +141,7 @@ def shortfalls(number: int, seed: int = 1) -> dict[str, dict[str, Array]]:
         plane, turned = found_by(_listed(stress)), found_by(_listed(other))
         here = np.array([parameter(s, n[None])[0] for s, n in zip(stress, plane.normal, strict=True)])
         best = np.array([searched(parameter, s) for s in stress])
-        scale = np.maximum(abs(best), 1e-30)
+        scale = np.maximum(np.maximum(abs(best), abs(plane.value)), 1e-30)
         table[name] = {
             "kind": np.array(kinds),
             "missing": (best - plane.value) / scale,

@@ -365,7 +365,7 @@ contains
     end associate
   end subroutine test_correction
 
-  !> A traction that rises like a root has one. A plateau that ends at the edge has none: the polynomial through its squares vanishes
+  !> A traction that rises like a root has one. A plateau that ends at the edge has none: the polynomial through its squares is 0
   !> ten spacings away, where nothing is to be fitted, and errors are small beside its slope.
   subroutine test_roots(error)
     type(error_t), allocatable, intent(out) :: error

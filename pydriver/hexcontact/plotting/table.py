@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..arrays import Array
 from ..text import scaled, worded
 from .fatigue import LEVELS, colored_values, map_of, mark_worst, section_of
 from .lines import draw_tables
@@ -67,7 +68,7 @@ def _worst(field: xarray.DataArray) -> xarray.DataArray:
     return field
 
 
-def _places(field: xarray.DataArray) -> tuple[np.ndarray, np.ndarray, dict[str, str]]:
+def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
     """Return the coordinates of a map in a unit, with the labels of the axes."""
     if np.ptp(field["depth"].values) > 0.0:
         return section_of(field)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _COLUMNS = 3  # maps beside each other
 
 
-@figure("table", "a table of stresses or fatigue parameters, by its own file", needs="a table")
+@figure("table", "the file of one table of stresses or fatigue", needs="a table")
 def table(table: xarray.Dataset) -> Figure:
     """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth.
 

@@ -119,6 +119,14 @@ def test_uncertain_energy_is_stated() -> None:
     ]
 
 
+def test_energy_that_adaptive_steps_leave_uncertain_is_stated() -> None:
+    result = sphere(
+        [{"normal_load": P, "steps": "auto"}], soft=30e9, poisson=0.3, friction_coefficient=0.1
+    ).run()
+    [remark] = [each for each in Summary.of_result(result).remarks if "uncertain" in each]
+    assert remark.endswith("give numbers of steps, of which twice as many leave half of it")
+
+
 def test_static_steps_have_no_bound() -> None:
     assert "dissipated_energy_path_error" not in sphere(circle(1, 4), algorithm="static").run().dataset
 

@@ -460,7 +460,9 @@ time = 01:30:00
 nice = 10
 exclusive = true
 requeue = false
-nodelist = "n[1-3]"
+nodelist = "n[1-3],n7"
+mail-type = "END,FAIL"
+export = "NONE"
 """
     (folder / "study.toml").write_text(told + options)
     (folder / "study.toml").rename("my study; touch PWN.toml")
@@ -479,7 +481,9 @@ nodelist = "n[1-3]"
         "time=01:30:00",
         "nice=10",
         "exclusive",
-        "nodelist=n[1-3]",
+        "nodelist=n[1-3],n7",
+        "mail-type=END,FAIL",
+        "export=NONE",
     }
     words = lines[-1].replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
     environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "3"}
@@ -500,7 +504,8 @@ nodelist = "n[1-3]"
         ('array = "1-9"', "slurm.array = "),
         ("time = [1, 2]", "slurm.time = [1, 2]: expected text, a number, or true or false"),
         ('comment = ""', "slurm.comment = "),
-        ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected one value, without commas"),
+        ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected ALL, NIL or NONE"),
+        ('export = "LD_PRELOAD=/tmp/x.so"', "expected ALL, NIL or NONE"),
         ("cases_per_task = 0", "slurm.cases_per_task = 0: expected a whole number of at least 1"),
     ],
 )

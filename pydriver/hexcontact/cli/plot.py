@@ -39,21 +39,23 @@ def _help() -> str:
     choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
     choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
-    of_a_result, of_a_study, of_none = (
+    of_a_result, of_a_study, of_a_table, of_none = (
         "\n".join(f"{name:<{width}}{words}" for kind, name, words in choices if kind == wanted)
-        for wanted in ("result", "study", "")
+        for wanted in ("result", "study", "table", "")
     )
     return (
         f"{_DRAWS}\n\n"
         "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
         f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
-        f"\b\nOf a study:\n{of_a_study}\n\n\b\nWithout FILE:\n{of_none}"
+        f"\b\nOf a study:\n{of_a_study}\n\n\b\nOf a table:\n{of_a_table}\n\n"
+        f"\b\nWithout FILE:\n{of_none}"
     )
 
 
 def _kind(entry: Entry) -> str:
-    """Return what the FILE of a figure is: a result, a study, or nothing."""
-    return "result" if entry.of_a_result else "study" if entry.of_a_study else ""
+    """Return what the FILE of a figure is: a result, a study, a table, or nothing."""
+    kinds = {"result": entry.of_a_result, "study": entry.of_a_study, "table": entry.of_a_table}
+    return next((kind for kind, holds in kinds.items() if holds), "")
 
 
 @command(
@@ -64,7 +66,9 @@ def _kind(entry: Entry) -> str:
 def plot(
     files: Annotated[
         list[Path] | None,
-        argument("FILE", "The result, a netCDF file; several for zones, outlines and compliance."),
+        argument(
+            "FILE", "The result or a table of it, a netCDF file; several for zones, outlines and compliance."
+        ),
     ] = None,
     what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
@@ -106,6 +110,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
+    from ..interior.tables import read_table
     from ..plotting.registry import entries
     from ..result.store import open_result
     from ..study.shown import read_study, study_of
@@ -115,16 +120,19 @@ def plot(
     if what not in (known := [*figures, _ALL]):
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
     study = study_of(files[0]) if len(files) == 1 else None
-    if study is not None and what == "overview":
-        what = "study"
+    table = read_table(files[0]) if len(files) == 1 and study is None else None
+    holds = "study" if study is not None else "table" if table is not None else "result"
+    if holds != "result" and what == "overview":
+        what = holds
     shows = "result" if what == _ALL else _kind(figures[what])
-    if files and shows and (study is not None) != (shows == "study"):
-        kind = "the result of a study; expected --what study" if study else "not the result of a study"
+    if files and shows and holds != shows:
+        words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
+        kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
     if bool(files) != bool(shows):
         expected = "expected no FILE" if files else "expected the FILE of a result"
         raise DeckError(f"--what {what}: {expected}")
-    results: list[Any] = [open_result(file) for file in files] if study is None else []
+    results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
         "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
@@ -147,6 +155,8 @@ def plot(
         return
     if study is not None:
         files, results = [study], [read_study(study)]
+    elif table is not None:
+        results = [table]
     default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
     print_output(f"written: {picture_of(results, what, output or default, chosen)}")
 

@@ -24,7 +24,7 @@ from ..deck.below import Fatigue, Stress
 from ..errors import DeckError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
-from ..interior.tables import read_table, tables_of
+from ..interior.tables import readable_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
 from ..result.history import energy_table, load_or_motion, worth_showing
@@ -191,7 +191,7 @@ def _below(result: Result) -> Table:
         steps = labels or ("last",) if table.steps is None else np.atleast_1d(table.steps)
         output = Path(result.path or "output")
         file = output.with_name(f"{output.stem}_{name}.nc")
-        found = read_table(file)
+        found = readable_table(file)
         fields = {} if found is None else found.data_vars
         places = [f"{key}: {place}" for key, field in fields.items() if (place := place_of(field))]
         shown = ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from .. import netcdf_library
 from ..deck.below import Criteria, Fatigue, Stress
 from ..deck.recorded import recorded
 from ..errors import DeckError
-from ..files import remove_stale, replacing
+from ..files import reading, remove_stale, replacing
 from ..text import quantity
 from .below import BelowSurface
 from .extremes import extremes_of, place_of
@@ -79,7 +80,7 @@ def at_hand(
     for name, table in tables_of(result.deck).items():
         if names is not None and name not in names:
             continue
-        found = read_table(files[name]) if files else None
+        found = readable_table(files[name]) if files else None
         if found is None or found.attrs.get("stress_of") != run:
             found = of_table(result, name, table, kept)
         yield name, found
@@ -121,14 +122,24 @@ def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
 
 
 def read_table(path: Path) -> xarray.Dataset | None:
-    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
+    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one.
+
+    Raises
+    ------
+    DeckError
+        If it is damaged.
+    """
     if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
-    try:
-        with netcdf_library.opened_by_xarray(path) as found:
-            return found.load()
-    except (OSError, ValueError):
-        return None
+    with reading(path), netcdf_library.opened_by_xarray(path) as found:
+        return found.load()
+
+
+def readable_table(path: Path) -> xarray.Dataset | None:
+    """Return the dataset of a file as `read_table`; None of a damaged one, too."""
+    with contextlib.suppress(DeckError):
+        return read_table(path)
+    return None
 
 
 def content_of(path: Path) -> dict[str, Any]:

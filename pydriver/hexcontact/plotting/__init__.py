@@ -25,6 +25,7 @@ from .compliance import compliance
 from .overview import overview
 from . import influence as influence
 from . import study as study
+from . import table as table
 from .registry import entries
 
 __all__ = [

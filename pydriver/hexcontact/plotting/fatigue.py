@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-_LEVELS = 12
+LEVELS = 12
 _MARGIN = 1.5  # width of the map over that of the contact
 _ENDLESS = 1e9  # cycles beyond which life is shown as endless
 
@@ -76,19 +76,14 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     canvas = new_figure(3.6 * columns + 0.2, 3.9 * rows + 0.3)
     panels = canvas.subplots(rows, columns, squeeze=False).ravel()
     for axes, (table, field) in zip(panels, drawn, strict=True):
-        factor, label = _scale(field)
-        values = np.squeeze(field.values) * factor
-        levels: Any = _LEVELS
-        scale: dict[str, Any] = {"ticks": MaxNLocator(6)}
-        if field.name == "life":
-            values = np.log10(np.clip(values, 1.0, _ENDLESS))
-            scale["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
-        elif field.name == first:  # common to panels of the same parameter
-            levels = MaxNLocator(_LEVELS).tick_values(lowest * factor, highest * factor)
+        values, factor, scale = colored_values(field)
+        levels: Any = LEVELS
+        if field.name == first != "life":  # common to panels of the same parameter
+            levels = MaxNLocator(LEVELS).tick_values(lowest * factor, highest * factor)
         draw = _draw_surface if table == surface else _draw_section
         colored = draw(axes, view, field, values, levels)
         axes.set_title(f"{'surface' if table == surface else 'section'} of body {tables[table].body}")
-        canvas.colorbar(colored, ax=axes, label=label, location="bottom", shrink=0.9, **scale)
+        canvas.colorbar(colored, ax=axes, location="bottom", shrink=0.9, **scale)
     legend_under(canvas, handles_of(*panels))
     set_title(canvas, title_of(result.dataset))
     return canvas
@@ -98,6 +93,17 @@ def _first_of(found: xarray.Dataset, name: str) -> xarray.DataArray:
     """Return a parameter of a table, the first other one if it has not got it."""
     others = (other for other, field in found.data_vars.items() if field.attrs["units"] != "rad")
     return found[name if name in found else min(others, key=lambda other: other == "life")]
+
+
+def colored_values(field: xarray.DataArray) -> tuple[Array, float, dict[str, Any]]:
+    """Return values in a unit, its factor and the options of the color scale; life as a power of ten."""
+    factor, label = _scale(field)
+    values = np.squeeze(field.values) * factor
+    scale: dict[str, Any] = {"label": label, "ticks": MaxNLocator(6)}
+    if field.name == "life":
+        values = np.log10(np.clip(values, 1.0, _ENDLESS))
+        scale["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
+    return values, factor, scale
 
 
 def _scale(field: xarray.DataArray) -> tuple[float, str]:
@@ -110,12 +116,12 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     return factor, f"{named} ({unit})" if unit else named
 
 
-def _map_of(field: xarray.DataArray) -> str:
+def map_of(field: xarray.DataArray) -> str:
     """Return the colors of a parameter: what is worst is bright."""
     return "viridis_r" if field.name == "life" else "viridis"
 
 
-def _mark(axes: Axes, x: Array, y: Array, field: xarray.DataArray, values: Array) -> None:
+def mark_worst(axes: Axes, x: Array, y: Array, field: xarray.DataArray, values: Array) -> None:
     """Mark the largest value of a parameter, or the least life."""
     if field.name == "life":
         mark_largest(axes, x, y, -values, "least life")
@@ -127,7 +133,7 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: A
     """Draw a map of the surface with the outlines of contact and stick area."""
     part = Part.around([view], _MARGIN)
     x, y = field["x"].values * part.factor, field["y"].values * part.factor
-    drawn = axes.contourf(x, y, values, levels, cmap=_map_of(field))
+    drawn = axes.contourf(x, y, values, levels, cmap=map_of(field))
     part.show(axes)
     meshes = [("contact area", "white", mesh_of(view, view.pressure, True))]
     if view.friction != 0.0 and view.has("zone"):
@@ -136,20 +142,27 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: A
         look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": EDGED}
         for polygon in mesh.outlines():
             axes.plot(*(polygon * part.factor).T, label=f"{name} in step {view.number}", **look)
-    _mark(axes, x, y, field, values)
+    mark_worst(axes, x, y, field, values)
     return drawn
 
 
 def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, values: Array, levels: Any) -> Any:
     """Draw a section, with contact and stick as bars above the surface."""
     x, y = field["x"].values, field["y"].values
+    along, depth, words = section_of(field)
+    drawn = axes.contourf(along, depth, values, levels, cmap=map_of(field))
+    draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
+    mark_worst(axes, along, depth, field, values)
+    axes.set_ylim(depth.max(), depth.min() - 0.06 * np.ptp(depth))
+    axes.set(**words, aspect="equal")
+    return drawn
+
+
+def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
+    """Return places along a section and depths in a unit, with the labels of the axes."""
+    x, y = field["x"].values, field["y"].values
     along = x if np.ptp(y) == 0.0 else y if np.ptp(x) == 0.0 else np.hypot(x - x[0, 0], y - y[0, 0])
     factor, unit = scaled(float(abs(along).max()), "m")
-    along, depth = along * factor, field["depth"].values * factor
-    drawn = axes.contourf(along, depth, values, levels, cmap=_map_of(field))
-    draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
-    _mark(axes, along, depth, field, values)
-    axes.set_ylim(depth.max(), depth.min() - 0.06 * np.ptp(depth))
     word = "x" if np.ptp(y) == 0.0 else "y" if np.ptp(x) == 0.0 else "distance"
-    axes.set(xlabel=f"{word} ({unit})", ylabel=f"depth ({unit})", aspect="equal")
-    return drawn
+    words = {"xlabel": f"{word} ({unit})", "ylabel": f"depth ({unit})"}
+    return along * factor, field["depth"].values * factor, words

@@ -348,7 +348,7 @@ def _draw_loop(
             raise DeckError(f"there is no cycle {number}; the history has {len(found)}")
         first, last, area = found[place]
         steps = slice(first, last + 1)
-        label = f"cycle {place % len(found) + 1}: loop of {worded(area, 'J')}"
+        label = f"cycle {place % len(found) + 1}:\nloop of {worded(area, 'J')}"
         axes.fill(x[steps] * to_x, y[steps] * to_y, color=color, alpha=0.12, lw=0, label=label, zorder=1)
         if chosen is not None:
             axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)

@@ -64,7 +64,11 @@ def lines(result: Result | xarray.Dataset) -> Figure:
     names = [name for name, table in tables_of(result.deck).items() if table.line or table.points]
     if not names:
         raise NotInResult("the deck has no table [[stress]] or [[fatigue]] of a line or of points")
-    shown = list(at_hand(result, kept_steps(result), names))
+    return draw_tables(list(at_hand(result, kept_steps(result), names)), title_of(result.dataset))
+
+
+def draw_tables(shown: Sequence[tuple[str, xarray.Dataset]], title: str) -> Figure:
+    """Draw tables of a line or of points, below each other."""
     panels = [_panels(found) for _, found in shown]
     rows = [-(-len(of_table) // _COLUMNS) for of_table in panels]
     columns = min(_COLUMNS, max(map(len, panels)))
@@ -73,7 +77,7 @@ def lines(result: Result | xarray.Dataset) -> Figure:
     parts = canvas.subfigures(len(shown), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (name, found), of_table in zip(parts, shown, panels, strict=True):
         _draw_table(part, name, found, of_table, columns)
-    set_title(canvas, title_of(result.dataset))
+    set_title(canvas, title)
     return canvas
 
 

@@ -59,6 +59,11 @@ class Entry:
         return "study" in self.options
 
     @property
+    def of_a_table(self) -> bool:
+        """Whether it shows a table [[stress]] or [[fatigue]]."""
+        return "table" in self.options
+
+    @property
     def of_several(self) -> bool:
         """Whether it may show several results."""
         return "results" in self.options

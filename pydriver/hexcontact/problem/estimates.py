@@ -74,11 +74,13 @@ def seconds(case: Problem) -> float | None:
 
 def work(case: Problem) -> str:
     """Return the estimate in words: "about 1,800 operator applications, about 4 s on one core"."""
-    runs = [[*cases] for cases in (least_and_most(case) if case.accuracy else ([case],))]
-    for cases in runs if case.estimates_tables else []:
-        cases += coarser(cases[-1])
-    applications = [_total(operator_applications(one) for one in cases) for cases in runs]
-    times = [_total(seconds(one) for one in cases) for cases in runs]
+    runs = [*least_and_most(case)] if case.accuracy else [[case]]
+    smaller = [coarser(cases[-1]) if case.estimates_tables else [] for cases in runs]
+    applications = [
+        _total([*map(operator_applications, cases), *(_on_finer(one, cases[-1]) for one in more)])
+        for cases, more in zip(runs, smaller, strict=True)
+    ]
+    times = [_total(map(seconds, [*cases, *more])) for cases, more in zip(runs, smaller, strict=True)]
     if None in applications or None in times:
         return "LAPACK on the nodes in contact, not estimated"
     count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
@@ -93,6 +95,12 @@ def work(case: Problem) -> str:
     )
     guess = guess * case.adaptive + chosen * (wear is not None and isinstance(wear.jump, str))
     return f"about {count} operator applications, about {durations} on one core{guess}{unworn}"
+
+
+def _on_finer(case: Problem, finer: Problem) -> float | None:
+    """Return the work of a case in operator applications on a finer lattice."""
+    applications = operator_applications(case)
+    return None if applications is None else applications * case.lattice.size / finer.lattice.size
 
 
 def _total(parts: Iterable[float | None]) -> float | None:

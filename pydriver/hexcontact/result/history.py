@@ -506,10 +506,16 @@ def uncertain_energy(histories: Sequence[History]) -> str:
     share = path_error_share(histories[-1])
     if share <= _UNCERTAIN:
         return ""
+    chosen = step_error_share(histories[-1]) is not None
+    more = (
+        'steps = "auto" resolves stick area, tractions and loads that turn: give numbers of steps, of which '
+        if chosen
+        else ""
+    )
     return (
         f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since "
-        "nodes slip in directions that turn or under a pressure that changes; twice as many steps leave half "
-        "of it"
+        f"nodes slip in directions that turn or under a pressure that changes; {more}twice as many "
+        f"{'' if chosen else 'steps '}leave half of it"
     )
 
 

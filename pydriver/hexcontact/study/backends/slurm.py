@@ -13,10 +13,12 @@ from typing import Annotated, Any
 
 from ...deck.model import meaning, refuse_key
 from ...errors import DeckError
+from ...text import listed
 from ..backend import OptionTable, backend
 
 _BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
 _CASES = "cases_per_task"
+_EXPORTS = ("ALL", "NIL", "NONE")
 _MOST_TASKS = 1000  # Slurm refuses indices from MaxArraySize on, which is 1001 by default
 
 
@@ -42,8 +44,8 @@ class BatchOptions(OptionTable):
                 refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
             if isinstance(entry, str) and _text(entry) is None:
                 refuse_key(key, entry, 'expected text on one line, without " and \\')
-            if isinstance(entry, str) and "," in entry:  # such as variables of the environment for `export`
-                refuse_key(key, entry, "expected one value, without commas")
+            if key == "export" and entry not in _EXPORTS:  # values of variables, such as LD_PRELOAD
+                refuse_key(key, entry, f"expected {listed(_EXPORTS, 'or')}")
             if not isinstance(entry, str | int | float | datetime.time):
                 refuse_key(key, entry, "expected text, a number, or true or false")
         return options

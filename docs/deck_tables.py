@@ -1,4 +1,4 @@
-"""Fill the tables of docs/deck.md and docs/studies.md from the models: they say what the program checks.
+"""Fill the tables of docs/keys.md and docs/studies.md from the models: they say what the program checks.
 
 Run it after a change of the deck format: ``python docs/deck_tables.py``.
 """
@@ -19,7 +19,7 @@ from hexcontact.study.backends.dask import Dask
 from hexcontact.study.tables import Parameter, StudyFile
 from hexcontact.text import shown
 
-PAGE = Path(__file__).with_name("deck.md")
+PAGE = Path(__file__).with_name("keys.md")
 PAGES = (PAGE, PAGE.with_name("studies.md"), PAGE.with_name("theory") / "expected_errors.md")
 TABLES: dict[str, type[Table]] = {
     "deck": tables.Deck,

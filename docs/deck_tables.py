@@ -23,7 +23,7 @@ from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 PAGE = Path(__file__).with_name("keys.md")
 PAGES = (
     PAGE,
-    *(PAGE.with_name(f"{name}.md") for name in ("variables", "studies")),
+    PAGE.with_name("variables.md"),
     PAGE.with_name("theory") / "expected_errors.md",
 )
 TABLES: dict[str, type[Table]] = {

@@ -101,10 +101,10 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 	cd output && hexcontact plot dissimilar_fretting.nc --what history
 	cd output && hexcontact report dissimilar_fretting.nc
 
-verify: install  ## compare with published, discrete and analytic solutions (minutes)
-	$(py) tests/validation/run.py $(CHECKS)
+verify: install  ## compare with published, discrete and analytic solutions; updates docs/validation.md and .csv (minutes)
+	$(py) tests/validation/run.py --write $(CHECKS)
 
-bench: install  ## work, times, memory, other codes side by side: tables of docs/performance.md and others (BENCH_ARGS=--quick: minutes)
+bench: install  ## work, times, memory, other codes side by side: docs/measurements.md and other pages (BENCH_ARGS=--quick: minutes)
 	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)
 
 # --- tests -------------------------------------------------------------------

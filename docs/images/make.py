@@ -171,6 +171,8 @@ COARSER = {
 HEADER = """\
 # Gallery
 
+Made by `python docs/images/make.py`; do not edit.
+
 The decks of `cases/`, each with its picture; [a table](cases.md) lists what they are compared with.
 """
 DECK = re.compile(r"^\| `(\w+)\.toml` \| (.+?) \| .* \| `(\w+\.nc.*)` \|$")

@@ -4,7 +4,7 @@
     python tests/mutants/run.py --until check       not the whole suite
     python tests/mutants/run.py --only python       the mutants of pydriver/ alone
     python tests/mutants/run.py --again             survivors once more, after tests were added
-    python tests/mutants/run.py --write             put the table into docs/developer.md
+    python tests/mutants/run.py --write             put the tables into docs/measurements.md
 
 A seed draws mutants of fortran/ and pydriver/: an operator, a constant or a whole line is changed in a copy
 of the checkout below build/mutants. Each meets the tests of its own file, then those of `make check`;

@@ -4,13 +4,13 @@ import csv
 import math
 import tomllib
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
-from validation import checks, fatigue, normal, runs
+from validation import checks, fatigue, normal, page, runs
 from validation import reference as table_of_references
 from validation.reference import TABLE, Comparison, reference
-from validation.run import markdown
 
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.cli import verify
@@ -112,15 +112,33 @@ def test_exit_code(capsys, computed: float, code: int) -> None:
     assert f"made-up: {1 if code else 2} of 2 comparisons passed" in printed.out
 
 
-def test_markdown() -> None:
-    check = made_up(2.1)["made-up"]
-    lines = markdown(check, check.run()).splitlines()
-    assert lines[0] == "## Made up"
-    assert "| one | length (µm) |  |  | **2** | 2.1 | +1.0e-01 µm | 1e-02 µm | FAIL |" in lines
-    assert "| one | time (s) |  |  |  | 0.5 |  |  |  |" in lines
-    assert "| one | max \\|p - q\\| |  |  | **0** | 1.000000e-09 | +1.0e-09 | 1e-08 | ok |" in lines
-    widths = {line.replace("\\|", "").count("|") for line in lines if line.startswith("|")}
-    assert len(widths) == 1
+def test_page_has_the_worst_row_of_each_check_and_the_file_all_rows(tmp_path: Path) -> None:
+    target = tmp_path / "validation.md"
+    known = made_up(2.1) | {"other": Check("other", "Other (Table 1)", "", lambda: Comparison())}
+    other = Comparison()
+    other.add("two", "angle", "-", 1.01, analytic=1.0, relative=0.1)
+    page.write(known["other"], other, known, target)
+    assert "compares 1 numbers" in target.read_text()
+    page.write(known["made-up"], known["made-up"].run(), known, target)
+    text = target.read_text()
+    assert "compares 3 numbers with independent values; 2 are within" in text
+    assert text.splitlines()[-2:] == [
+        "|`made-up`|Made up|one, length (µm)|analytic|+1.0e-01 µm|1e-02 µm|",
+        "|`other`|Other|two, angle|analytic|+1.0e-02|1e-01|",
+    ]
+    rows = page.read(target.with_suffix(".csv"))
+    assert [row["quantity"] for row in rows["made-up"]] == ["length (µm)", "max |p - q|"]  # no times
+    assert [(row["computed"], row["result"]) for row in rows["other"]] == [("1.01", "ok")]
+    page.write(known["made-up"], made_up(2.001)["made-up"].run(), known, target)
+    assert [len(found) for found in page.read(target.with_suffix(".csv")).values()] == [2, 1]
+    assert "3 are within" in target.read_text()
+
+
+def test_page_and_file_have_the_same_rows_of_every_check(tmp_path: Path) -> None:
+    rows = page.read(page.PAGE.with_suffix(".csv"))
+    assert list(rows) == list(checks.CHECKS)
+    lines = [page.line(checks.CHECKS[name], found) for name, found in rows.items()]
+    assert page.PAGE.read_text(encoding="utf-8").endswith("".join(lines))
 
 
 def test_list_and_unknown_names(capsys) -> None:

@@ -19,6 +19,9 @@ COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
 PERTURBED_BUILD := build/perturbed
 PERTURBED_SITE := build/perturbed-site
+FLANG := flang-22
+FLANG_BUILD := build/flang
+FLANG_SITE := build/flang-site
 
 # Least share of lines that tests must reach, percent.
 COVERED_FORTRAN := 97
@@ -34,10 +37,10 @@ pip_build := $(pip) install --quiet --no-build-isolation
 # Files of tests go to one process each, so that what they share is made once.
 PYTEST_JOBS ?= $(if $(strip $(PYTEST_ARGS)),0,logical)
 pytest := -m pytest --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 --dist=loadscope $(PYTEST_ARGS)
-# A build of its own, installed beside that of .venv and not hidden by an editable one: site, build folder, settings.
+# A build of its own, installed beside that of .venv and not hidden by an editable one: site, build folder, settings, compiler.
 define build_apart
 @rm -rf $(1)
-@$(pip_build) --no-deps --target $(1) -C build-dir=$(2) $(addprefix -C setup-args=-D,tests=true $(3)) .
+@$(if $(4),FC=$(4)) $(pip_build) --no-deps --target $(1) -C build-dir=$(2) $(addprefix -C setup-args=-D,tests=true $(3)) .
 @cp .ci/sitecustomize.py $(1)
 @PYTHONPATH=$(CURDIR)/$(1) $(py) -c "import hexcontact, sys; '/$(1)/' in hexcontact.__file__ or sys.exit('hexcontact is not imported from $(1)')"
 endef
@@ -56,7 +59,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -135,6 +138,14 @@ debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extr
 	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) $(pytest) $(if $(filter debug-check,$@),$(CHECKED:%=tests/python/test_%.py))
 debug-test:  ## all tests on a build that checks bounds and traps NaN
 debug-check:  ## the tests of the solvers on that build (minutes)
+
+# With openmp=enabled, so that a build in one thread does not pass for one with threads.
+flang-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## the quick tests on a build of LLVM's flang, which is installed
+	@sh .ci/bootstrap.sh --flang $(FLANG)
+	@echo "Building hexcontact with $(FLANG) ($(FLANG_BUILD))"
+	$(call build_apart,$(FLANG_SITE),$(FLANG_BUILD),openmp=enabled warning_level=0,$(FLANG))
+	@meson test -C $(FLANG_BUILD) --print-errorlogs
+	@PYTHONPATH=$(CURDIR)/$(FLANG_SITE) $(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 
 perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
 	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"

@@ -401,13 +401,14 @@ contains
   !> Forget the active nodes, and free what was stored for them.
   subroutine clear_sheared(self)
     class(shear_preconditioner_t), intent(inout) :: self
+    type(active_set_t) :: none
 
     self%direction => null()
     call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
     if (allocated(self%front)) deallocate (self%front)
     if (allocated(self%own)) deallocate (self%own, self%far)
-    self%slipping = active_set_t()
+    self%slipping = none
   end subroutine clear_sheared
 
 end module hc_shear_preconditioner

@@ -387,19 +387,20 @@ contains
       end do
     end do
     do n = size(node, 2)/2, 1, -1
-      call sink(n, size(node, 2))
+      call sink(node, n, size(node, 2))
     end do
     do last = size(node, 2), 2, -1
       swapped = node(:, 1)
       node(:, 1) = node(:, last)
       node(:, last) = swapped
-      call sink(1, last - 1)
+      call sink(node, 1, last - 1)
     end do
 
   contains
 
     !> Put a node of the heap, whose top is the smallest gap, into its place.
-    pure subroutine sink(first, n)
+    pure subroutine sink(node, first, n)
+      integer, intent(inout) :: node(:, :)
       integer, intent(in) :: first, n
       integer :: i, child, moved(2)
 

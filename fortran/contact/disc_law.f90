@@ -81,9 +81,7 @@ contains
     class(disc_law_t), intent(in) :: self
     real(wp) :: stretches(2)
 
-    associate (disc => self)
-      stretches = 1.0_wp
-    end associate
+    stretches = 1.0_wp
   end function stretches
 
   !> Compute the largest traction over the largest pressure: the longer semi-axis of an ellipse.

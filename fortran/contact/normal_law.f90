@@ -115,9 +115,7 @@ contains
   pure logical function unilateral_is_compliant(self) result(is_compliant)
     class(unilateral_t), intent(in) :: self
 
-    associate (law => self)
-      is_compliant = .false.
-    end associate
+    is_compliant = .false.
   end function unilateral_is_compliant
 
   !> Accept: there are no numbers.
@@ -125,8 +123,6 @@ contains
     class(unilateral_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
 
-    associate (law => self)
-    end associate
   end subroutine unilateral_check
 
   !> Return 0: there is no layer.
@@ -134,9 +130,7 @@ contains
     class(unilateral_t), intent(in) :: self
     real(wp), intent(in) :: pressure
 
-    associate (law => self, under_any => pressure)
-      compliance = 0.0_wp
-    end associate
+    compliance = 0.0_wp
   end function unilateral_compliance
 
   !> Return springs of no compliance.
@@ -148,10 +142,8 @@ contains
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)
 
-    associate (law => self, same_everywhere => first, scale => r, bound => softest, pressure => p, opening => gap, nodes => contact)
-      compliance = 0.0_wp
-      offset = 0.0_wp
-    end associate
+    compliance = 0.0_wp
+    offset = 0.0_wp
   end subroutine unilateral_linearize
 
   !> Find the nodes in contact: those with p - r g > 0, whatever the law.
@@ -192,12 +184,10 @@ contains
     integer :: i
 
     stiffness = 1.0_wp/compliance
-    associate (law => self, same_everywhere => first)
-      !$omp simd reduction(max: worst)
-      do i = 1, size(p)
-        worst = max(worst, abs(min(p(i), stiffness*gap(i)))*merge(1.0_wp, 0.0_wp, candidate(i)))
-      end do
-    end associate
+    !$omp simd reduction(max: worst)
+    do i = 1, size(p)
+      worst = max(worst, abs(min(p(i), stiffness*gap(i)))*merge(1.0_wp, 0.0_wp, candidate(i)))
+    end do
   end subroutine unilateral_violation
 
 end module hc_normal_law

@@ -142,9 +142,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (error => error)
-      call self%factors%apply(x, y)
-    end associate
+    call self%factors%apply(x, y)
   end subroutine precondition
 
 end module hc_area_system

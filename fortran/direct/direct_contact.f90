@@ -100,14 +100,12 @@ contains
 
     again = allocated(start%pressure)
     if (again) again = any(start%pressure > 0.0_wp)
-    associate (reference => reference)
-      if (again) then
-        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
-                        start%pressure > 0.0_wp)
-      else
-        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
-      end if
-    end associate
+    if (again) then
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
+                      start%pressure > 0.0_wp)
+    else
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+    end if
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.

@@ -90,7 +90,7 @@ contains
       call self%space%fill(self%traction, 0.0_wp)
     end if
     associate (contact => self%pressed, runs => self%sheared%pairs, n_p => self%pressed%n_active, &
-               n_t => self%sheared%pairs%n_first, direction => self%shear%direction, given => nodes)
+               n_t => self%sheared%pairs%n_first, direction => self%shear%direction)
       call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), self%traction(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, e)
       do k = 1, size(contact%first)
@@ -138,7 +138,7 @@ contains
     real(wp), allocatable :: shear(:)
     integer :: k, i, at
 
-    associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators, given => nodes)
+    associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators)
       call operators%normal%apply_packed(contact, n/3, r(:n_p), z(:n_p), operators%preconditioning)
       if (.not. allocated(self%tilt)) then
         call self%shear%precondition_packed(self%sheared, 2*n/3, r(n_p + 1:), z(n_p + 1:), error)

@@ -64,7 +64,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%normal%apply(x, y, operators%preconditioning)
     end associate
   end subroutine pressure_precondition
@@ -78,7 +78,7 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed

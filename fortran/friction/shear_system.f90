@@ -357,7 +357,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%tangential%apply(x, y, operators%preconditioning)
     end associate
   end subroutine shear_precondition
@@ -371,7 +371,7 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine shear_precondition_packed

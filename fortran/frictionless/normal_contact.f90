@@ -146,9 +146,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     ! the first guess is that of the coarser lattices: a load gives the same bits whatever came before it
-    associate (start => start, reference => reference)
-      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
-    end associate
+    call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.

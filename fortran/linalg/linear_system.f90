@@ -67,9 +67,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (error => error)
-      call self%space%copy(x, y)
-    end associate
+    call self%space%copy(x, y)
   end subroutine no_precondition
 
   !> Compute y = A x of the values at the active nodes.
@@ -116,8 +114,6 @@ contains
   subroutine release(self)
     class(linear_system_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine release
 
   !> Compute M B, the constraint vectors after the preconditioner.

@@ -101,16 +101,12 @@ contains
   subroutine release(self)
     class(preconditioner_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine release
 
   !> Forget the active nodes: by default nothing is stored for them.
   subroutine clear(self)
     class(preconditioner_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine clear
 
 end module hc_preconditioner

@@ -87,15 +87,13 @@ contains
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
-    associate (direction => direction)
-      if (present(compliance)) then
-        call self%inverse%set_springs(self%options, compliance, active)
-        ! displacements go on beyond the nodes on stiff springs
-        call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
-      else
-        call self%continue_beyond(self%extent, active)
-      end if
-    end associate
+    if (present(compliance)) then
+      call self%inverse%set_springs(self%options, compliance, active)
+      ! displacements go on beyond the nodes on stiff springs
+      call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
+    else
+      call self%continue_beyond(self%extent, active)
+    end if
   end subroutine set_contact
 
   !> Set up the continuation beyond some nodes, which are handed on without a copy.

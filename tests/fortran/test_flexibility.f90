@@ -315,7 +315,8 @@ contains
     call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'three threads')
   end subroutine test_threads
 
-  !> Copies of operators, and of what holds them, go without taking anything with them; nothing is freed twice.
+  !> Copies of operators, and of what holds them, go without taking anything with them, and stay when the first one goes;
+  !> nothing is freed twice.
   subroutine test_copies(error)
     type(error_t), allocatable, intent(out) :: error
     type :: holder_t
@@ -350,6 +351,14 @@ contains
       call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'the operator that was copied')
       if (allocated(error)) return
     end do
+    allocate (second)
+    call new_fft_flexibility(second%flexibility, lattice, pair, error)
+    if (allocated(error)) return
+    first%flexibility = second%flexibility
+    deallocate (second)
+    call first%flexibility%apply(all_components, traction, all_components, v, error)
+    if (allocated(error)) return
+    call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'the copy that is left')
   end subroutine test_copies
 
   !> Operators of one window share their spectra, on any spacing; with a cache they give the same bits as without.

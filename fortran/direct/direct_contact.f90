@@ -245,8 +245,8 @@ contains
     real(wp) :: r, softest
 
     associate (options => self%options%contact, pair => self%flexibility%pair, lattice => self%flexibility%lattice)
-      r = options%classification_scale/(2.0_wp*pi*pair%lambda_1*sqrt(lattice%cell_area()*count(active)/pi))
-      softest = options%softest_layer*(self%compliance + self%law%compliance_under(maxval(abs(p))))
+      r = options%classification_parameter(pair%lambda_1, lattice%cell_area()*max(count(active), 1))
+      softest = self%law%softest_spring(options%softest_layer, self%compliance, maxval(abs(p)))
     end associate
     call self%law%find_contact(r, p, gap, candidate, active)
     if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)

@@ -239,7 +239,7 @@ contains
     r = 1.0_wp/coarser%compliance
     allocate (contact, source=coarse%pressure - r*min(coarse%gap, coarser%compliance*p_max))
     call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
-    softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
+    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, p_max)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too

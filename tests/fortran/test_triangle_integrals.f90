@@ -553,8 +553,9 @@ contains
     parts(:, :, 4) = middle
   end function quarters
 
-  !> Allowed error of an integral: what is promised, and the rounding of the edge form, whose terms are as many times larger
-  !> than their sum as a sliver is longer than high. It counts where xp is no more than wp.
+  !> Allowed error of an integral: what is promised, and the rounding of the edge form. The terms of the two long edges of a
+  !> sliver are as many times larger than their sum as it is longer than high, each with some twenty roundings: that counts
+  !> where xp is no more than wp.
   pure real(wp) function allowed(vertices, x, y, j, k, m)
     !> Vertices, as columns
     real(wp), intent(in) :: vertices(2, 3)
@@ -563,7 +564,7 @@ contains
     !> Exponents
     integer, intent(in) :: j, k, m
 
-    allowed = (thr + 10.0_wp*real(epsilon(1.0_xp), wp)*longest_edge(vertices)**2/(2.0_wp*area(vertices)))* &
+    allowed = (thr + 40.0_wp*real(epsilon(1.0_xp), wp)*longest_edge(vertices)**2/(2.0_wp*area(vertices)))* &
               envelope(vertices, x, y, j, k, m)
   end function allowed
 

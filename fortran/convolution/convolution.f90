@@ -469,12 +469,9 @@ contains
 
   !> Compute the address of an object.
   integer(c_intptr_t) function address(self)
-    class(holdings_t), intent(in), target :: self
+    type(holdings_t), intent(in), target :: self
 
-    select type (self)
-    type is (holdings_t)
-      address = transfer(c_loc(self), address)
-    end select
+    address = transfer(c_loc(self), address)
   end function address
 
   !> Hold what another convolution holds.

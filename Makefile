@@ -19,6 +19,8 @@ COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
 PERTURBED_BUILD := build/perturbed
 PERTURBED_SITE := build/perturbed-site
+FLANG := flang-22
+FLANG_BUILD := build/flang
 
 # Least share of lines that tests must reach, percent.
 COVERED_FORTRAN := 97
@@ -56,7 +58,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -135,6 +137,13 @@ debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extr
 	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) $(pytest) $(if $(filter debug-check,$@),$(CHECKED:%=tests/python/test_%.py))
 debug-test:  ## all tests on a build that checks bounds and traps NaN
 debug-check:  ## the tests of the solvers on that build (minutes)
+
+# With openmp=enabled, so that a build in one thread does not pass for one with threads.
+flang-check: $(STAMPS)/build-tools  ## Fortran unit tests on a build of LLVM's flang, which apt installs where it is missing
+	@sh .ci/bootstrap.sh --flang $(FLANG)
+	@echo "Building hexcontact with $(FLANG) ($(FLANG_BUILD))"
+	@[ -e $(FLANG_BUILD)/build.ninja ] || FC=$(FLANG) meson setup $(FLANG_BUILD) -Dopenmp=enabled -Dwarning_level=0
+	@meson test -C $(FLANG_BUILD) --print-errorlogs --timeout-multiplier 5
 
 perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
 	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"

@@ -265,7 +265,7 @@ contains
   end subroutine friction_of
 
   !> Make a law of contact from coefficient and exponent of a normal compliance; both 0: bodies do not penetrate.
-  pure function normal_law_of(interface) result(law)
+  function normal_law_of(interface) result(law)
     !> Coefficient [Pa/m^m] and exponent m of the normal compliance, tangential stiffness [Pa/m]
     real(c_double), intent(in) :: interface(3)
     class(normal_law_t), allocatable :: law

@@ -102,13 +102,7 @@ _LATER = {
 
 
 def fault_of_result(dataset: xarray.Dataset) -> str:
-    """Return a fault of a result that was read from a file; empty if there is none.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Its data set; fields need not be in memory.
-    """
+    """Return a fault of the dataset of a result file, whose fields may be unread; empty if there is none."""
     attributes = {str(name): value for name, value in dataset.attrs.items()}
     if fault := _fault_of_attributes(attributes):
         return fault

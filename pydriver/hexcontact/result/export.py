@@ -35,19 +35,9 @@ _TRIANGLE = 5  # number of this kind of cell in VTK
 
 
 def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int]:
-    """Return the numbers of the steps whose fields are in a result.
+    """Return the numbers of the steps (default: all) whose fields are in a result.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-    numbers : sequence of int, optional
-        Only these steps; -1 is the last one.
-
-    Raises
-    ------
-    DeckError
-        If there is no such step, or the output lacks its fields.
+    A requested step without fields is a DeckError, and so is a result without any.
     """
     wanted = [int(step) for step in result.dataset["step"].values]
     if numbers is not None:
@@ -64,7 +54,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
 
 
 def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
-    """Return `kept_steps` of a result; DeckError if its window has no triangles."""
+    """Return the `kept_steps` of a result; refuse a window without triangles."""
     steps = kept_steps(result, numbers)
     if min(result.lattice.shape) < 2:
         raise DeckError("a window of one row or one column has no triangles to export")
@@ -88,44 +78,14 @@ def to_vtk(
     numbers: Sequence[int] | None = None,
     source: str | None = None,
 ) -> Path:
-    """Write a series of VTK files, one for each load step, and a ``.pvd`` file that lists them.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    folder : Path
-        Folder for the files, created if missing.
-    stem : str
-        Start of the names of the files.
-    numbers : sequence of int, optional
-        Only these steps.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    Path
-        The ``.pvd`` file, which ParaView opens.
-
-    Raises
-    ------
-    DeckError
-        If there is nothing to export.
-    """
+    """Write a VTK file for each load step, and return the ``.pvd`` file that lists them."""
     steps = _meshed_steps(result, numbers)
     _make(folder)
     return _series(folder, stem, "vtu", {number: _vtu(result, number, source) for number in steps})
 
 
 def volumes_to_vtk(result: Result, folder: Path, stem: str) -> list[Path]:
-    """Write the tables [[stress]] and [[fatigue]] of the deck of a result as structured grids.
-
-    Returns
-    -------
-    list of Path
-        A ``.pvd`` file for each table ``[[stress]]`` and ``[[fatigue]]``.
-    """
+    """Write the tables [[stress]] and [[fatigue]] as structured grids with a ``.pvd`` file each."""
     written = []
     for name, found in at_hand(result, kept_steps(result)):
         _make(folder)
@@ -140,11 +100,6 @@ def histories_to_csv(result: Result, folder: Path, stem: str) -> list[Path]:
     """Write the stress histories of the tables ``[[fatigue]]`` of the deck, in the format of pyLife.
 
     A line has point, load step, place (m) and the six stresses (MPa); points are written block by block.
-
-    Raises
-    ------
-    DeckError
-        If the deck has no such table.
     """
     tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}
     if not tables:
@@ -280,27 +235,6 @@ def to_ugrid(
     """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
 
     The result has the same mesh, but its fields by row and column.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    target : Path
-        File to write.
-    numbers : sequence of int, optional
-        Only these steps.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If there is nothing to export.
     """
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
@@ -343,32 +277,7 @@ def to_csv(
     numbers: Sequence[int] | None = None,
     source: str | None = None,
 ) -> list[Path]:
-    """Write the history as a table, the fields of some steps, a line for each node, and tables of the deck.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    folder : Path
-        Folder for the files, created if missing.
-    stem : str
-        Start of the names of the files.
-    numbers : sequence of int, optional
-        Steps whose fields are written.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    list of Path
-        The files.
-
-    Raises
-    ------
-    DeckError
-        If there are no such steps, or a table [[stress]] or [[fatigue]] of a finished run has the name of
-        another file or cannot be computed.
-    """
+    """Write tables of the history, of the nodes in some steps, and those of the deck."""
     import pandas as pd
 
     steps = [] if numbers is None else kept_steps(result, numbers)

@@ -1,8 +1,8 @@
 """Fields between the nodes: at any point, and along lines.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon with corners at the edges of triangles. Only pressure and shear traction go to the edges of contact
-and stick, which lie between the nodes, unless the source "nodes" is asked for.
+a polygon with corners at the edges of triangles. Pressure and shear traction go to the edges of contact and
+stick between the nodes, unless the source is "nodes".
 """
 
 from __future__ import annotations
@@ -42,25 +42,10 @@ def interpolate(
     y: ArrayLike,
     tractions: TractionField | None = None,
 ) -> Array:
-    """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
+    """Return a field at points of the plane (m): tractions to the edges, others linear on the triangles.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    name : str
-        Name of the field, see `hexcontact.variables`. The zone at a point is that of the nearest node.
-    values : ndarray, (n_row, n_col)
-        Its values at the nodes.
-    x, y : array_like
-        Points (m), broadcast.
-    tractions : TractionField, optional
-        What pressure and shear traction are taken from; default: their values at the nodes, joined linearly.
-
-    Returns
-    -------
-    ndarray
-        Values at the points. Outside the window tractions and slip are 0, other fields NaN.
+    A zone is that of the nearest node. Without `tractions` pressure and shear are linear, too. Outside the
+    window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     if tractions is not None and name in TRACTIONS:
@@ -75,24 +60,9 @@ def traction_field(
 ) -> TractionField:
     """Return pressure and shear traction of a load step at any point.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    fields : mapping of str to ndarray
-        Fields of the step: the pressure, and what was kept of shear tractions, gap and zone.
-    limits : tuple of array_like or None
-        Coefficient of friction and bound of the shear traction (Pa); None: unknown, or no friction.
-    source : str, optional
-        ``"edges"``, or ``"nodes"``: the values at the nodes, joined linearly; by default the edges, if
-        there are any and the gap was kept.
-    sharp : bool
-        Whether the contact has a sharp edge, unlike that of a compliant interface.
-
-    Raises
-    ------
-    DeckError
-        If the pressure was not kept, or the edges cannot be found.
+    `limits` are the coefficient of friction and the bound of the shear traction (Pa), None if unknown;
+    `sharp` is False for a compliant interface, whose contact has no sharp edge; `source` as of
+    `hexcontact.Result.traction_field`.
     """
     if source not in (None, *SOURCES):
         raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
@@ -189,17 +159,7 @@ class PressureField:
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line between two points of the plane.
-
-    Attributes
-    ----------
-    start : tuple of float
-        First point, m.
-    end : tuple of float
-        Last point, m.
-    zero : float
-        Distance (m) from the start at which distances along the line are 0.
-    """
+    """A straight line between two points (m); distances along it are 0 at `zero` (m) from its start."""
 
     start: Point
     end: Point
@@ -218,13 +178,7 @@ class Line:
         return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
     def corners(self, lattice: Lattice) -> Array:
-        """Return the distances (m) from the start at which the line crosses edges of triangles, and its ends.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The lattice, also outside of its window.
-        """
+        """Return distances (m) from the start at which the line crosses edges of triangles, and its ends."""
         return crossings(lattice, self.start, self.end)
 
     def points(self, distance: Array) -> tuple[Array, Array]:
@@ -236,43 +190,14 @@ class Line:
 def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point | None) -> Line:
     """Return the line across a contact at an angle (rad) from x, with a margin on both sides.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    pressure : ndarray, (n_row, n_col)
-        Contact pressure, Pa.
-    angle : float
-        Direction from x, rad.
-    through : tuple of float or None
-        A point (m) on the line, from which distances count; None: the node next to the center of pressure.
-
-    Raises
-    ------
-    DeckError
-        If nothing is in contact.
+    Distances count from the point `through` (m), by default from the node next to the center of pressure.
     """
     start, end, zero = section_ends(lattice, pressure, angle, through)
     return Line(start, end, zero)
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return the named fields of a load step; without names, all of the output.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of fields.
-    fields : mapping of str to array_like
-        The fields of the step.
-    step : int
-        Number of the step, for messages.
-
-    Raises
-    ------
-    DeckError
-        If there is no such field in the output.
-    """
+    """Return the named fields of a load step, by default all that were kept."""
     for name in names:
         if name not in fields:
             known = name in VARIABLES and VARIABLES[name].is_field
@@ -303,33 +228,10 @@ def profile(
     tractions: TractionField | None = None,
     **attributes: Any,
 ) -> xarray.Dataset:
-    """Return fields along a line.
+    """Return fields along a line, over ``distance`` (m), with `attributes` of the dataset.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    fields : mapping of str to ndarray
-        Values at the nodes, by the names of `hexcontact.variables`.
-    line : Line
-        The line.
-    points : int, optional
-        Number of points, evenly spaced. By default the points are the corners of the polygon of a field along
-        the line, so that straight lines between them are exact, and eight a spacing for curved tractions.
-    tractions : TractionField, optional
-        As of `interpolate`.
-    **attributes
-        Attributes of the data set.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimension ``distance`` (m), with the coordinates ``x`` and ``y`` (m).
-
-    Raises
-    ------
-    DeckError
-        If the number of points is below 2.
+    Without a number of `points` they are the corners of the polygon of a field, so that straight lines
+    between them are exact; tractions to the edges are curved and have eight points a spacing.
     """
     import xarray
 

@@ -62,15 +62,8 @@ def journal_of(path: Path) -> Path:
 class Journal:
     """The finished steps of a run, read from the disk one at a time.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder; a missing one is an empty journal.
-    companions : bool
-        Read the companions of steps, too.
-    ours : bool
-        Whether this process has written or read the records already: only their checksums are compared, and
-        the fields of large ones are not in memory, but read whenever they are asked for.
+    If this process has validated the records before (`ours`), only checksums are compared, and fields of
+    large records are loaded lazily. Restart data are read on request (`companions`).
     """
 
     def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
@@ -169,49 +162,18 @@ def _is_temporary(name: str, folder: Path) -> bool:
 
 
 class Growth(NamedTuple):
-    """Reference of a record to metadata in an earlier one, and the text that it adds to the deck.
-
-    Attributes
-    ----------
-    run : str
-        Unique name of the run.
-    of : int
-        Number of the record with the metadata.
-    planned_steps : int
-        As in `Metadata`.
-    kept : int
-        Characters of the deck of the record before that remain.
-    added : str
-        Text that follows them.
-    checksum : int
-        CRC-32 of the whole deck.
-    """
+    """Reference of a record to the metadata in record `of`, and the text that it adds to the deck."""
 
     run: str
     of: int
     planned_steps: int
-    kept: int
-    added: str
-    checksum: int
+    kept: int  # characters of the deck of the last record that remain
+    added: str  # text that follows them
+    checksum: int  # CRC-32 of the whole deck
 
 
 class Description:
-    """Metadata of a run whose deck grows.
-
-    Parameters
-    ----------
-    metadata : Metadata
-        The metadata at first.
-    number : int
-        Number of the record that holds them; 0: that of the next one.
-
-    Attributes
-    ----------
-    whole : Metadata
-        The metadata at first.
-    number, planned_steps : int
-        As the argument, and as in `Metadata`.
-    """
+    """Metadata of a run whose deck grows; record `number` holds them, 0: the next record will."""
 
     def __init__(self, metadata: Metadata, number: int = 0) -> None:
         self._begin(metadata, number)
@@ -231,15 +193,7 @@ class Description:
     def next(
         self, number: int, added: str = "", kept: int | None = None, planned_steps: int | None = None
     ) -> Metadata | Growth:
-        """Add text to the deck, and return what the next record holds of the metadata.
-
-        Parameters
-        ----------
-        number : int
-            Number of the record.
-        added, kept, planned_steps : optional
-            As the attributes of `Growth`; by default nothing is added.
-        """
+        """Append text to the first `kept` characters of the deck; return the metadata for record `number`."""
         kept = self._ends[-1][0] if kept is None else kept
         self._replace(kept, added)
         self.planned_steps = self.planned_steps if planned_steps is None else planned_steps
@@ -276,22 +230,7 @@ class Description:
 
 
 def write_record(path: Path, about: Metadata | Growth, step: Step) -> None:
-    """Write a record.
-
-    Parameters
-    ----------
-    path : Path
-        File to write or replace.
-    about : Metadata or Growth
-        Metadata of the run, or a reference to those of earlier records.
-    step : Step
-        The step.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write a record: a step, with the metadata of the run or a reference to those of earlier records."""
     fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
     for name, values in fields.items():
         if values.shape != step.lattice.shape:
@@ -342,16 +281,10 @@ def _write_array(archive: zipfile.ZipFile, name: str, parts: Sequence[NDArray[An
 def read_step(
     path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
 ) -> tuple[Metadata | Growth, Step]:
-    """Read a record, with its companion or without, and without the metadata that it may refer to.
+    """Read a record, without following its reference to metadata in another record.
 
-    To `check` the step, these are given by `whole`, or read.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged or of another version.
-    FileNotFoundError
-        If it is missing.
+    To `check` the step, the metadata are those of `whole`, else they are read. `companion`: read restart
+    data, too.
     """
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
         known = _known(file, path)

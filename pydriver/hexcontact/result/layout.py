@@ -43,45 +43,19 @@ def now() -> str:
 
 @dataclass(frozen=True)
 class Metadata:
-    """Data about a run in its result.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case.
-    deck : str
-        The whole deck as text; empty for a case that was built in Python.
-    fields : tuple of str
-        Fields of the output; empty: all.
-    every : int
-        The output has the fields of each step whose number is a multiple of this, and of the last one.
-    planned_steps : int
-        Load steps of the whole run; 0 while it is open.
-    parameters : mapping of str to number or text
-        Materials, tolerance and other parameters of the case.
-    run : str
-        Unique name of the run.
-    created : str
-        Start of the run, UTC.
-    version : str
-        Version of the program at its start.
-    resumed : tuple of str
-        A line for each time that the run was resumed.
-    deck_file : str
-        The file of the deck, to which its file names are relative; not in the output.
-    """
+    """Data about a run in its result."""
 
     title: str = ""
-    deck: str = ""
-    fields: tuple[str, ...] = ()
-    every: int = 1
-    planned_steps: int = 0
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    deck: str = ""  # the whole text
+    fields: tuple[str, ...] = ()  # of the output; empty: all
+    every: int = 1  # the output has the fields of steps of these numbers, and of the last one
+    planned_steps: int = 0  # 0: open
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # materials, tolerance and others
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    created: str = field(default_factory=now)
-    version: str = __version__
-    resumed: tuple[str, ...] = ()
-    deck_file: str = ""
+    created: str = field(default_factory=now)  # start of the run, UTC
+    version: str = __version__  # of the program at the start
+    resumed: tuple[str, ...] = ()  # a line for each time
+    deck_file: str = ""  # file names in the deck are relative to it; not in the output
 
     @property
     def story(self) -> str:
@@ -110,13 +84,7 @@ class Metadata:
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Return the metadata of the attributes of a file.
-
-        Raises
-        ------
-        KeyError, ValueError
-            If one is missing or wrong.
-        """
+        """Return the metadata from the attributes of a file; KeyError or ValueError for a fault."""
         return cls(
             title=str(attributes["title"]),
             deck=str(attributes["deck"]),
@@ -134,14 +102,8 @@ class Metadata:
 class Layout:
     """Dimensions, coordinates, variables and attributes of a result.
 
-    Parameters
-    ----------
-    metadata : Metadata
-        Metadata of the run.
-    steps : sequence of Step
-        All its steps (heads are enough), in order.
-    trials : mapping of str to sequence, optional
-        Solutions on other lattices: values by trial, by the names of `hexcontact.variables`.
+    `steps` are all steps in order, heads are enough; `trials` are values on other lattices by
+    `hexcontact.variables`.
     """
 
     def __init__(
@@ -299,25 +261,10 @@ def assemble(
     trials: Mapping[str, Sequence[Any]] | None = None,
     stopped: str = "",
 ) -> xarray.Dataset:
-    """Return the data set of the steps of a run.
+    """Return the dataset of the steps of a run, which are read twice: no generator.
 
-    Parameters
-    ----------
-    metadata : Metadata
-        Metadata of the run.
-    steps : iterable of Step
-        The finished steps in order, which are read twice: no generator.
-    complete : bool
-        Whether these are all steps of the run.
-    trials : mapping of str to sequence, optional
-        As for `Layout`.
-    stopped : str
-        Reason why the run ended early, if it did.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``step``, ``row``, ``col``; the layout is described in docs/netcdf.md.
+    `complete`: these are all steps of the run; `trials` as of `Layout`; `stopped`: reason of an early end.
+    The layout is described in docs/netcdf.md.
     """
     import xarray
 
@@ -354,13 +301,7 @@ _GIVEN = {
 
 
 class Quantities(Mapping[str, Variable]):
-    """The quantities of a result by name; printed, a table.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names, see `hexcontact.variables`.
-    """
+    """The quantities of a result by name; printed, a table."""
 
     def __init__(self, names: list[str]) -> None:
         self._names = [name for name in VARIABLES if name in names]

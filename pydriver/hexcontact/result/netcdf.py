@@ -48,24 +48,7 @@ _END = slice(28, 36)  # in the head: the address where the file ends
 
 
 def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
-    """Write the file of a result.
-
-    Parameters
-    ----------
-    path : Path
-        File to write or replace.
-    layout : Layout
-        Layout of all the steps.
-    steps : iterable of Step
-        The steps with their fields, which are read once.
-    complete : bool
-        Whether they are all steps of the run.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write the file of a result from its steps, which are read once; OSError if that fails."""
     with _new_file(path) as file:
         with LOCK:
             for name, size in layout.sizes.items():
@@ -204,13 +187,7 @@ def is_ours(path: Path) -> bool:
 
 
 def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
-    """Refuse to overwrite files of stresses, or other files even with `overwrite`.
-
-    Raises
-    ------
-    DeckError
-        If there is such a file.
-    """
+    """Refuse to overwrite files of stresses, and with `overwrite` any other file."""
     for path in stresses:
         if not overwrite and os.path.lexists(path):
             raise DeckError(f"{path} exists already; --overwrite (overwrite=True in Python) replaces it")
@@ -247,14 +224,8 @@ def read_output(path: Path) -> Result:
     """Open an output file; its fields are read at their first use.
 
     All bytes are checked first. In a file without a seal, of an earlier version or rewritten by another
-    program, the fields are read and checked instead.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged, of another kind or of another version.
-    FileNotFoundError
-        If it is missing.
+    program, the fields are read and checked instead. Raises DeckError for a damaged or foreign file,
+    FileNotFoundError for a missing one.
     """
     with reading(path):
         sealed = check_seal(path)
@@ -315,13 +286,7 @@ def is_sealed(path: Path) -> bool:
 
 
 def check_seal(path: Path) -> bool:
-    """Test whether a file has a valid seal; False without a seal.
-
-    Raises
-    ------
-    DeckError
-        If the seal is broken.
-    """
+    """Test whether a file has a valid seal; False without a seal, DeckError for a broken one."""
     with path.open("rb") as file:
         head, size = file.read(_END.stop), file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _SIZE))

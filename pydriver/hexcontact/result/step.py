@@ -41,16 +41,10 @@ _BLOCK = 2**20  # bytes that are read at a time
 
 
 class Stored(Mapping[str, NDArray[Any]]):
-    """Fields of a step in a file, each read whenever it is asked for: an output takes one after the other.
+    """Fields of a step in a file, each loaded at every access: an output takes one after the other.
 
-    Their arrays are not compressed, and all checksums are compared here.
-
-    Parameters
-    ----------
-    path, archive : Path, ZipFile
-        The file.
-    members : mapping of str to sequence of str
-        Names of the fields in each array of the archive, along its first axis.
+    Their arrays are not compressed, and all checksums are compared here. `members` has the names of the
+    fields in each array of the archive, along its first axis.
     """
 
     def __init__(self, path: Path, archive: ZipFile, members: Mapping[str, Sequence[str]]) -> None:

@@ -85,21 +85,8 @@ def _continues(journal: Journal, output: Result) -> bool:
 class Store:
     """Writes a run: each finished step to the journal, all of them to the output.
 
-    Use it as a context manager, or call `close`. Without `finish` the journal remains.
-
-    Parameters
-    ----------
-    path : path
-        Output file.
-    metadata : Metadata
-        Metadata of the run, with the fields of the output.
-    overwrite : bool
-        Replace an existing output or unfinished run, at `finish`.
-
-    Raises
-    ------
-    DeckError
-        If the output exists, is being written by another run or cannot be written.
+    Use it as a context manager, or call `close`. Without `finish` the journal remains. With `overwrite` an
+    existing output or unfinished run is replaced at `finish`.
     """
 
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
@@ -125,28 +112,11 @@ class Store:
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
-        """Open the journal of an unfinished run to resume it.
+        """Open the journal of an unfinished run to resume it; return its store and last finished step.
 
-        Its files do not change before `go_on`.
-
-        Parameters
-        ----------
-        path : path
-            Output file.
-
-        Returns
-        -------
-        store : Store
-            The store, with the lock.
-        last : Step or None
-            The last finished step with all its fields; None if the run is finished, or refines its lattice.
-
-        Raises
-        ------
-        DeckError
-            If there are no finished steps, one is missing or damaged, or another run writes them.
-        FileNotFoundError
-            If there is no journal.
+        The step has all its fields; it is None if the run is finished, or refines its lattice. No file
+        changes before `go_on`. Raises DeckError if no step is finished, one is missing or damaged, or another
+        run writes them; FileNotFoundError without a journal.
         """
         store = cls.__new__(cls)
         store._at(path)
@@ -347,13 +317,7 @@ class Store:
             write(path, layout, steps, complete)
 
     def append(self, step: Step, **growth: Any) -> None:
-        """Record a finished step on the disk; `growth` changes the deck as in `Description.next`.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the steps before it remain.
-        """
+        """Record a finished step on the disk; `growth` changes the deck as in `Description.next`."""
         with self._mutex:
             self._require_open()
             if step.number != len(self.heads) + 1:
@@ -383,20 +347,14 @@ class Store:
                     self._put_together(layout, Journal(self.folder, ours=True), complete=False)
 
     def _lighten(self, record: Path) -> None:
-        """Take from a record what only the next step starts from: the last two have it, one may be lost."""
+        """Remove restart data from an older record; the last two keep it, since one may be lost."""
         with self.writing("the journal"):
             about, before = read_step(record, companion=False, check=False)
             with self._replacing(record) as path:
                 write_record(path, about, before)
 
     def finish(self) -> None:
-        """Write the output and delete the journal.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the journal is kept.
-        """
+        """Write the output and delete the journal, which remains after an error."""
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
@@ -407,19 +365,7 @@ class Store:
     ) -> None:
         """Write the output of steps that are recorded elsewhere, and delete the journal.
 
-        Parameters
-        ----------
-        metadata : Metadata
-            Metadata of the run.
-        steps : iterable of Step
-            The steps, which are read twice: no generator.
-        trials : mapping of str to sequence
-            Solutions on other lattices, as for `hexcontact.result.layout.Layout`.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the journal is kept.
+        The steps are read twice: no generator. `trials` as of `hexcontact.result.layout.Layout`.
         """
         with self._mutex:
             self._finish(Layout(metadata, [step.head for step in steps], trials), steps)
@@ -437,13 +383,7 @@ class Store:
             raise ValueError("the store is closed")
 
     def close(self, reason: str = "") -> None:
-        """Close the files; the journal of an unfinished run remains.
-
-        Parameters
-        ----------
-        reason : str
-            Reason of an early end, which is written to the journal.
-        """
+        """Close the files; the journal of an unfinished run remains, with the `reason` of an early end."""
         with self._mutex:
             if self._closed:
                 return

@@ -33,40 +33,18 @@ FOLDER = "lattices"  # in the journal
 
 
 class Solution(NamedTuple):
-    """The solution on one lattice.
+    """The histories of all load steps on one lattice."""
 
-    Parameters
-    ----------
-    level : int
-        How often the lattice was refined.
-    copy : int
-        0: the lattice itself, else the number of its shifted copy.
-    spacing : float
-        Spacing, m.
-    origin : tuple of float
-        Position of a node, m.
-    nodes : int
-        Nodes of its largest window.
-    histories : sequence of mapping
-        History of each load step.
-    """
-
-    level: int
-    copy: int
-    spacing: float
-    origin: tuple[float, float]
-    nodes: int
-    histories: Sequence[Mapping[str, Any]]
+    level: int  # number of refinements
+    copy: int  # 0: the lattice itself, else the number of its shifted copy
+    spacing: float  # m
+    origin: tuple[float, float]  # position of a node, m
+    nodes: int  # of its largest window
+    histories: Sequence[Mapping[str, Any]]  # by load step
 
 
 class TrialFolder:
-    """The lattices of an unfinished refinement.
-
-    Parameters
-    ----------
-    journal : Path
-        The journal of the output.
-    """
+    """The lattices of an unfinished refinement, in the journal of an output."""
 
     def __init__(self, journal: Path) -> None:
         self.folder = journal / FOLDER
@@ -81,13 +59,7 @@ class TrialFolder:
         return self.folder / f"{level}_{copy}.nc"
 
     def read(self) -> tuple[Metadata, list[Solution]]:
-        """Return the metadata of the run, and the finished lattices.
-
-        Raises
-        ------
-        DeckError
-            If the file is damaged or of another version.
-        """
+        """Return the metadata of the run, and the finished lattices; DeckError for a damaged file."""
         path = self.ledger
         with reading(path, "a list of finished lattices"):
             about = json.loads(path.read_bytes())
@@ -147,13 +119,7 @@ class TrialFolder:
         return "load steps on the first lattice are finished" if self._latest()[1] else ""
 
     def result(self, path: Path) -> Result:
-        """Return the steps on the finest finished lattice, else on the first; `path` names the result.
-
-        Raises
-        ------
-        DeckError
-            If no step is finished.
-        """
+        """Return the steps on the finest finished lattice, else on the first; `path` names the result."""
         level, journal = self._latest()
         if not journal:
             raise DeckError(f"no load step of {path} was finished")

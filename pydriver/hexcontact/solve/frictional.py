@@ -107,18 +107,7 @@ class FrictionWindow(Window[ContactState]):
 
 
 def state_of(step: Step) -> ContactState:
-    """Return the state of a contact with friction at the end of a step.
-
-    Parameters
-    ----------
-    step : Step
-        A step of a frictional run, or its record in the journal; all its fields are needed.
-
-    Raises
-    ------
-    DeckError
-        If a field or a value is missing, as in a frictionless run.
-    """
+    """Return the state with friction at the end of a step with all its fields."""
     needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(

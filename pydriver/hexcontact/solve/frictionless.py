@@ -159,22 +159,7 @@ def _parts(case: Problem, lattice: Lattice) -> int:
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
-    """Refuse a window, or a table [[stress]] or [[fatigue]], that does not fit into memory.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    lattice : Lattice
-        The window.
-    steps_held : int
-        Load steps whose fields the result holds in memory.
-
-    Raises
-    ------
-    ResourceError
-        If less memory is available.
-    """
+    """Refuse a window, with the fields of some steps, or a table that does not fit into memory."""
     kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
     needed, there = memory_needed(case, lattice) + kept, memory.available()
     fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
@@ -206,33 +191,7 @@ def fields_of(case: Problem) -> tuple[str, ...]:
 
 
 class Window(ABC, Generic[S]):
-    """A case on one window.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    lattice : Lattice
-        The window.
-    steps_held : int
-        Load steps whose fields the result holds in memory.
-    listener : Listener, optional
-        Follows the run.
-
-    Attributes
-    ----------
-    initial_gap : ndarray, (n_row, n_col)
-        Gap before loading (m), NaN where the bodies cannot touch.
-    candidate : ndarray of bool, (n_row, n_col)
-        Nodes that can touch.
-    friction : FrictionLaw
-        Friction at the nodes.
-
-    Raises
-    ------
-    ResourceError
-        If it does not fit into memory.
-    """
+    """A case on one window, whose results hold the fields of `steps_held` load steps in memory."""
 
     state: ClassVar[tuple[str, ...]]  # fields of every step
     worn: Array | None = None  # depth by which the surfaces are worn, m
@@ -261,16 +220,9 @@ class Window(ABC, Generic[S]):
 
     @abstractmethod
     def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
-        """Solve a load step.
+        """Solve a load step from the state at its beginning, None before the first load.
 
-        Parameters
-        ----------
-        state : solution or None
-            End of the step before, None before the first load.
-        target : LoadStep
-            Control of z, x, y and the twist.
-        values : tuple of float
-            The prescribed load or motion of each.
+        `values` are the prescribed loads or motions of z, x, y and the twist.
         """
 
     def carried(self, state: S | None, lattice: Lattice) -> S | None:
@@ -286,13 +238,7 @@ class Window(ABC, Generic[S]):
         return solution.touches_rim and not self.case.full_contact
 
     def grown(self, solution: S, target: LoadStep) -> Self:
-        """Return a larger window for a contact that reached the rim, in place of this one.
-
-        Raises
-        ------
-        DeckError
-            If the deck fixed the window.
-        """
+        """Return a larger window for a contact that reached the rim, unless the deck fixes the window."""
         if self.case.window_fixed:
             raise DeckError(
                 f"grid: in step {target.index + 1} the contact reaches the rim of the window of "
@@ -306,17 +252,7 @@ class Window(ABC, Generic[S]):
         return type(self)(self.case, larger, self.steps_held, self.listener)
 
     def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
-        """Return a finished load step.
-
-        Parameters
-        ----------
-        target : LoadStep
-            The load step.
-        solution, before : solution
-            Its end, and that of the step before (None: none).
-        started : float
-            Time at which its solution began (s, `time.perf_counter`).
-        """
+        """Return a finished step from the states at its end and beginning; its time counts from `started`."""
         fields = {"initial_gap": self.initial_gap}
         fields |= {name: getattr(solution, name) for name in self.state}
         fields["gap"] = self._where_touching(solution.gap)

@@ -15,13 +15,7 @@ from .events import Listener
 
 
 class Lines(Listener):
-    """One line for each step, for files and pipes.
-
-    Parameters
-    ----------
-    stream : text file
-        Destination of the lines.
-    """
+    """Prints a line for each step, to files and pipes."""
 
     def __init__(self, stream: IO[str]) -> None:
         self.stream = stream

@@ -32,24 +32,12 @@ from .wear import lacks_ends
 
 @dataclass
 class Restart:
-    """An unfinished run that was reopened.
-
-    Attributes
-    ----------
-    case : Problem
-        The problem.
-    store : Store
-        The store of its steps.
-    before : list of Step
-        The finished steps: heads, the last one with all its fields.
-    warning : str
-        Reason why the result may differ from that of an uninterrupted run; may be empty.
-    """
+    """A run that is resumed: with all solved steps, the last one with its fields, and its warning."""
 
     case: Problem
     store: Store
     before: list[Step]
-    warning: str = ""
+    warning: str = ""  # reason why the result may differ from that of an uninterrupted run
 
 
 def resume(
@@ -118,13 +106,7 @@ def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
 def reopened(
     path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
 ) -> Iterator[Restart | None]:
-    """Open a run to resume it, and close it at the end; arguments and errors as `resume`.
-
-    Yields
-    ------
-    Restart or None
-        None if the run is finished.
-    """
+    """Open a run to resume it, and close it at the end; None if it is finished; arguments as of `resume`."""
     store, last = _found(output_of(Path(path)))
     refines = store is not None and bool(TrialFolder(store.folder))
     if store is None or (last is None and not refines):

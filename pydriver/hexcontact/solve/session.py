@@ -313,12 +313,8 @@ class Session:
     def _next_step(self, done: int = 0, load: dict[str, Any] | None = None) -> Step:
         """Solve the next load step and record it; after a failure the last finished step is the start again.
 
-        Parameters
-        ----------
-        done : int
-            Number of steps before `advance` was called.
-        load : dict, optional
-            Entry of [[load]] for all steps from there, after the last one; default: one for each step.
+        `advance` was called after `done` steps; `load` is its entry of [[load]] after its last step, else
+        there is one by step.
         """
         assert self._solving is not None
         try:

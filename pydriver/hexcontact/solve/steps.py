@@ -52,35 +52,13 @@ def steps(
     targets: Iterable[LoadStep] | None = None,
     listener: Listener | None = None,
 ) -> Iterator[Step]:
-    """Solve a case step by step.
+    """Solve a case step by step, and yield each load step when it is finished.
 
-    Parameters
-    ----------
-    case : Problem
-        The checked problem.
-    in_memory : bool
-        Whether the fields of all steps stay in memory, which is checked for them.
-    before : sequence of Step
-        The first steps, if they are solved: heads, the last one with all its fields. The further steps are
-        bit-identical to those of an uninterrupted run.
-    targets : iterable of LoadStep, optional
-        Further load steps in place of the rest of the case; each is taken after the one before is solved.
-    listener : Listener, optional
-        Follows the run, but for its finished steps; default: the log.
-
-    Yields
-    ------
-    Step
-        Each load step when it is finished.
-
-    Raises
-    ------
-    DeckError
-        If the contact outgrows a fixed window.
-    ConvergenceError
-        If a load step misses its tolerance, or the bodies slide.
-    ResourceError
-        If there is not enough memory.
+    `before` are the first steps, if they are solved: heads, the last one with all its fields; the others are
+    bit-identical to those of an uninterrupted run. `targets` replace the remaining load steps of the case,
+    and each is taken after the step before is solved. The listener follows all but the finished steps.
+    `in_memory`: the fields of all steps stay in memory, which is checked for them. Exceptions as of
+    `hexcontact.Case.run`.
     """
     listener = listener or Log()
     lattice = before[-1].lattice if before else case.lattice

@@ -18,10 +18,11 @@ from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.stress import TENSOR
-from ..interior.tables import as_volume, at_hand, tables_of
+from ..interior.tables import as_volume, tables_of
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh
+from .below import at_hand
 from .interpolate import is_kept, with_shown
 from .netcdf import is_mesh
 from .result import Result

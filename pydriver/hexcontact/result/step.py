@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -15,21 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from ..core.edges import Limits, TractionField
-from ..core.lattice import Lattice
 from ..files import reading
 from ..text import did_you_mean
-from ..variables import EDGES, TRACTIONS
-from .interpolate import (
-    Line,
-    Point,
-    chosen_fields,
-    interpolate,
-    limits_of,
-    profile,
-    section_line,
-    traction_field,
-)
+from ..variables import EDGES
+from .interpolate import NodalStep
 
 if TYPE_CHECKING:
     from zipfile import ZipFile
@@ -85,7 +75,7 @@ class Stored(Mapping[str, NDArray[Any]]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Step:
+class Step(NodalStep):
     """A finished load step.
 
     Its quantities are attributes, too: ``step.pressure`` is an array over the nodes, ``step.approach`` a
@@ -122,9 +112,6 @@ class Step:
         Bound of the shear traction, Pa; inf: none.
     """
 
-    index: int
-    lattice: Lattice
-    fields: Mapping[str, NDArray[Any]]
     history: Mapping[str, Any]
     companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     control: Mapping[str, Any] = field(default_factory=dict)
@@ -132,9 +119,6 @@ class Step:
     load_fraction: float = math.nan
     ramp_done: float = math.nan
     bodies: Sequence[Any] = ()
-    friction: float = 0.0
-    sharp: bool = True
-    shear_limit: float = math.inf
 
     def __post_init__(self) -> None:
         if isinstance(self.fields, Stored):
@@ -143,8 +127,9 @@ class Step:
         object.__setattr__(self, "fields", MappingProxyType(safe))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        given = (getattr(self, entry.name) for entry in dataclasses.fields(self))
-        return type(self), tuple(dict(v) if isinstance(v, Mapping) else v for v in given)
+        given = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
+        plain: dict[str, Any] = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
+        return partial(type(self), **plain), ()
 
     def __getattr__(self, name: str) -> Any:
         """Return a quantity."""
@@ -166,11 +151,6 @@ class Step:
     def __dir__(self) -> list[str]:
         """List the quantities, too."""
         return [*super().__dir__(), *self.fields, *self.history]
-
-    @property
-    def number(self) -> int:
-        """Number of the step, from 1."""
-        return self.index + 1
 
     @property
     def x(self) -> Array:
@@ -208,52 +188,6 @@ class Step:
     def done(self) -> float:
         """Finished share of the load history with adaptive load steps; 0 without."""
         return float(self.control.get("done", 0.0))
-
-    # --- between the nodes ----------------------------------------------------------------------------------
-
-    def traction_field(self, source: str | None = None) -> TractionField:
-        """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
-        names = (*TRACTIONS, *EDGES)
-        known = {name: self.fields[name] for name in names if name in self.fields}
-        return traction_field(self.lattice, known, self.limits, source, self.sharp)
-
-    @property
-    def limits(self) -> Limits | None:
-        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
-        return limits_of(self.friction, self.fields, self.shear_limit)
-
-    def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
-        """Return a field at points of the plane; see `hexcontact.Result.at`."""
-        [values] = chosen_fields([name], self.fields, self.number).values()
-        return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
-
-    def profile(
-        self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
-    ) -> xarray.Dataset:
-        """Return fields along a line between two points; see `hexcontact.Result.profile`."""
-        return self._along(Line(start, end), names, points, source)
-
-    def section(
-        self,
-        *names: str,
-        angle: float = 0.0,
-        through: Point | None = None,
-        points: int | None = None,
-        source: str | None = None,
-    ) -> xarray.Dataset:
-        """Return fields along a line across the contact; see `hexcontact.Result.section`."""
-        line = section_line(self.lattice, self.fields["pressure"], angle, through)
-        return self._along(line, names, points, source)
-
-    def _along(
-        self, line: Line, names: Sequence[str], points: int | None, source: str | None
-    ) -> xarray.Dataset:
-        fields = chosen_fields(names, self.fields, self.number)
-        return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
-
-    def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
-        """Return the tractions between the nodes, if there is one among some fields."""
-        return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
     def stress_at(
         self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None

@@ -158,7 +158,8 @@ def write_stresses(
     if not missing:
         return
     from ..interior.extremes import with_errors
-    from ..interior.tables import computed, tables_of, write_netcdf
+    from ..interior.tables import tables_of, write_netcdf
+    from ..result.below import computed
     from ..result.export import kept_steps
 
     result = open_result(output)
@@ -180,7 +181,7 @@ def _on_coarser(
     result: Result, case: Problem | None, names: list[str], listener: Listener
 ) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
-    from ..interior.tables import computed
+    from ..result.below import computed
     from ..result.export import kept_steps
     from ..result.result import Result
 

@@ -16,8 +16,8 @@ from hexcontact.cli import tables
 from hexcontact.core.steps import LEAST
 from hexcontact.deck.schema import deck_schema
 from hexcontact.problem import estimates, overview
-from hexcontact.result import history
-from hexcontact.result.history import describe
+from hexcontact.result import history_words as history
+from hexcontact.result.history_words import describe
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step

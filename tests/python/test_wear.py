@@ -11,7 +11,7 @@ import hexcontact
 from hexcontact import Case, DeckError, ElasticPair, NormalContact, PathWarning, plotting
 from hexcontact.cli.tables import Summary
 from hexcontact.deck.write import starter
-from hexcontact.result.history import energy_table, step_rows
+from hexcontact.result.history_words import energy_table, step_rows
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.solve import wear as solving
 from hexcontact.text import cycle_count

@@ -20,7 +20,7 @@ from ..interior.region import region
 from ..interior.stress import LOADED, Surface, below, bodies_of, nodal_tractions
 from ..text import did_you_mean, text_table
 from ..variables import EDGES, FIELDS, TRACTIONS, VARIABLES
-from .history import WEARING, cycles, segments, stages, worn_by_cycle
+from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .interpolate import NodalStep, Point, PressureField, TractionField, chosen_fields, with_shown
 from .layout import Quantities, history_of, lattice_of, step_of
 

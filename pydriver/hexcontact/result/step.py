@@ -175,7 +175,7 @@ class Step(NodalStep):
     @property
     def residuals(self) -> dict[str, float]:
         """Residuals of the contact conditions and loads by their symbols: R_n, R_t, R_P, R_Q, R_M."""
-        from .history import residuals
+        from .history_words import residuals
 
         return residuals(self.history)
 
@@ -206,7 +206,7 @@ class Step(NodalStep):
 
     def __repr__(self) -> str:
         """Describe the step in a line."""
-        from .history import describe
+        from .history_words import describe
 
         try:
             about = describe(self.history)
@@ -216,7 +216,7 @@ class Step(NodalStep):
 
     def _repr_html_(self) -> str:
         from ..text import html_table
-        from .history import extent_of, step_rows
+        from .history_words import extent_of, step_rows
 
         return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
 

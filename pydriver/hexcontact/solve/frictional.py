@@ -13,7 +13,7 @@ from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.step import Step
 from ..variables import BULK_STRAIN, CORE, STATE
-from .frictionless import Window
+from .window import Window
 
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")

@@ -29,8 +29,8 @@ from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener
-from .frictionless import require_memory
 from .steps import check_step, steps
+from .window import require_memory
 
 _SAME = 1e-12  # relative difference of equal spacings
 

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from ..core.lattice import Lattice
 from ..errors import DeckError, HexcontactError
-from ..result.history import worth_showing
+from ..result.history_words import worth_showing
 from ..result.step import Step
 from ..text import visible
 from ..variables import RESIDUALS, label_of

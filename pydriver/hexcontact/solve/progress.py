@@ -8,7 +8,7 @@ import sys
 from typing import IO, Any
 
 from ..core.lattice import Lattice
-from ..result.history import describe
+from ..result.history_words import describe
 from ..result.step import Step
 from ..text import cut, quantity, visible
 from .events import Listener

@@ -13,17 +13,17 @@ from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.overview import parameters_of
 from ..problem.problem import Problem
 from ..problem.refinement import coarser
-from ..result.history import limited_steps
+from ..result.history_words import limited_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import quantity, visible
 from .events import Callback, Listener, Listeners, Stopped
-from .frictionless import require_memory
 from .log import Log
 from .progress import reporter
 from .steps import steps
+from .window import require_memory
 
 if TYPE_CHECKING:
     import xarray

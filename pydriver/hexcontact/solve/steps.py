@@ -16,14 +16,14 @@ from ..problem import plausibility
 from ..problem.loads import LoadStep
 from ..problem.overview import machine
 from ..problem.problem import Problem
-from ..result.history import unasked_path
+from ..result.history_words import unasked_path
 from ..result.step import Step
 from ..variables import LOADS
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .frictional import FrictionWindow
-from .frictionless import NormalWindow, Window
 from .log import Log
+from .window import NormalWindow, Window
 
 _SAME = 1e-9  # relative difference of equal initial gaps
 

@@ -36,7 +36,7 @@ from ..core.steps import (
 from ..errors import ConvergenceError, DeckError, PathWarning
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
-from ..result.history import unclosed_cycle
+from ..result.history_words import unclosed_cycle
 from ..result.step import Step
 from ..variables import LOADS, RESIDUALS, WORN
 from .adaptive import GivenPath

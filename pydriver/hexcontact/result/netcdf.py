@@ -8,7 +8,6 @@ chunks. A program that rewrites the file with HDF5 removes the seal.
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,8 +23,8 @@ from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
-from .check import fault_of_dimensions, fault_of_fields, fault_of_result
-from .layout import COORDINATES, Layout, Metadata
+from .check import fault_of_dimensions, fault_of_result
+from .layout import Layout, Metadata
 from .step import Step
 
 if TYPE_CHECKING:
@@ -60,9 +59,8 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 for name, values in (layout.coordinates() | layout.histories() | layout.trials).items()
             ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
-            vars(file)["defined"] = True
             file.setncatts(layout.attributes(complete))
-            # chunks are written once; the default, 64 MB a variable, is set with the end of definitions
+            # chunks are written once; the default is 64 MB a variable
             for column in file.variables.values():
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
@@ -83,32 +81,16 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 column[...] = fixed[name]
 
 
-@functools.cache
-def _file_type() -> type[netCDF4.Dataset]:
-    """Return files that only leave the mode of definitions once they are `defined`: leaving it flushes."""
-    import netCDF4
-
-    class File(netCDF4.Dataset):
-        def _redef(self) -> None:
-            if "defined" in vars(self):
-                super()._redef()  # type: ignore[misc]
-
-        def _enddef(self) -> None:
-            if "defined" in vars(self):
-                super()._enddef()  # type: ignore[misc]
-
-    return File
-
-
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; at the end close it and add its checksum."""
-    file_type = _file_type()
+    import netCDF4
+
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
         with LOCK:
-            file = file_type(path, "w", format="NETCDF4_CLASSIC")
+            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:
@@ -231,12 +213,8 @@ def read_output(path: Path) -> Result:
         sealed = check_seal(path)
     with reading(path), opened(path) as file:
         _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
-        for name in COORDINATES:
-            if 0 in file[name].shape:
-                raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
-        for name, column in file.variables.items():
-            if fault := fault_of_dimensions(name, column.dimensions):
-                raise DeckError(f"{path} is damaged: {fault}")
+        if not sealed and (fault := fault_of_dimensions(file.variables)):
+            raise DeckError(f"{path} is damaged: {fault}")
     with reading(path):
         from .result import Result
 
@@ -246,7 +224,7 @@ def read_output(path: Path) -> Result:
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:
                 variable.load()
-        if fault := fault_of_result(result.dataset) or ("" if sealed else fault_of_fields(result.dataset)):
+        if not sealed and (fault := fault_of_result(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)

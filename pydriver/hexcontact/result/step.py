@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,62 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from ..files import reading
 from ..text import did_you_mean
 from ..variables import EDGES
 from .interpolate import NodalStep
 
 if TYPE_CHECKING:
-    from zipfile import ZipFile
-
     import xarray
-
-_LENGTHS = 26  # byte of a member of an archive at which the lengths of its name and extra field stand
-_BLOCK = 2**20  # bytes that are read at a time
-
-
-class Stored(Mapping[str, NDArray[Any]]):
-    """Fields of a step in a file, each loaded at every access: an output takes one after the other.
-
-    Their arrays are not compressed, and all checksums are compared here. `members` has the names of the
-    fields in each array of the archive, along its first axis.
-    """
-
-    def __init__(self, path: Path, archive: ZipFile, members: Mapping[str, Sequence[str]]) -> None:
-        self._path = path
-        self._places: dict[str, tuple[int, np.dtype[Any], tuple[int, ...]]] = {}
-        for member, names in members.items():
-            begin = archive.getinfo(member).header_offset
-            with path.open("rb") as file:
-                file.seek(begin + _LENGTHS)
-                begin += _LENGTHS + 4 + sum(struct.unpack("<HH", file.read(4)))  # name and extra field
-            with archive.open(member) as array:
-                np.lib.format.read_magic(array)
-                shape, _, kind = np.lib.format.read_array_header_1_0(array)
-                begin += array.tell()
-                while array.read(_BLOCK):  # compares the checksum at the end
-                    pass
-            size = math.prod(shape[1:]) * kind.itemsize
-            places = ((begin + number * size, kind, shape[1:]) for number in range(shape[0]))
-            self._places |= zip(names, places, strict=True)
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """Read a field; DeckError if the file has been damaged since."""
-        begin, kind, shape = self._places[name]
-        with reading(self._path, "a record of a journal"):
-            return np.fromfile(self._path, kind, math.prod(shape), offset=begin).reshape(shape)
-
-    def __contains__(self, name: object) -> bool:
-        """Test whether there is such a field."""
-        return name in self._places
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        """Return the number of fields."""
-        return len(self._places)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,7 +69,7 @@ class Step(NodalStep):
     bodies: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.fields, Stored):
+        if not isinstance(self.fields, dict | MappingProxyType):  # each is loaded at its use
             return
         safe = {name: _read_only(values) for name, values in self.fields.items()}
         object.__setattr__(self, "fields", MappingProxyType(safe))

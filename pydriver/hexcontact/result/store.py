@@ -23,7 +23,17 @@ from typing import TYPE_CHECKING, Any, Self
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
 from ..lock import Lock, begun, names_a_run
-from .journal import STOPPED, SUFFIX, Description, Journal, journal_of, read_step, write_record
+from .journal import (
+    HEADER,
+    STOPPED,
+    SUFFIX,
+    Header,
+    Journal,
+    journal_of,
+    read_record,
+    write_header,
+    write_record,
+)
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
@@ -103,12 +113,16 @@ class Store:
 
     @property
     def metadata(self) -> Metadata:
-        """Metadata of the run; the next record has all of them if they are set."""
-        return self._about.metadata
+        """Metadata of the run; set ones are written with the next step."""
+        return self._header.whole(len(self.heads))
 
     @metadata.setter
     def metadata(self, metadata: Metadata) -> None:
-        self._about = Description(metadata)
+        self.describe(metadata)
+
+    def describe(self, metadata: Metadata, loads: list[str] | None = None) -> None:
+        """Set the metadata, of a session with its loads apart, which `append` may add to."""
+        self._header, self._described = Header(metadata, loads, len(self.heads)), False
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
@@ -159,7 +173,7 @@ class Store:
         The time at which the run `began` tells whether a complete output is its own if it left no records.
         """
         journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
-        left = trials.read()[0] if trials else None
+        left = trials.metadata if trials else None
         output = None
         with contextlib.suppress(DeckError):  # another file is not replaced
             output = read_output(self.path) if self.path.exists() else None
@@ -178,7 +192,7 @@ class Store:
             return None
         if left is not None:
             self.metadata = left
-            self._refuse_newer(not ours, trials.ledger)
+            self._refuse_newer(not ours, trials.folder / HEADER)
             return None
         if not journal and output is not None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
@@ -195,7 +209,7 @@ class Store:
                 f"without it and those after it, hexcontact resume continues after step {len(self.heads)}"
             )
             raise
-        self.metadata = journal.metadata
+        self._header, self._described = journal.header, True
         with reading(self.folder, "a journal"):
             Layout(self.metadata, self.heads)  # fails if the steps do not belong together
         self._refuse_newer(not ours, journal.records[0])
@@ -234,7 +248,7 @@ class Store:
         """Refuse or delete an existing output or unfinished run."""
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
-            count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
+            count, what = (len(trials.solutions), "lattice") if trials else (len(left), "step")
             raise DeckError(
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
@@ -274,14 +288,14 @@ class Store:
     def has_all_steps(self) -> bool:
         """Whether all planned steps are finished."""
         return bool(self.heads) and (
-            len(self.heads) == self._about.planned_steps or self.heads[-1].done == 1.0
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
         )
 
     @property
     def kept(self) -> str:
         """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
-        planned, count = self._about.planned_steps, len(self.heads)
+        planned, count = self.metadata.planned_steps, len(self.heads)
         finished = TrialFolder(self.folder).kept
         if self.heads and planned:
             finished = f"{count} of {planned} load steps are finished"
@@ -316,20 +330,26 @@ class Store:
         with self._replacing(self.path) as path:
             write(path, layout, steps, complete)
 
-    def append(self, step: Step, **growth: Any) -> None:
-        """Record a finished step on the disk; `growth` changes the deck as in `Description.next`."""
+    def append(self, step: Step, loads: Sequence[Any] = ()) -> None:
+        """Record a finished step on the disk, with the `loads` of a session as of `Header.follow`."""
         with self._mutex:
             self._require_open()
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
             record = self.folder / f"{step.number:06d}{SUFFIX}"
             try:
-                about = self._about.next(step.number, **growth)
-                with self.writing(f"step {step.number}"), self._replacing(record) as path:
-                    write_record(path, about, step)
+                with self.writing(f"step {step.number}"):
+                    if not self._described:
+                        write_header(self.folder, self._header)
+                    with self._replacing(record) as path:
+                        write_record(path, self._header.metadata.run, step, loads)
             except BaseException:
-                self._about.number = 0  # the next record does not refer to this one
+                if not self.heads:
+                    (self.folder / HEADER).unlink(missing_ok=True)
                 raise
+            self._described = True
+            if loads:
+                self._header.follow(loads)
             if step.companion and "until" in step.control and step.number > 2:
                 self._lighten(self.folder / f"{step.number - 2:06d}{SUFFIX}")
             self.heads.append(step.head)
@@ -349,9 +369,9 @@ class Store:
     def _lighten(self, record: Path) -> None:
         """Remove restart data from an older record; the last two keep it, since one may be lost."""
         with self.writing("the journal"):
-            about, before = read_step(record, companion=False, check=False)
+            about, before = read_record(record)
             with self._replacing(record) as path:
-                write_record(path, about, before)
+                write_record(path, about["run"], before, about["loads"])
 
     def finish(self) -> None:
         """Write the output and delete the journal, which remains after an error."""

@@ -29,8 +29,8 @@ from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener
-from .steps import check_step, steps
 from .window import require_memory
+from .steps import check_step, steps
 
 _SAME = 1e-12  # relative difference of equal spacings
 
@@ -192,9 +192,9 @@ class OnDisk:
     def __init__(self, store: Store, listener: Listener) -> None:
         self._store, self.listener = store, listener
         self._trials = TrialFolder(store.folder)
-        self._solutions = self._trials.read()[1] if self._trials else []
+        self._solutions = self._trials.solutions if self._trials else []
         with store.writing("the journal"):
-            self._trials.write(store.metadata, self._solutions)
+            self._trials.begin(store.metadata)
 
     def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice, or its missing steps."""
@@ -211,13 +211,8 @@ class OnDisk:
                 check_step(case, last, found)
             before = [*store.heads[:-1], last] if last is not None else []
             solution = _solved(trial, case, self.listener, store.append, before)
-        self._solutions.append(solution)
         with self._store.writing(f"{trial.name}"):
-            self._trials.write(self._store.metadata, self._solutions)
-            if trial.copy:
-                self._trials.drop(trial.level, trial.copy)
-            elif trial.level:
-                self._trials.drop(trial.level - 1)
+            self._trials.add(solution)
         return solution
 
     @contextlib.contextmanager
@@ -226,7 +221,7 @@ class OnDisk:
         path, last = self._trials.path(trial.level, trial.copy), None
         if Journal(journal_of(path)):
             store, last = Store.reopened(path)
-            self._trials.check(self._store.metadata, store.metadata)
+            self._trials.check(self._store.metadata.run, store.metadata.run)
         else:
             store = Store(path, self._store.metadata, overwrite=True)
         store.interim = False

@@ -21,9 +21,9 @@ from ..result.store import Store, open_result
 from ..text import quantity, visible
 from .events import Callback, Listener, Listeners, Stopped
 from .log import Log
+from .window import require_memory
 from .progress import reporter
 from .steps import steps
-from .window import require_memory
 
 if TYPE_CHECKING:
     import xarray

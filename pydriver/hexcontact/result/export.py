@@ -46,7 +46,11 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
             wanted = [int(result.step(number)["step"]) for number in numbers]
         except NoSuchStep as error:
             raise DeckError(f"--step: {error}") from error
-    kept = [number for number in wanted if any(is_kept(field) for _, field in _fields(result, number))]
+    kept = [
+        number
+        for number in wanted
+        if any(is_kept(field.values) for field in _fields(result, number).data_vars.values())
+    ]
     if not kept or (numbers is not None and len(kept) < len(wanted)):
         lost = sorted(set(wanted) - set(kept))
         where = f"step {lost[0]}" if numbers is not None else "any step"
@@ -62,11 +66,12 @@ def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
     return steps
 
 
-def _fields(result: Result, number: int, source: str | None = "nodes") -> Iterator[tuple[str, NDArray[Any]]]:
+def _fields(result: Result, number: int, source: str | None = "nodes") -> xarray.Dataset:
+    """Return the fields of a step, with the tractions of a source."""
     one = result.step(number)
     if source != "nodes":
         one = with_shown(one, result.lattice, source)
-    return ((name, one[name].values) for name in FIELDS if name in one)
+    return one[[name for name in FIELDS if name in one]]
 
 
 # --- VTK ------------------------------------------------------------------------------------------
@@ -197,7 +202,7 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
 
 def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
     """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
-    fields = dict(_fields(result, number, source))
+    fields = {str(name): field.values for name, field in _fields(result, number, source).items()}
     for name in FIXED:
         if name in result.dataset:
             yield name, result.dataset[name].values.ravel(), VARIABLES[name].unit
@@ -250,21 +255,18 @@ def to_ugrid(
         mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
-        names = [name for name in (*FIXED, *FIELDS) if name in result.dataset]
-        columns = {}
-        for name in names:
+        for name in (name for name in (*FIXED, *FIELDS) if name in result.dataset):
             variable = VARIABLES[name]
             fill = variable.missing if variable.dtype == "f8" else None
-            packed = {"zlib": True, "complevel": 1, "fill_value": fill}
             dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
-            column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
+            column = mesh.add_column(
+                *(file, name, variable.dtype, dims, attributes), zlib=True, complevel=1, fill_value=fill
+            )
             if name in FIXED:
                 column[...] = result.dataset[name].values.ravel()
-            else:
-                columns[name] = column
         for position, number in enumerate(steps):
-            for name, values in _fields(result, number, source):
-                columns[name][position] = values.ravel()
+            for shown, field in _fields(result, number, source).items():
+                file[str(shown)][position] = field.values.ravel()
     return target
 
 
@@ -279,8 +281,6 @@ def to_csv(
     source: str | None = None,
 ) -> list[Path]:
     """Write tables of the history, of the nodes in some steps, and those of the deck."""
-    import pandas as pd
-
     steps = [] if numbers is None else kept_steps(result, numbers)
     written = [folder / f"{stem}_history.csv", *(folder / f"{stem}_{number:04d}.csv" for number in steps)]
     wanted = (
@@ -300,13 +300,10 @@ def to_csv(
     with replacing(written[0]) as path:
         history.to_csv(path)
     for number, target in zip(steps, written[1:], strict=True):
-        rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
-        columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
-        table = pd.DataFrame(
-            {k: v.ravel() for k, v in (columns | dict(_fields(result, number, source))).items()}
-        )
+        fields = _fields(result, number, source)
+        table = fields.to_dataframe(dim_order=["row", "col"])[["x", "y", *fields.data_vars]]
         with replacing(target) as path:
-            table.rename(columns=_with_unit).to_csv(path, index=False)
+            table.rename(columns=_with_unit).to_csv(path)
     return written + [write_table(tables[name], target) for name, target in wanted.items()]
 
 

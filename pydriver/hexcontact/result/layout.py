@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     import xarray
 
 COORDINATES = ("step", "row", "col", "x", "y")
+MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
+_ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
+_STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin"),
@@ -121,6 +124,7 @@ class Layout:
             present -= set(FIELDS) - set(metadata.fields)
         self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
         self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
+        self.block = max(1, _STEPS // self.window.size)  # load steps in a chunk
         self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
         if self.trials:
             self.variables |= {name: VARIABLES[name] for name in self.trials}
@@ -128,7 +132,7 @@ class Layout:
 
     def attributes_of(self, name: str) -> dict[str, Any]:
         """Return the CF attributes of a variable, with the name of its estimated error."""
-        attributes = VARIABLES[name].attributes
+        attributes = dict(_ATTRIBUTES_OF[name])
         if (error := f"{name}_error") in self.variables:
             attributes["ancillary_variables"] = error
         return attributes
@@ -173,7 +177,7 @@ class Layout:
         """Return the values of quantities with one value by step; texts as objects."""
         return {
             name: np.array(
-                [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
+                [step.history.get(name, "" if v.dtype == "str" else MISSING[name]) for step in self.steps],
                 dtype=object if v.dtype == "str" else v.dtype,
             )
             for name, v in self.variables.items()
@@ -185,7 +189,7 @@ class Layout:
         if self.keeps(position) and name in step.fields:
             return self.padded(name, step)
         variable = self.variables[name]
-        return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
+        return np.full(self.window.shape, MISSING[name], dtype=variable.dtype)
 
     def padded(self, name: str, step: Step) -> NDArray[Any]:
         """Return a field of `step` on the window of the whole result."""

@@ -24,7 +24,7 @@ from ..netcdf_library import LOCK, attributes, close, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_result
-from .layout import Layout, Metadata
+from .layout import MISSING, Layout, Metadata
 from .step import Step
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 # Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
 _BELOW = ("stress", "fatigue", "\\")
 _CHUNK = 512  # nodes of a chunk along row and col
-_STEPS = 64**2  # nodes of a chunk with several steps
 _MARK = b"hexcontact sha-2"
 _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes
@@ -53,7 +52,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
             given = [
-                _text(file, name, values)
+                _text(file, name, values, layout)
                 if VARIABLES[name].dtype == "str"
                 else (_column(file, name, layout), values)
                 for name, values in (layout.coordinates() | layout.histories() | layout.trials).items()
@@ -72,7 +71,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         block: list[Step] = []
         for position, step in enumerate(steps):
             block.append(step)
-            if len(block) == _block(layout) or position == len(layout.steps) - 1:
+            if len(block) == layout.block or position == len(layout.steps) - 1:
                 _write_block(columns, layout, position - len(block) + 1, block)
                 block.clear()
             layout.complete_fixed(fixed, step)
@@ -100,11 +99,6 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     seal(path)
 
 
-def _block(layout: Layout) -> int:
-    """Return the number of load steps in a chunk."""
-    return max(1, _STEPS // layout.window.size)
-
-
 def _write_block(
     columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
 ) -> None:
@@ -121,19 +115,21 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     variable = VARIABLES[name]
     options: dict[str, Any] = {}
     if variable.dims[-2:] == ("row", "col"):
-        block = {"step": _block(layout), "row": _CHUNK, "col": _CHUNK}
+        block = {"step": layout.block, "row": _CHUNK, "col": _CHUNK}
         sizes = [min(block[dim], layout.sizes[dim]) for dim in variable.dims]
         options = {"compression": "zlib", "complevel": 1, "chunksizes": sizes}
         options["fletcher32"] = True  # damage is an error
         if variable.dtype == "f8":
-            options["fill_value"] = variable.missing
+            options["fill_value"] = MISSING[name]
     attributes = layout.attributes_of(name)
     if options and name not in ("x", "y"):
         attributes["coordinates"] = "x y"
     return mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
 
 
-def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF4.Variable, NDArray[Any]]:
+def _text(
+    file: netCDF4.Dataset, name: str, texts: NDArray[Any], layout: Layout
+) -> tuple[netCDF4.Variable, NDArray[Any]]:
     """Create the text variable `name`, and return it with its characters.
 
     Characters, not netCDF strings, on which HDF5 crashes if a file is open more than once.
@@ -141,7 +137,7 @@ def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF
     variable = VARIABLES[name]
     characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
     file.createDimension(f"{name}_length", characters.shape[1])
-    attributes = {**variable.attributes, "_Encoding": "utf-8"}
+    attributes = {**layout.attributes_of(name), "_Encoding": "utf-8"}
     column = mesh.add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
     column.set_auto_chartostring(False)
     return column, characters

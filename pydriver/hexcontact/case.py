@@ -305,7 +305,7 @@ class Case(Problem):
 
     def _repr_html_(self) -> str:
         from .problem.overview import case_rows
-        from .solve.window import peak_memory
+        from .solve.memory_needed import peak_memory
         from .text import html_table
 
         return html_table(

@@ -309,7 +309,7 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.solve.frictional import FrictionWindow
+    from hexcontact.solve.window import FrictionWindow
 
     advance, asked = FrictionWindow.advance, []
 

@@ -45,9 +45,9 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve import steps as solve
-from hexcontact.solve.frictional import FrictionWindow, state_of
+from hexcontact.solve.memory_needed import memory_needed
 from hexcontact.solve.progress import Lines
-from hexcontact.solve.window import memory_needed
+from hexcontact.solve.window import FrictionWindow, state_of
 from hexcontact.variables import FIELDS, WORN
 
 STIFF = {"young_modulus": 432e9, "poisson_ratio": 0.32}

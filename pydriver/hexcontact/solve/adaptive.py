@@ -28,7 +28,7 @@ from ..core.steps import (
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from .frictional import FrictionWindow
+from .window import FrictionWindow
 
 
 class _Rim(Exception):

@@ -29,7 +29,7 @@ from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener
-from .window import require_memory
+from .memory_needed import require_memory
 from .steps import check_step, steps
 
 _SAME = 1e-12  # relative difference of equal spacings

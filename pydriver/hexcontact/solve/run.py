@@ -21,7 +21,7 @@ from ..result.store import Store, open_result
 from ..text import quantity, visible
 from .events import Callback, Listener, Listeners, Stopped
 from .log import Log
-from .window import require_memory
+from .memory_needed import require_memory
 from .progress import reporter
 from .steps import steps
 

@@ -21,9 +21,8 @@ from ..result.step import Step
 from ..variables import LOADS
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
-from .frictional import FrictionWindow
 from .log import Log
-from .window import NormalWindow, Window
+from .window import FrictionWindow, NormalWindow, Window
 
 _SAME = 1e-9  # relative difference of equal initial gaps
 

@@ -40,7 +40,7 @@ from ..result.history_words import unclosed_cycle
 from ..result.step import Step
 from ..variables import LOADS, RESIDUALS, WORN
 from .adaptive import GivenPath
-from .frictional import FrictionWindow, state_of
+from .window import FrictionWindow, state_of
 
 LABEL = "wear"  # of the cycles that wear, which are no part of the load history
 MOST_UNWORN = 50  # cycles on unworn surfaces, until they close

@@ -1,193 +1,37 @@
-"""A case on one window of its lattice: gap, solver, operators, and the fields and history of a load step.
-
-`Window` is what all algorithms share, `NormalWindow` contact without friction; for contact with friction see
-`hexcontact.solve.frictional`.
-"""
+"""A case on one window of its lattice: gap, solver, operators, and the fields and history of a load step."""
 
 from __future__ import annotations
 
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..core import contact, kernel_cache, memory
-from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
-from ..core.friction import ContactState
+from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
+from ..core.friction import ContactState, FrictionalContact
 from ..core.lattice import Lattice
 from ..core.measures import measures
-from ..deck.below import cycle_of
-from ..deck.units import readable
 from ..errors import DeckError
-from ..problem.checks import stage_of
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..problem.window import grown, rim_sides
 from ..result.step import Step
-from ..text import listed
-from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, NODAL_FRICTION, STATE, WORN, names_where
+from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, STATE, names_where
 from .events import Listener
+from .memory_needed import fields_of, require_memory
 
-# Fields that Python holds while a step is solved and measured. Without friction: initial gap, pressure, gap
-# and zones, beside them those that the measures take in place of the iteration's. With friction: the state
-# before, which the core holds, gaps, and holes in the heap of the C library.
-ARRAYS = {False: 3, True: 14}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
-_ITEM = 8  # bytes of a float
 _STEPPED = names_where(lambda v: v.dims == ("step",))
-# Measured by tests/bench/memory.py.
-_WRITING = 24 * 2**20  # bytes of netCDF and HDF5, which an interim output loads beside the solver
-_LOADED = 5 * 2**20  # bytes of modules that a run imports
-_LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
-_HOLES = 32 * 2**20  # bytes at most of freed arrays in the heap, by FFTs without friction: larger go back
-_PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
-_COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
-_LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
-_INTERFACE_ARRAYS = {False: 4, True: 6}  # springs of a compliant interface, and the symbol of bodies on them
-_WEAR_ARRAYS = 42  # fields of the cycles before and after a jump, of their record, of the pressure ahead
-_END_ARRAYS = 3  # fields that remember the end of a load step of the cycle
-_ENTRY_ARRAYS = 45  # fields of the core for the places of nodes when their gap closed
-
-
-# --- memory ---------------------------------------------------------------------------------------
-
-
-def peak_memory(case: Problem, lattice: Lattice) -> int:
-    """Return the largest memory (bytes) of a run on a window, with interpreter and libraries."""
-    solved = memory_needed(case, lattice, _parts(case, lattice))
-    return memory.resident() + max(solved, _stress_memory(case, lattice, kept=True))
-
-
-def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
-    """Return the memory (bytes) of the tables [[stress]] and [[fatigue]] after the run."""
-    return max(_stress_needs(case, lattice, kept).values(), default=0)
-
-
-def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[str, int]:
-    """Return the memory (bytes) of each table [[stress]] and [[fatigue]] after the run, by its key."""
-    if not (case.deck.stress or case.deck.fatigue):
-        return {}
-    from ..interior import fatigue, stress
-    from ..interior.region import region
-
-    needs = {}
-    for number, table in enumerate(case.deck.stress, 1):
-        all_steps = math.ceil(len(case.load_steps) / case.output.every)
-        steps = all_steps if table.steps == "all" else len(table.steps or (1,))
-        below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
-        needs[f"stress.{number}"] = max(below, _tractions_memory(case, lattice, steps, table.source))
-    for number, cycle in enumerate(case.deck.fatigue, 1):
-        steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
-        points = region(lattice, **cycle.where)
-        below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
-        needs[f"fatigue.{number}"] = max(below, _tractions_memory(case, lattice, steps, None))
-    return {key: needed + _LOADED_AFTER for key, needed in needs.items()}
-
-
-def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
-    """Return the places of the load steps of a closed cycle, adaptive segments as one step each."""
-    first, last = cycle_of([stage_of(step) for step in case.load_steps], labels)
-    return range(first, last + 1)
-
-
-def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
-    """Return the memory (bytes) of the tractions of some steps, corrected at sharp edges."""
-    from ..interior import stress
-
-    mu = case.friction_coefficient  # nan where it varies
-    sheared = math.isnan(mu) or 0.0 < mu < math.inf
-    nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
-    used = "nodes" if case.deck.interface else source
-    needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)
-    # beside the spectra of the solver, which are kept
-    return needed + case.frictional * contact.memory_needed("fft", *lattice.shape, part="operator")
-
-
-def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
-    """Return the memory (bytes) to solve and write load steps on a window.
-
-    The size of the contact is the estimate at the largest load, else that of the window. `kept` are further,
-    dispensable bytes.
-    """
-    bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
-    operator, set_up = (
-        contact.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
-        for part in ("operator", "set-up of the operator")
-    )
-    arrays = ARRAYS[case.frictional]
-    if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
-        arrays += _ENTRY_ARRAYS
-    if case.adaptive:
-        arrays += _COMPANION_ARRAYS
-    if math.isnan(case.friction_coefficient):
-        arrays += _LAW_ARRAYS
-    if case.deck.wear:
-        arrays += _WEAR_ARRAYS + _END_ARRAYS * (1 + len(case.cycle))
-    if case.deck.interface:
-        arrays += _INTERFACE_ARRAYS[case.frictional]
-    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
-    if case.deck.wear:
-        needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
-    if bodies:
-        # the set-up fits into the vectors of a solver with friction, which are free by then
-        needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    if not case.frictional and case.method_for(lattice) == "fft":
-        needed += min(needed // 2, _HOLES)
-    return _LOADED + _WRITING + needed
-
-
-def _parts(case: Problem, lattice: Lattice) -> int:
-    """Return the bytes of operators on parts of the window around a growing contact, and of cached spectra.
-
-    Of n steps in which it grows, about log2(n) need a part that is larger by much.
-    """
-    if case.method_for(lattice) == "direct":
-        return 0
-    most, growing = 0.0, 0
-    for step in case.load_steps:
-        if step.z.value > most:
-            most, growing = step.z.value, growing + 1
-    doublings = min(math.log2(max(growing, 1)), 5.0) - case.frictional
-    kept = int(_PART[case.frictional] * max(doublings, 0.0) * case.contact_nodes(lattice))
-    return min(kept, kernel_cache.bound())
-
-
-def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
-    """Refuse a window, with the fields of some steps, or a table that does not fit into memory."""
-    kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
-    needed, there = memory_needed(case, lattice) + kept, memory.available()
-    fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
-    fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""
-    advice = ["a smaller window" if case.window_fixed else f"a larger grid.spacing{fits}"]
-    if (method := case.method_for(lattice)) == "direct":
-        advice.append('solver.method = "fft"')
-    if steps_held:
-        advice.append("an output file")
-    memory.require(
-        needed,
-        f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {method})",
-        f"choose {listed(advice, 'or')}",
-        there,
-    )
-    for key, below in _stress_needs(case, lattice).items():
-        if below + kept > needed:
-            fewer = "a smaller region, fewer points or steps, or a larger grid.spacing"
-            memory.require(below + kept, key, f"choose {fewer}", there)
-
-
-def fields_of(case: Problem) -> tuple[str, ...]:
-    """Return the fields of each step of a case: its whole state, and displacements that the deck names."""
-    worn = WORN if case.deck.wear else ()
-    return (*STATE[case.frictional], *worn, *(name for name in DISPLACEMENTS if name in case.output.fields))
-
-
-# --- windows --------------------------------------------------------------------------------------
+# numbers of a state that have the names of the history
+_NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
+_PATH_ERROR = "dissipated_energy_path_error"  # static steps have no path
+_ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contact
 
 
 class Window(ABC, Generic[S]):
@@ -212,11 +56,11 @@ class Window(ABC, Generic[S]):
     def _solver(self, gap: Array) -> Any:
         """Return the solver for an initial gap (inf where nothing can touch)."""
 
-    def _without_friction(self, gap: Array) -> contact.NormalContact:
+    def _without_friction(self, gap: Array) -> NormalContact:
         """Return the solver of the contact without friction."""
         method = self.case.method_for(self.lattice)
         given = self.lattice, self.case.solved_pair, gap, self.candidate
-        return contact.NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
+        return NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
 
     @abstractmethod
     def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
@@ -347,3 +191,102 @@ class NormalWindow(Window[NormalSolution]):
         driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
         solution: NormalSolution = self._contact.solve(**driven, tolerance=self.case.solver.tolerance)
         return solution
+
+
+class FrictionWindow(Window[ContactState]):
+    """Contact with friction; a step starts from the state at the end of the step before."""
+
+    state = STATE[True]
+    _contact: FrictionalContact
+
+    def _solver(self, gap: Array) -> FrictionalContact:
+        return FrictionalContact(
+            self.lattice,
+            self.case.solved_pair,
+            gap,
+            self.candidate,
+            friction_coefficient=self.friction,
+            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
+            method=self.case.method_for(self.lattice),
+            iteration="dissertation" if self.case.solver.iteration == "dissertation" else "newton",
+            interface=self.case.interface,
+            rim_warning=False,
+        )
+
+    def advance(
+        self,
+        state: ContactState | None,
+        target: LoadStep,
+        values: tuple[float, ...],
+        **how: Any,
+    ) -> ContactState:
+        """Advance a state to new loads and motions; `how` goes to the solver."""
+        return self._contact.advance(
+            self._contact.virgin() if state is None else state,
+            [motion.control for motion in target.targets],
+            values,
+            bulk_strain=self.case.bulk(target.bulk)[1],
+            static=self.case.solver.algorithm == "static",
+            entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
+            **{"tolerance": self.case.solver.tolerance} | how,
+        )
+
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        self.worn = depth
+        del self._contact  # frees the memory of the solver before that of the next
+        self._contact = self._solver(np.where(self.candidate, self.initial_gap + depth, np.inf))
+
+    def grown(self, solution: ContactState, target: LoadStep) -> Self:
+        """Return the problem on a larger window, with its worn depth."""
+        larger = super().grown(solution, target)
+        if self.worn is not None:
+            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0), dtype=float))
+        return larger
+
+    def joined(self, first: ContactState, last: ContactState) -> ContactState:
+        """Record two steps as one, with the slip of both and its residual."""
+        return self._contact.joined(first, last)
+
+    def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
+        """Return a state on this window; the history of the new nodes follows from it."""
+        return None if state is None else self._contact.extended(state, lattice)
+
+    def restored(self, step: Step) -> ContactState | None:
+        """Return the whole state, and set the worn depth of the step."""
+        if (worn := step.fields.get("worn_depth")) is not None:
+            self.wear(np.array(worn))
+        return state_of(step)
+
+    # --- history ------------------------------------------------------------------------------------------
+
+    def _history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
+        static = self.case.solver.algorithm == "static"  # nothing has gone before
+        spent_before = 0.0 if before is None or static else before.dissipated_energy
+        spent = solution.dissipated_energy - spent_before
+        history = {**super()._history(solution, before), "dissipated_energy_step": spent}
+        left_out = () if self.case.deck.bulk else BULK_STRAIN
+        left_out = (*left_out, _PATH_ERROR) if static else left_out
+        return {name: value for name, value in history.items() if name not in left_out}
+
+    def largest_contact_area(self) -> float:
+        """Return the contact area at the largest load of the history, without friction (m2)."""
+        solver, nodes = self._without_friction(self.initial_gap), 1
+        for drive in self.case.largest_drives:
+            known: dict[str, Any] = {**drive}
+            nodes = max(nodes, int((solver.solve(**known, tolerance=_ROUGHLY).zone > 0).sum()))
+        return self.lattice.cell_area * nodes
+
+
+def state_of(step: Step) -> ContactState:
+    """Return the state with friction at the end of a step with all its fields."""
+    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
+    if missing := needed - step.fields.keys() - step.history.keys():
+        raise DeckError(
+            f"step {step.number} holds no state of a contact with friction: it lacks "
+            f"{', '.join(sorted(missing))}"
+        )
+    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
+    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    return ContactState(**state)  # a finished step has converged, and away from the rim

@@ -184,8 +184,9 @@ def test_a_journal_without_its_header_is_refused(out: Path) -> None:
     written(out, planned=4)
     (journal_of(out) / "header.json").unlink()
     for read in (open_result, Store.reopened):
-        with pytest.raises(DeckError, match=r"out\.nc\.d lacks its header, header\.json"):
+        with pytest.raises(DeckError, match=r"out\.nc\.d lacks its header, header\.json") as caught:
             read(out)
+        assert not hasattr(caught.value, "__notes__")  # no record is to be deleted
 
 
 @pytest.mark.parametrize("story", ["", "resumed, tolerance = 1e-07 instead of 1e-05"])
@@ -336,6 +337,15 @@ def test_a_record_of_another_version_is_refused(out: Path) -> None:
     np.savez(record, **(arrays | {"about": np.frombuffer(text, "u1")}))
     with pytest.raises(DeckError, match=r"000001\.npz was kept by hexcontact .*layout 1; .* reads layout 4"):
         open_result(out)
+
+
+def test_lattices_of_an_earlier_version_are_refused(out: Path) -> None:
+    lattices = journal_of(out) / "lattices"
+    lattices.mkdir(parents=True)
+    (lattices / "trials.json").write_text('{"trials_version": 2}')
+    for read in (open_result, Store.reopened):
+        with pytest.raises(DeckError, match=r"trials\.json was kept by an earlier version .*; run the deck"):
+            read(out)
 
 
 def test_a_gap_or_a_damaged_record_in_the_journal_is_named(out: Path) -> None:

@@ -9,6 +9,7 @@ content, so that damage is an error.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import hashlib
 import json
@@ -157,11 +158,16 @@ class Journal:
 
     @cached_property
     def header(self) -> Header:
-        """The header, with the loads of a session in all records."""
+        """The header."""
         if not self._headers:
             read_about(self.records[0])  # DeckError for another version
             raise DeckError(f"{self.folder} lacks its header, {HEADER}")
-        header = read_header(self.folder)
+        return read_header(self.folder)
+
+    @cached_property
+    def grown(self) -> Header:
+        """The header with the loads that the records of a session add."""
+        header = dataclasses.replace(self.header, loads=copy.copy(self.header.loads))
         for record in self.records[header.steps :] if header.loads is not None else ():
             header.follow(read_about(record)["loads"])
         return header
@@ -169,7 +175,7 @@ class Journal:
     @property
     def metadata(self) -> Metadata:
         """Metadata of the run."""
-        return self.header.whole(len(self))
+        return self.grown.whole(len(self))
 
     @property
     def run(self) -> str:

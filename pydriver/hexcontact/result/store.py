@@ -200,7 +200,7 @@ class Store:
             raise DeckError(
                 f"no load step of {self.path} was finished, so it has to be run from the beginning"
             )
-        last = None
+        last, _ = None, journal.header  # whose damage is not that of a record
         try:
             for last in journal:
                 self.heads.append(last.head)
@@ -209,7 +209,7 @@ class Store:
                 f"without it and those after it, hexcontact resume continues after step {len(self.heads)}"
             )
             raise
-        self._header, self._described = journal.header, True
+        self._header, self._described = journal.grown, True
         with reading(self.folder, "a journal"):
             Layout(self.metadata, self.heads)  # fails if the steps do not belong together
         self._refuse_newer(not ours, journal.records[0])

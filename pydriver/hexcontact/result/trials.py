@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from .result import Result
 
 _JOURNAL = r"\d+_\d+\.nc\.d"
-_TEXT = rf"(\d+_\d+\.json|{re.escape(HEADER)})(\.tmp)?"
+_EARLIER = "trials.json"  # of the layouts 1 to 3
+_TEXT = rf"(\d+_\d+\.json|{re.escape(HEADER)}|{re.escape(_EARLIER)})(\.tmp)?"
 FOLDER = "lattices"  # in the journal
 
 
@@ -59,7 +60,7 @@ class TrialFolder:
 
     def __bool__(self) -> bool:
         """Test whether there are any."""
-        return (self.folder / HEADER).exists()
+        return any((self.folder / name).exists() for name in (HEADER, _EARLIER))
 
     def path(self, level: int, copy: int = 0) -> Path:
         """Return the path of the output of a lattice, to which its journal belongs."""
@@ -73,13 +74,15 @@ class TrialFolder:
     @property
     def metadata(self) -> Metadata:
         """Metadata of the run."""
+        if (earlier := self.folder / _EARLIER).exists():
+            raise DeckError(f"{earlier} was kept by an earlier version of hexcontact; run the deck again")
         return read_header(self.folder).metadata
 
     @property
     def solutions(self) -> list[Solution]:
         """The finished lattices; DeckError if a file is damaged or of another run."""
         run, found = self.metadata.run, []
-        for path in (path for path in self._texts() if path.suffix == ".json" and path.name != HEADER):
+        for path in (path for path in self._texts() if re.fullmatch(r"\d+_\d+", path.stem)):
             about = read_sealed(path)
             self.check(run, about.pop("run"))
             with reading(path, "a finished lattice"):

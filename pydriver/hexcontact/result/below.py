@@ -27,7 +27,7 @@ def computed(
 def at_hand(
     result: Result, kept: list[int], names: list[str] | None = None
 ) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield what `computed` does; tables that the run has written are read from their files."""
+    """Yield the tables as `computed`; those that the run has written are read from their files."""
     run, path = result.dataset.attrs.get("run"), Path(result.path)
     files = files_of(result.deck, path) if path.name else {}
     for name, table in tables_of(result.deck).items():
@@ -42,7 +42,7 @@ def at_hand(
 def of_table(
     result: Result, name: str, table: Stress | Fatigue, kept: list[int] | None = None
 ) -> xarray.Dataset:
-    """Return what a table of a deck wants; arguments and errors as of `computed`."""
+    """Return the dataset of a table of the deck; arguments and errors as of `computed`."""
     if isinstance(table, Fatigue):
         try:
             found = of_cycle(result, table)

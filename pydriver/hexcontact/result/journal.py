@@ -184,7 +184,7 @@ class Journal:
 
     @property
     def stopped(self) -> str:
-        """Reason of an early end; empty if the run goes on, was killed or has finished."""
+        """Reason of an early end; empty if the run continues, was killed or has finished."""
         return beginning(self.folder / STOPPED, _LONGEST_REASON).decode(errors="replace")
 
     @property

@@ -80,7 +80,7 @@ class Metadata:
 
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
-        """Return the metadata of what `dataclasses.asdict` gave, after JSON."""
+        """Return the metadata from the table of `dataclasses.asdict`, after JSON."""
         require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
         return made(cls, {**values, **tuples})

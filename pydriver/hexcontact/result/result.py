@@ -323,7 +323,7 @@ class Result:
         segment: str | Sequence[str] | None = None,
         steps: Sequence[int] | None = None,
     ) -> xarray.Dataset:
-        """Return what one cycle of the loads wears off, of a run with friction and without [wear].
+        """Return the wear of one cycle of the loads, of a run with friction and without [wear].
 
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
         `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
@@ -374,7 +374,7 @@ class Result:
         return with_places(below(self.lattice, steps, *given, **more, surface=self._surface(numbers)))
 
     def _surface(self, numbers: Sequence[int]) -> Surface:
-        """Return what gives the tractions over the surface of some steps, to the edges."""
+        """Return a function of the place of a step that gives its tractions, to the edges."""
         return lambda place: self.traction_field(numbers[place], "edges")
 
     def fatigue(
@@ -475,7 +475,7 @@ class Result:
     def _loaded(
         self, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = False
     ) -> list[dict[str, Any]]:
-        """Return tractions, bulk stress and other fields of some steps, on demand what tells the edges."""
+        """Return tractions, bulk stress and other fields of some steps, and on request those of the edges."""
         bulk = [name for name in LOADED if name not in TRACTIONS and name in self.dataset]
         names = [name for name in (*TRACTIONS, *more) if name in self.dataset]
         return [

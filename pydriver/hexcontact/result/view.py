@@ -172,7 +172,7 @@ class StepView:
         return np.asarray(self.at(x, y, distances) > 0.0)
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
-        """Return the limits of a picture of the contact, and of what is worn: x_min, x_max, y_min, y_max."""
+        """Return the limits of a picture of the contact and the worn area: x_min, x_max, y_min, y_max."""
         zone = self.contact | (self.field("worn_depth") > 0.0) if self.has("worn_depth") else self.contact
         zone = zone if zone.any() else np.ones_like(zone)
         x, y = self.x[zone], self.y[zone]

@@ -22,7 +22,7 @@ class Listener:
         """Note the start on another lattice; a `shifted` copy only serves to estimate errors."""
 
     def step(self, step: Step) -> None:
-        """Note a finished load step, which is recorded by then."""
+        """Note a finished load step, after it was recorded."""
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
         """Note any other event: a sentence for the terminal (empty: for the log alone), values in SI."""

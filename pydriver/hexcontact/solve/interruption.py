@@ -64,7 +64,7 @@ def in_background(
             work()
         except BaseException as error:
             raised.append(error)
-        with contextlib.suppress(OSError):  # nobody waits any more
+        with contextlib.suppress(OSError):  # the waiting thread has ended
             os.write(own, bytes([0]))  # is the number of no signal
         os.close(own)
 

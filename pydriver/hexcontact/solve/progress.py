@@ -49,7 +49,7 @@ class Lines(Listener):
         self._print(f"step {number}  {describe(step.history)}")
 
     def _print(self, line: str) -> None:
-        with contextlib.suppress(OSError):  # the reader is gone; the run goes on
+        with contextlib.suppress(OSError):  # the reader has closed; the run continues
             print(visible(line), file=self.stream, flush=True)
 
 

@@ -324,7 +324,7 @@ class Session:
         except BaseException:
             self._solving = None
             raise
-        if self.case.deck.wear:  # a cycle only starts from the one before, after `back` as the first one
+        if self.case.deck.wear:  # a cycle starts from the last one alone, after `back` without restart data
             self._steps[-1:] = [without_ends(before) for before in self._steps[-1:]]
         self._steps.append(step)
         self._log.step(step)

@@ -81,7 +81,7 @@ def steps(
 
 
 def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) -> None:
-    """Report the beginning of the load history, or that it goes on after `done` steps."""
+    """Report the start of the load history, or its continuation after `done` steps."""
     solver = case.solver
     values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": machine()}
     values |= {"steps": case.planned_steps or "auto"} | ({"done": done} if done else {})

@@ -91,7 +91,7 @@ class _Ends:
 
     def __init__(self, lattice: Lattice, count: int) -> None:
         self.lattice = lattice
-        # tractions and their rates by cycle; motions and theirs; cycles by then, none yet
+        # tractions and their rates per cycle; motions and their rates; cycles at that time, none yet
         self.fields = np.zeros((count, 2, 3, *lattice.shape), dtype=np.float32)
         self.numbers = np.zeros((count, 2, len(MOTION)))
         self.cycles = np.full(count, -1.0)
@@ -276,7 +276,7 @@ class WearPath(GivenPath):
         missed = cycle.state.dissipated_energy_path_error
         state = self._unspent(cycle.state)
         *_, last = self.case.load_steps
-        # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
+        # the loads at the end of the cycle on the new gap; this slip is no part of the cycle
         state = self._unspent(self._through(state, [last], until)[0])
         state, about = self._through(state, self.case.cycle, until, first=1)
         energy, path = state.dissipation_density, state.accumulated_slip

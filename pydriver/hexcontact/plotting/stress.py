@@ -13,7 +13,7 @@ from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
 from ..errors import NotInResult
 from ..interior.stress import LOADED, below, bodies_of
-from ..result.interpolate import NodalStep
+from ..result.interpolate import nodal
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from ..variables import EDGES
@@ -151,5 +151,5 @@ def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
     return below(
         *given,
         friction=view.friction,
-        surface=lambda _: NodalStep.of(view.data, view.lattice).traction_field("edges"),
+        surface=lambda _: nodal(view.data, view.lattice).traction_field("edges"),
     )

@@ -67,19 +67,6 @@ class NodalStep:
     sharp: bool = field(default=True, kw_only=True)
     shear_limit: float = field(default=math.inf, kw_only=True)
 
-    @classmethod
-    def of(cls, step: xarray.Dataset, lattice: Lattice) -> NodalStep:
-        """Return a load step of a result, whose fields are read at their first use."""
-        known = step.attrs
-        return NodalStep(
-            int(step["step"]) - 1,
-            lattice,
-            {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
-            friction=friction_of(known),
-            sharp=not is_compliant(known),
-            shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
-        )
-
     @property
     def number(self) -> int:
         """Number of the step, from 1."""
@@ -156,12 +143,25 @@ class NodalStep:
         return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
 
+def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
+    """Return a load step of a result, whose fields are read at their first use."""
+    known = step.attrs
+    return NodalStep(
+        int(step["step"]) - 1,
+        lattice,
+        {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
+        friction=friction_of(known),
+        sharp=not is_compliant(known),
+        shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
+    )
+
+
 def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
     """Return a load step of a result with the tractions of a source at the nodes."""
     names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]
     if "pressure" not in names:
         return step
-    shown = NodalStep.of(step, lattice).traction_field(source).at_nodes()
+    shown = nodal(step, lattice).traction_field(source).at_nodes()
     found = dict(zip(TRACTIONS, shown, strict=True))
     return step.assign({name: step[name].copy(data=found[name]) for name in names})
 

@@ -21,7 +21,15 @@ from ..interior.stress import LOADED, Surface, below, bodies_of, nodal_tractions
 from ..text import did_you_mean, text_table
 from ..variables import EDGES, FIELDS, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
-from .interpolate import NodalStep, Point, PressureField, TractionField, chosen_fields, with_shown
+from .interpolate import (
+    NodalStep,
+    Point,
+    PressureField,
+    TractionField,
+    chosen_fields,
+    nodal,
+    with_shown,
+)
 from .layout import Quantities, history_of, lattice_of, step_of
 
 if TYPE_CHECKING:
@@ -338,12 +346,12 @@ class Result:
 
     def _nodal(self, step: int) -> NodalStep:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""
-        return NodalStep.of(self.step(step), self.lattice)
+        return nodal(self.step(step), self.lattice)
 
     def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
         """Return the nodal values of some fields of a step, or of all."""
-        nodal = self._nodal(step)
-        return chosen_fields(names, nodal.fields, nodal.number)
+        one = self._nodal(step)
+        return chosen_fields(names, one.fields, one.number)
 
     # --- below the surface ----------------------------------------------------------------------------------
 

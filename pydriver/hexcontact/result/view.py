@@ -16,7 +16,7 @@ from ..core.interpolation import linear
 from ..errors import NotInResult
 from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
-from .interpolate import NodalStep, is_kept
+from .interpolate import is_kept, nodal
 from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ class StepView:
     @functools.cached_property
     def tractions(self) -> TractionField:
         """Pressure and shear traction at any point, from the source."""
-        return NodalStep.of(self.data, self.lattice).traction_field(self.source)
+        return nodal(self.data, self.lattice).traction_field(self.source)
 
     @functools.cached_property
     def _at_nodes(self) -> dict[str, Array]:

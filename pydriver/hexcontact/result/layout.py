@@ -195,7 +195,7 @@ class Layout:
         """Return a field of `step` on the window of the whole result."""
         variable = VARIABLES[name]
         values = np.asarray(step.fields[name], dtype=variable.dtype)
-        if values.shape != step.lattice.shape:
+        if values.shape != (step.lattice.n_row, step.lattice.n_col):
             raise ValueError(
                 f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
             )

@@ -1,4 +1,4 @@
-"""A contact problem from a deck or from Python, and its solution in one call."""
+"""A contact problem with its solution in one call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words and tables of the history of a load step or of a run."""
+"""The history of a run in words."""
 
 from __future__ import annotations
 

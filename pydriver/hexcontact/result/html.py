@@ -1,4 +1,4 @@
-"""Tables and small pictures of results for notebooks and terminals."""
+"""Display of results in notebooks."""
 
 from __future__ import annotations
 

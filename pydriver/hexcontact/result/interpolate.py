@@ -1,4 +1,4 @@
-"""Fields between the nodes: at any point, and along lines.
+"""Fields of a load step between its nodes.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
 a polygon with corners at the edges of triangles. Pressure and shear traction go to the edges of contact and

@@ -1,4 +1,4 @@
-"""The journal of a run: its metadata and its finished load steps, in files beside the output.
+"""The journal of a run, in a folder beside its output.
 
 The header (JSON) has the metadata of the run with the whole deck. A record is an uncompressed zip archive of
 the fields of a step as numpy saves them, and a text (JSON) with all other data. It is written and read

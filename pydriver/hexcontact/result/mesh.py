@@ -1,4 +1,4 @@
-"""The triangular lattice as a mesh: its triangles, and their description in netCDF (UGRID-1.0)."""
+"""The triangles of the lattice as a mesh in netCDF (UGRID-1.0)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Result files: writing step by step, reading, refusal of damaged and foreign files.
+"""The result file, in netCDF.
 
 HDF5 files may have further bytes at their end. Those of a result are its seal of 48 bytes: a mark, and a
 SHA-256 of the SHA-256 of each block before it. So damage shows before HDF5 reads it, also in indices of

@@ -1,4 +1,4 @@
-"""Small pictures of fields: points of a plane, and images."""
+"""Small pictures over a plane."""
 
 from __future__ import annotations
 

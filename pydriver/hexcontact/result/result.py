@@ -1,4 +1,4 @@
-"""The result of a run: quantities by name, fields between the nodes and along lines, tables, comparison."""
+"""The result of a run."""
 
 from __future__ import annotations
 

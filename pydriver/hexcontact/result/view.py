@@ -1,4 +1,4 @@
-"""One load step of a result, for pictures and comparisons."""
+"""One load step of a result for pictures."""
 
 from __future__ import annotations
 

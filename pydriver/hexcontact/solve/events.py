@@ -1,4 +1,4 @@
-"""Events of a run and the listeners that follow it: a bar or lines on a terminal, the log, callbacks."""
+"""Events of a run, with the base class of their listeners."""
 
 from __future__ import annotations
 

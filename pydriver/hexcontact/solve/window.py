@@ -1,4 +1,4 @@
-"""A case on one window of its lattice: gap, solver, operators, and the fields and history of a load step."""
+"""A case on one window of its lattice."""
 
 from __future__ import annotations
 

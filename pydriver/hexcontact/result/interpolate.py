@@ -156,6 +156,18 @@ def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
     )
 
 
+def loaded(step: NodalStep, more: Sequence[str] = (), edges: bool = True) -> dict[str, Any]:
+    """Return the tractions and `more` fields of a step; with `edges`, those that show the edges, if known."""
+    names = [name for name in (*TRACTIONS, *more) if name in step.fields]
+    if (
+        edges
+        and step.sharp
+        and all(name in step.fields and is_kept(np.asarray(step.fields[name])) for name in EDGES)
+    ):
+        names += EDGES
+    return dict(chosen_fields(names, step.fields, step.number))
+
+
 def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
     """Return a load step of a result with the tractions of a source at the nodes."""
     names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..analytic.hertz_gap import friction_of, is_compliant
+from ..analytic.hertz_gap import friction_of
 from ..arrays import Array, has_entries, integer, number
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, cycle_of
@@ -19,7 +19,7 @@ from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
 from ..interior.region import region
 from ..interior.stress import LOADED, Surface, below, bodies_of, nodal_tractions
 from ..text import did_you_mean, text_table
-from ..variables import EDGES, FIELDS, TRACTIONS, VARIABLES
+from ..variables import FIELDS, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .interpolate import (
     NodalStep,
@@ -27,6 +27,7 @@ from .interpolate import (
     PressureField,
     TractionField,
     chosen_fields,
+    loaded,
     nodal,
     with_shown,
 )
@@ -485,22 +486,10 @@ class Result:
     ) -> list[dict[str, Any]]:
         """Return tractions, bulk stress and other fields of some steps, and on request those of the edges."""
         bulk = [name for name in LOADED if name not in TRACTIONS and name in self.dataset]
-        names = [name for name in (*TRACTIONS, *more) if name in self.dataset]
         return [
-            self._fields(names, number)
-            | {name: self.step(number)[name].item() for name in bulk}
-            | (self._edges_of(number) if edges else {})
+            loaded(self._nodal(number), more, edges) | {name: self.step(number)[name].item() for name in bulk}
             for number in numbers
         ]
-
-    def _edges_of(self, number: int) -> dict[str, Any]:
-        """Return the fields that tell where the edges are; none if not kept, or without sharp edges."""
-        if is_compliant(self.dataset.attrs):
-            return {}
-        try:
-            return self._fields(EDGES, number)
-        except NotInResult:
-            return {}
 
     def _change_over(self, numbers: Sequence[int]) -> float | None:
         """Return the largest change of a traction over a cycle in the largest pressure; None if not kept."""

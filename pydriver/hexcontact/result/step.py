@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
 from ..text import did_you_mean
-from ..variables import EDGES
-from .interpolate import NodalStep
+from .interpolate import NodalStep, loaded
 
 if TYPE_CHECKING:
     import xarray
@@ -143,12 +142,10 @@ class Step(NodalStep):
         """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
         from ..interior.stress import below
 
-        loaded: dict[str, Any] = {**self.history, **self.fields}
-        if not self.sharp:
-            loaded = {name: values for name, values in loaded.items() if name not in EDGES}
+        fields: dict[str, Any] = {**self.history, **loaded(self)}
         given = self.bodies, body, {"points": points}, components
         more: dict[str, Any] = {"friction": self.friction, "source": source}
-        return below(self.lattice, [loaded], *given, **more, surface=lambda _: self.traction_field("edges"))
+        return below(self.lattice, [fields], *given, **more, surface=lambda _: self.traction_field("edges"))
 
     # --- display --------------------------------------------------------------------------------------------
 

@@ -16,8 +16,8 @@ from hexcontact.cli import tables
 from hexcontact.core.steps import LEAST
 from hexcontact.deck.schema import deck_schema
 from hexcontact.problem import estimates, overview
-from hexcontact.result import history
-from hexcontact.result.history import describe
+from hexcontact.result import history_words as history
+from hexcontact.result.history_words import describe
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
@@ -309,7 +309,7 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.solve.frictional import FrictionWindow
+    from hexcontact.solve.window import FrictionWindow
 
     advance, asked = FrictionWindow.advance, []
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from hexcontact import Case, Result, open_result, plotting
 from hexcontact.cli import tables
 from hexcontact.cli.app import app
-from hexcontact.result.history import contact_size, energy_table, some_steps
+from hexcontact.result.history_words import contact_size, energy_table, some_steps
 from hexcontact.variables import VARIABLES
 
 DECK = """\

@@ -38,16 +38,16 @@ from hexcontact.errors import (
 )
 from hexcontact.problem import overview
 from hexcontact.problem.loads import LoadStep, Target
-from hexcontact.result import history
-from hexcontact.result.history import describe
+from hexcontact.result import history_words as history
+from hexcontact.result.history_words import describe
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve import steps as solve
-from hexcontact.solve.frictional import FrictionWindow, state_of
-from hexcontact.solve.frictionless import memory_needed
+from hexcontact.solve.memory_needed import memory_needed
 from hexcontact.solve.progress import Lines
+from hexcontact.solve.window import FrictionWindow, state_of
 from hexcontact.variables import FIELDS, WORN
 
 STIFF = {"young_modulus": 432e9, "poisson_ratio": 0.32}

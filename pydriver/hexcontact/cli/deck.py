@@ -22,7 +22,7 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
     from ..problem import plausibility
     from ..problem.overview import case_rows
     from ..problem.refinement import least_and_most
-    from ..solve.frictionless import peak_memory, require_memory
+    from ..solve.memory_needed import peak_memory, require_memory
     from . import tables
 
     case = case_of(deck, settings)
@@ -43,7 +43,7 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
     """Return a case as the object that ``check --json`` prints."""
     from ..problem import estimates, plausibility
     from ..problem.overview import largest_loads, parameters_of
-    from ..solve.frictionless import peak_memory
+    from ..solve.memory_needed import peak_memory
 
     lattice = case.lattice
     return {

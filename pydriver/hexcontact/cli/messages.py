@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
-from ..result.history import extent_of
+from ..result.history_words import extent_of
 from ..result.netcdf import missing_stresses
 from ..result.store import open_result
 from ..solve import log
@@ -27,7 +27,7 @@ from .options import LogLevel
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
-    from ..result.history import Extent
+    from ..result.history_words import Extent
     from ..result.step import Step
     from ..result.store import Store
     from ..solve.events import Listener

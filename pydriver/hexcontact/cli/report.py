@@ -27,7 +27,7 @@ from ..interior.extremes import place_of
 from ..interior.tables import readable_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
-from ..result.history import energy_table, load_or_motion, worth_showing
+from ..result.history_words import energy_table, load_or_motion, worth_showing
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
 from . import tables

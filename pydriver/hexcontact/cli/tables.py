@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DeckError, HexcontactError
-from ..result.history import (
+from ..result.history_words import (
     contact_size,
     cycles,
     energy_table,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..problem.problem import Problem
-    from ..result.history import Extent
+    from ..result.history_words import Extent
     from ..result.result import Result
 
 History = Mapping[str, Any]

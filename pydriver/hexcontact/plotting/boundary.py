@@ -12,7 +12,7 @@ from matplotlib.tri import Triangulation
 from ..arrays import Mask
 from ..core import estimators
 from ..errors import NotInResult
-from ..result.history import ROUND
+from ..result.history_words import ROUND
 from ..result.mesh import triangles
 from ..result.raster import SLIP, STICK
 from ..result.result import Result

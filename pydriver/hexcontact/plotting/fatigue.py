@@ -11,7 +11,8 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from ..arrays import Array
 from ..deck.below import Fatigue
 from ..errors import NotInResult
-from ..interior.tables import at_hand, tables_of
+from ..interior.tables import tables_of
+from ..result.below import at_hand
 from ..result.result import Result
 from ..result.view import StepView, title_of
 from ..text import scaled

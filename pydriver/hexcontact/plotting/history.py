@@ -15,7 +15,7 @@ from ..arrays import Array
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
-from ..result.history import LOADS_AND_MOTIONS, worth_showing
+from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import dataset_of, title_of
 from ..text import scaled, worded

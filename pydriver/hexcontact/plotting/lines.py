@@ -11,7 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Array
 from ..errors import NotInResult
-from ..interior.tables import at_hand, tables_of
+from ..interior.tables import tables_of
+from ..result.below import at_hand
 from ..result.export import kept_steps
 from ..result.result import Result
 from ..result.view import title_of

@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..result.history import step_rows
+from ..result.history_words import step_rows
 from ..result.raster import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of

@@ -13,7 +13,7 @@ from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
 from ..errors import NotInResult
 from ..interior.stress import LOADED, below, bodies_of
-from ..result.interpolate import tractions_of
+from ..result.interpolate import nodal
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from ..variables import EDGES
@@ -149,5 +149,7 @@ def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
     body = 2 if bodies and bodies[0].rigid else 1
     given = view.lattice, [fields], bodies, body, {"points": points}, names
     return below(
-        *given, friction=view.friction, surface=lambda _: tractions_of(view.data, view.lattice, "edges")
+        *given,
+        friction=view.friction,
+        surface=lambda _: nodal(view.data, view.lattice).traction_field("edges"),
     )

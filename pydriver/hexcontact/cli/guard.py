@@ -134,11 +134,8 @@ class _Unpadded(io.TextIOWrapper):
 def standard_streams() -> Iterator[None]:
     """Let a command end normally although its standard streams are closed, full or no longer read.
 
-    Raises
-    ------
-    SystemExit
-        With the exit code of lacking resources if the command succeeded but its output is lost, unless the
-        reader has closed the pipe.
+    If the command succeeded but its output is lost, exit with the code of lacking resources, unless the
+    reader has closed the pipe.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass  # otherwise the next files would get the numbers of closed streams, and the output of libraries
@@ -194,24 +191,12 @@ def warn_plainly() -> None:
 
 
 class Command(NamedTuple):
-    """A sub-command.
+    """Hold a sub-command and its help."""
 
-    Attributes
-    ----------
-    function : callable
-        What it does, guarded.
-    example : str
-        Example in its help.
-    short_help : str or None
-        Its line in the list of commands; None: the first sentence of its help.
-    help : callable or None
-        Writes its help; None: the docstring of the function.
-    """
-
-    function: Callable[..., None]
+    function: Callable[..., None]  # guarded
     example: str
-    short_help: str | None = None
-    help: Callable[[], str] | None = None
+    short_help: str | None = None  # None: the first sentence of the help
+    help: Callable[[], str] | None = None  # None: the docstring of the function
 
 
 COMMANDS: dict[str, Command] = {}
@@ -219,15 +204,7 @@ COMMANDS: dict[str, Command] = {}
 
 
 def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
-    """Register a function as the sub-command of its name, guarded, with its options as arguments.
-
-    Parameters
-    ----------
-    example : str
-        Example in the help.
-    **options
-        Further attributes of `Command`.
-    """
+    """Register a function as the sub-command of its name, guarded, with its options as arguments."""
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:
         COMMANDS[function.__name__] = Command(guarded(function), example, **options)

@@ -23,15 +23,7 @@ _SIGNAL = 128  # plus the number of a signal
 
 
 def write(command: str, content: Mapping[str, Any]) -> None:
-    """Print the object of a command.
-
-    Parameters
-    ----------
-    command : str
-        Name of the command.
-    content : mapping
-        Further entries of the object, see `jsonable`.
-    """
+    """Print the object of a command: its name, its exit code and its content, see `jsonable`."""
     whole = {"hexcontact": __version__, "command": command, "exit_code": 0, **content}
     print(visible(json.dumps(jsonable(whole), ensure_ascii=False, allow_nan=False)), flush=True)
 
@@ -63,19 +55,7 @@ def seen_from_here(message: str) -> str:
 def error(
     message: str, exit_code: int, faults: Sequence[Fault] = (), details: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return the object of a failure.
-
-    Parameters
-    ----------
-    message : str
-        Message on standard error.
-    exit_code : int
-        Exit code of the command.
-    faults : sequence of Fault
-        Faults of a deck.
-    details : mapping, optional
-        Further entries.
-    """
+    """Return the object of a failure, with the faults of a deck and further entries."""
     kind = "interrupted" if exit_code > _SIGNAL else _KINDS.get(exit_code, "other")
     found = {
         "kind": kind,

@@ -35,21 +35,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Messages:
-    """The messages of a command that solves, from its options.
+    """Print the messages of a command that solves, as its options say."""
 
-    Attributes
-    ----------
-    command : str
-        Name of the command.
-    quiet, as_json : bool
-        Print errors only; print an object instead of tables at the end.
-    log_file, log_level : Path, LogLevel or None
-        Options of the log.
-    """
-
-    command: str
-    quiet: bool = False
-    as_json: bool = False
+    command: str  # its name
+    quiet: bool = False  # print errors only
+    as_json: bool = False  # print an object instead of tables at the end
     log_file: Path | None = None
     log_level: LogLevel | None = None
 

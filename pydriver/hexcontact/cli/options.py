@@ -64,28 +64,12 @@ def flag(name: str, help: str) -> Declared:
 
 
 class Parameter(NamedTuple):
-    """An argument of the function of a command.
-
-    Attributes
-    ----------
-    name : str
-        Its name.
-    declared : Declared
-        What it is on the command line.
-    hint : type
-        Its type.
-    kind : type
-        Type of one value.
-    many : bool
-        Whether it takes several.
-    required : bool
-        Whether it has no default.
-    """
+    """Describe an argument of the function of a command."""
 
     name: str
     declared: Declared
     hint: Any
-    kind: type
+    kind: type  # of one value
     many: bool
     required: bool
 
@@ -193,16 +177,7 @@ def setting(text: str) -> tuple[str, Any]:
 def steps_of(text: str, labels: Sequence[str], option: str = "step") -> list[int]:
     """Return numbers of load steps from "20", "10,20,30", "109-135", "all", or a label.
 
-    A label selects the last step of its segments.
-
-    Parameters
-    ----------
-    text : str
-        Value of the option.
-    labels : sequence of str
-        Label of each load step; empty texts for cycles.
-    option : str
-        Name of the option.
+    A label selects the last step of its segments; cycles have empty labels.
     """
     words = [text.strip()] if text.strip() in labels else [word.strip() for word in text.split(",")]
     numbers: list[int] = []

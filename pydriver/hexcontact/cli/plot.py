@@ -207,24 +207,7 @@ def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str,
 
 
 def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapping[str, Any]) -> Path:
-    """Draw a picture of one result, of several, or of none.
-
-    Parameters
-    ----------
-    results : sequence of Result
-        The results.
-    what : str
-        Name of the figure.
-    picture : Path
-        File to write.
-    chosen : mapping
-        Values of the given options by name: step (a list), angle, through, over, arrows.
-
-    Raises
-    ------
-    DeckError
-        If the figure has no such option, the result lacks data for it, or the file cannot be written.
-    """
+    """Draw a picture of one result, of several, or of none, with the given options; return its file."""
     from ..plotting.registry import entries
 
     entry = entries()[what]
@@ -241,21 +224,9 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:
-    """Draw every figure for which the result has data; return a line about each.
+    """Draw every figure for which the result has data, each with the options that it has.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-    first : Path
-        File to whose name the name of each figure is appended.
-    chosen : mapping
-        Values of the given options; each figure takes those that it has.
-
-    Raises
-    ------
-    DeckError
-        If no figure can be drawn, or a file cannot be written.
+    Return a line about each; the name of a figure is appended to that of the file `first`.
     """
     from ..plotting.registry import SEVERAL_RUNS, entries
 

@@ -43,25 +43,7 @@ _DATA = resources.files("hexcontact").joinpath("data")
 
 
 def write_report(result: Result, target: Path) -> Path:
-    """Write the page of a result.
-
-    Parameters
-    ----------
-    result : Result
-        The result, of a finished run or not.
-    target : Path
-        File to write, ``.html``; an earlier page is replaced.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If the name has another ending, or the file is no page of hexcontact.
-    """
+    """Write the page of a result, finished or not, in place of an earlier page."""
     if target.suffix.lower() not in (".html", ".htm"):
         raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
     require_replaceable(target)
@@ -71,13 +53,7 @@ def write_report(result: Result, target: Path) -> Path:
 
 
 def report(result: Result) -> str:
-    """Return the page of a result as HTML.
-
-    Parameters
-    ----------
-    result : Result
-        The result, of a finished run or not.
-    """
+    """Return the page of a result, finished or not, as HTML."""
     summary = tables.Summary.of_result(result)
     histories = summary.steps()
     numbers = kept_steps(result)

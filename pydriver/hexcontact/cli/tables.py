@@ -82,30 +82,14 @@ def pairs(title: str, rows: Iterable[Row]) -> TextTable:
 
 
 class Summary(NamedTuple):
-    """The load steps of a run or a file.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case.
-    histories : sequence of mapping
-        History of each load step.
-    parameters : mapping
-        Parameters of the case, or attributes of the result.
-    case : Problem or None
-        The case, if it is known; without it there is no comparison with Hertz.
-    result : Result or None
-        The result, if it was read from a file.
-    fault : str
-        Reason why its deck is not understood; empty if it is, or has parts from Python.
-    """
+    """Present the load steps of a run or a file as tables and as objects."""
 
     title: str
     histories: Sequence[History]
-    parameters: Mapping[str, Any]
-    case: Problem | None
-    result: Result | None = None
-    fault: str = ""
+    parameters: Mapping[str, Any]  # of the case, or attributes of the result
+    case: Problem | None  # without it there is no comparison with Hertz
+    result: Result | None = None  # if it was read from a file
+    fault: str = ""  # why its deck is not understood; empty if it has parts from Python
     extent: Extent | None = None
 
     @classmethod
@@ -143,13 +127,7 @@ class Summary(NamedTuple):
         return against_hertz(self.case, self.histories[-1]) if self.case is not None else []
 
     def print(self, whole_file: bool = False) -> None:
-        """Print the history, the last step, its comparison with Hertz, lattices and errors.
-
-        Parameters
-        ----------
-        whole_file : bool
-            Also print the origin of the result.
-        """
+        """Print the history, the last step, its comparison with Hertz, lattices; origin of a file."""
         shown, last, named = console(), self.histories[-1], ""
         if whole_file and self.result is not None:
             shown.print(pairs(self.title, file_rows(self.result)))
@@ -293,20 +271,10 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
 
 
 def against_hertz(case: Problem, history: History) -> list[tuple[str, float, float, str]]:
-    """Compare a load step with Hertz's solution.
+    """Compare a load step with Hertz's solution: name of the quantity, Hertz, computed, unit.
 
-    Parameters
-    ----------
-    case : Problem
-        The case.
-    history : mapping
-        History of one of its steps.
-
-    Returns
-    -------
-    list of (str, float, float, str)
-        Name of the quantity in histories, Hertz, computed, unit; empty where Hertz does not apply: with
-        friction, a compliant interface, surfaces that are not quadratic or touch along a line, without load.
+    Return nothing where Hertz does not apply: with friction, a compliant interface, surfaces that are not
+    quadratic or touch along a line, without load.
     """
     load = float(history["normal_load"])
     surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
@@ -367,16 +335,7 @@ TRIAL_HEADERS = ("", "first lattice", "last but one", "last", "largest error")
 def trial_rows(result: Result) -> list[Row]:
     """Return the quantities that decide about the accuracy of a refined result, at the last load step.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-
-    Returns
-    -------
-    list of rows
-        Quantity, its values on three of the lattices, largest error of all load steps over its largest value;
-        empty if the lattice was not refined.
+    A row has the values on three of the lattices, and the largest error of all steps over the largest value.
     """
     from ..solve.accuracy import JUDGED, relative_errors
 

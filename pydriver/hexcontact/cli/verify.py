@@ -188,29 +188,7 @@ def main(
     output: Callable[[Check, Comparison], None] = show,
     listing: bool = False,
 ) -> int:
-    """Run checks and print their comparisons.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the checks; all of them if empty.
-    checks : mapping of str to Check, optional
-        The checks to choose from; default: those of an installation.
-    output : callable
-        Prints a check with its comparison.
-    listing : bool
-        List the checks without running them.
-
-    Returns
-    -------
-    int
-        Exit code: 0 if everything passed, 1 otherwise.
-
-    Raises
-    ------
-    DeckError
-        If there is no check of a name.
-    """
+    """Run checks, all if none is named, and print their comparisons; return 1 if one fails, else 0."""
     chosen = _chosen(names, self_test() if checks is None else checks)
     if listing:
         width = max(len(check.name) for check in chosen)

@@ -36,26 +36,6 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
     With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    step : int
-        Number of the load step, from 1; -1 is the last one.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept, or nothing is in contact.
     """
     view = StepView.of(result, step)
     if not view.contact.any():

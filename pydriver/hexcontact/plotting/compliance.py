@@ -24,15 +24,7 @@ if TYPE_CHECKING:
 def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
     """Return the shift of the first step with a tangential load over that of Mindlin, and its Q/(mu P).
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The whole result: spheres pressed, then sheared at a constant normal load.
-
-    Raises
-    ------
-    ValueError
-        If it is another result.
+    Spheres are pressed, then sheared at a constant normal load; another result is an error.
     """
     gap, attributes = QuadraticGap.of(dataset), dataset.attrs
     friction = float(attributes.get("friction_coefficient", np.nan))
@@ -63,21 +55,12 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
 def compliance(results: Results, ax: Axes | None = None) -> Figure:
     """Draw the initial tangential compliance of spheres against Dundurs' beta, a point for each result.
 
-    Parameters
-    ----------
-    results : Result or xarray.Dataset, or a sequence of them
-        Outputs of `Case.run` or `open_result`: spheres pressed, then sheared.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    The spheres are pressed, then sheared.
 
     Raises
     ------
     ValueError
-        If one of them is another result.
+        If one of the results is another one.
     """
     several = [dataset_of(one) for one in as_list(results)]
     series: dict[tuple[float, str], list[tuple[float, float]]] = {}

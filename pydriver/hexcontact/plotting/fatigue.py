@@ -36,21 +36,8 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
     step : int, optional
         Number of the load step whose contact and stick area are outlined; by default the last of the cycle.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the deck has no table [[fatigue]] of the surface or a plane.
     """
     result = result if isinstance(result, Result) else Result(result)
     tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}

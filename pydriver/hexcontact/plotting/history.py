@@ -59,11 +59,6 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
 
     Loads and motions below the noise, and quantities that stay 0, are left out. Areas extend to the edge
     between the nodes, where the histories have them.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each step.
     """
     noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
     panels: dict[str, dict[str, str]] = {}
@@ -119,18 +114,12 @@ def history(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
     quantities : sequence of str, optional
         Names of the history variables, one for each panel; by default those above the noise.
     over : str
         Quantity on the horizontal axis: "step", or a history variable such as "tangential_load_x".
     ax : matplotlib.axes.Axes, optional
         Axes to draw the quantities into, which then share a panel; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
 
     Raises
     ------
@@ -220,25 +209,6 @@ def loop(
     """Draw the tangential load against the shift; for similar spheres also the closed solution.
 
     Both are taken along the direction of the largest load.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    cycles : int or sequence of int, optional
-        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
-        last cycle.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no tangential load in this result, or no such cycle.
     """
     dataset = _before_wear(dataset_of(result))
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
@@ -275,27 +245,7 @@ def loop(
 def torsion(
     result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Draw the torque against the twist; for similar spheres also the solution of Lubkin.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    cycles : int or sequence of int, optional
-        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
-        last cycle.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no torque in this result, or no such cycle.
-    """
+    """Draw the torque against the twist; for similar spheres also the solution of Lubkin."""
     dataset = _before_wear(dataset_of(result))
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise NotInResult("there is no torque in this result")

@@ -36,17 +36,7 @@ _TABLE_8_1 = (
 
 @figure("pyramid", "displacements by one pyramid (Figure 5.6)")
 def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
-    """Draw the nine functions C ... K of Table 8.1, the displacements of unit pyramid loads (Figure 5.6).
-
-    Parameters
-    ----------
-    poisson_ratio : float
-        nu of the body; G and K depend on it through nu_0 = nu/(1-nu).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the nine functions C ... K of Table 8.1, the displacements of unit pyramid loads (Figure 5.6)."""
     fine = np.linspace(-2.2, 2.2, 221)
     x, y = np.meshgrid(fine, fine)
     functions = iter(pyramid_functions(x, y, poisson_ratio))
@@ -98,17 +88,7 @@ def _element(number: int) -> Array:
 
 @figure("elements", "tetrahedra and pyramids of load (Figures 4.5, 5.2, 5.5)")
 def load_elements(poisson_ratio: float = 0.3) -> Figure:
-    """Draw a tetrahedral element, pyramids of six (Figures 4.5, 5.2, 5.4, 5.5), displacements by elements.
-
-    Parameters
-    ----------
-    poisson_ratio : float
-        nu of the body.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a tetrahedral element, pyramids of six (Figures 4.5, 5.2, 5.4, 5.5), displacements by elements."""
     canvas = new_figure(9.6, 4.5)
     solid = (True, False, True, True, False, False, False, False)
     panels = [canvas.add_subplot(2, 4, k + 1, projection="3d" if solid[k] else None) for k in range(8)]
@@ -171,17 +151,7 @@ def _draw_solid(axes: Any, numbers: tuple[int, ...], along: str) -> None:
 
 @figure("load-models", "a load in two dimensions (Figures 7.3, 7.4)")
 def load_models(nodes: int = 9) -> Figure:
-    """Draw a surface load in two dimensions (Figure 7.3) and overlapping triangles (Figure 7.4).
-
-    Parameters
-    ----------
-    nodes : int
-        Nodes across the contact.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a surface load in two dimensions (Figure 7.3) and overlapping triangles (Figure 7.4)."""
     canvas = new_figure(7.6, 4.6)
     panels = canvas.subplots(2, 2, sharex=True, sharey=True).ravel()
     fine = np.linspace(-1.0, 1.0, 801)
@@ -224,14 +194,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 def load_shapes(nodes_in_radius: int = 10) -> Figure:
     """Compare a point force, a constant load on the hexagonal cell and the pyramid (Figure 7.3).
 
-    Parameters
-    ----------
-    nodes_in_radius : int
-        a/l_e of the Hertz contact in the panels (b) and (c).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    The Hertz contact in the panels (b) and (c) has `nodes_in_radius` spacings in its radius.
     """
     a = nodes_in_radius
     canvas = new_figure(7.2, 5.6)

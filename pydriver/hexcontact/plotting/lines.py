@@ -44,22 +44,7 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "bl
 
 @figure("lines", "tables along a line, or at points by step", needs="[[stress]] or [[fatigue]]")
 def lines(result: Result | xarray.Dataset) -> Figure:
-    """Draw the tables [[stress]] and [[fatigue]] of the deck along lines, and at points over the load steps.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If the deck has no table of a line or of points.
-    """
+    """Draw the tables [[stress]] and [[fatigue]] of the deck along lines, and at points over the steps."""
     result = result if isinstance(result, Result) else Result(result)
     names = [name for name, table in tables_of(result.deck).items() if table.line or table.points]
     if not names:

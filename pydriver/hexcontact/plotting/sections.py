@@ -61,39 +61,21 @@ def line_of(views: Iterable[StepView], angle: float, through: Point | None = Non
 
 @dataclass(frozen=True)
 class Cut:
-    """The line of a section, and the places along it at which values are drawn.
+    """Hold the line of a section, and the places along it at which values are drawn.
 
-    Attributes
-    ----------
-    line : Line
-        The line, see `line_of`.
-    angle : float
-        Its direction from x, rad.
-    place : ndarray
-        Distances (m) from its start at which values are drawn: of the nodes if enough lie on the line, but
-        not too many, and of one step; else of its crossings with lattice lines, between which fields are
-        linear away from edges, and of points between them.
-    at_nodes : bool
-        Whether the places are nodes, drawn as circles.
-    through : tuple of float, optional
-        Given point of the line, m.
+    These are the nodes if enough lie on the line, but not too many, and of one step; else its crossings with
+    lattice lines, between which fields are linear away from edges, and points between them.
     """
 
     line: Line
-    angle: float
-    place: Array
-    at_nodes: bool
-    through: Point | None
+    angle: float  # its direction from x, rad
+    place: Array  # distances (m) from its start
+    at_nodes: bool  # whether the places are nodes, drawn as circles
+    through: Point | None  # a given point, m
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
-        """Return the cut through the contacts of some steps of one result, see `line_of`.
-
-        Raises
-        ------
-        ValueError
-            If the line does not cross the window.
-        """
+        """Return the cut through the contacts of some steps of one result, see `line_of`."""
         line, lattice = line_of(views, angle, through), views[0].lattice
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
@@ -257,29 +239,8 @@ def section(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    step : int
-        Number of the load step, from 1; -1 is the last one.
-    angle : float
-        Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
-    through : tuple of float, optional
-        A point of the line, m; by default the node nearest to the center.
     ax : matplotlib.axes.Axes, optional
         Axes for the pressure, without its difference from Hertz; by default those of a new figure.
-    source : {"edges", "nodes"}, optional
-        Where the pressure comes from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept.
     """
     view = StepView.of(result, step, source)
     if ax is not None:
@@ -310,30 +271,9 @@ def tractions(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
-    angle : float
-        Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
-    through : tuple of float, optional
-        A point of the line, m; by default the node nearest to the center.
     ax : matplotlib.axes.Axes, optional
         Axes for the shear traction of one load step; by default those of a new figure, with the pressure
         above.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the contact is frictionless, or the tractions of that step were not kept.
     """
     views, labels, title = views_of(result, steps, source)
     exact = closed_solutions(result, views)

@@ -37,30 +37,7 @@ _LEVELS = 12
 def stress(
     result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
 ) -> Figure:
-    """Draw the equivalent stress of von Mises in a section below the contact.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    step : int
-        Number of the load step, from 1; -1 is the last one.
-    angle : float
-        Direction of the section from x, rad.
-    through : tuple of float, optional
-        A point of the section, m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept, or the result does not contain the moduli of the bodies.
-    """
+    """Draw the equivalent stress of von Mises in a section below the contact."""
     view = StepView.of(result, step)
     cut = Cut.of([view], angle, through)
     along = np.linspace(0.0, cut.line.length, _POINTS)
@@ -92,16 +69,10 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
 
     Parameters
     ----------
-    result : Result
-        Output of `Case.run` or `open_result`.
     depth : float
         Depth of the points, m; by default they lie on the surface.
     angle : float
         Direction of the section from x, rad; its ends are those of the largest contact.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
 
     Raises
     ------

@@ -58,10 +58,6 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
     over : str
         Parameter on the horizontal axis; by default the one with the most values.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
     Raises
     ------
     DeckError

@@ -24,26 +24,7 @@ _CURVES = 7
 
 @figure("wear", "pressure and worn depth along a line, by cycles of wear", needs="wear")
 def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
-    """Draw pressure and worn depth in a section of the contact, for several cycles of wear.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    angle : float
-        Direction of the section from x, rad.
-    through : tuple of float, optional
-        A point of the section, m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If the surfaces do not wear, or no fields of the cycles were kept.
-    """
+    """Draw pressure and worn depth in a section of the contact, for several cycles of wear."""
     dataset = dataset_of(result)
     if "wear_cycles" not in dataset or "worn_depth" not in dataset:
         raise NotInResult("the surfaces do not wear; a deck with [wear] is needed")

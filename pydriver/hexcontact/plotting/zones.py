@@ -57,20 +57,9 @@ def zone_legend(views: Sequence[StepView], exact: Sequence[PartialSlip | None]) 
 def draw_zone_bars(
     axes: Axes, view: StepView, points: tuple[Array, Array], along: Array, height: float
 ) -> None:
-    """Draw contact, or slip and stick, along a section as bars.
+    """Draw contact, or slip and stick, along a section as bars at a height.
 
-    Parameters
-    ----------
-    axes : Axes
-        Axes of the section.
-    view : StepView
-        The step.
-    points : tuple of ndarray
-        Points x, y (m) of the section.
-    along : ndarray
-        Their coordinates on the horizontal axis.
-    height : float
-        Coordinate of the bars on the vertical axis.
+    `points` are x and y (m) of the section, `along` their coordinates on the horizontal axis.
     """
     zones = [("contact", view.touches(*points), SLIP)]
     if view.friction != 0.0 and view.has("zone"):
@@ -92,25 +81,8 @@ def zones(
 
     Parameters
     ----------
-    results : Result or xarray.Dataset, or a sequence of them
-        Outputs of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
     arrows : {"none", "traction", "slip"}
         Arrows of the shear traction on body 1, or of the slip of body 1 over body 2 in the step.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the contact is frictionless, or the zones of that step were not kept.
     """
     views, labels, title = views_of(results, steps)
     part = Part.around(views)
@@ -131,28 +103,7 @@ def zones(
 
 @figure("outlines", "outlines of contact and stick area, of steps or files", needs="friction")
 def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None = None) -> Figure:
-    """Draw the outlines of contact and stick area of several load steps or results in one map.
-
-    Parameters
-    ----------
-    results : Result or xarray.Dataset, or a sequence of them
-        Outputs of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the contact is frictionless, or the zones of that step were not kept.
-    """
+    """Draw the outlines of contact and stick area of several load steps or results in one map."""
     views, labels, title = views_of(results, steps)
     part = Part.around(views, 1.15)
     height = float(np.clip(3.9 * part.aspect, 2.0, 6.0)) + 0.8

@@ -22,42 +22,18 @@ from .tables import Parameter, StudyFile
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter of a study, with unit, description and kind of its deck keys.
+    """Hold a parameter of a study, with unit, description and kind of its deck keys."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        Dotted keys of the deck, which share one value.
-    name : str
-        Name in the result.
-    units : str
-        SI unit; empty if it is no quantity.
-    long_name : str
-        Description.
-    kind : Kind or None
-        Kind of the values in the deck.
-    values : tuple
-        The values as in a deck; empty for a range in a Latin hypercube.
-    bounds : (float, float) or None
-        Ends of a range, SI.
-    scale : str
-        Spacing of the values in a range: linear or log.
-    dims : tuple of str
-        Dimensions of the result along which it varies.
-    formula : Formula or None
-        Expression that gives its value in each case.
-    """
-
-    keys: tuple[str, ...]
-    name: str
-    units: str
+    keys: tuple[str, ...]  # dotted, of the deck, which share one value
+    name: str  # in the result
+    units: str  # SI; empty if it is no quantity
     long_name: str
-    kind: Kind | None
-    values: tuple[Any, ...]
-    bounds: tuple[float, float] | None = None
-    scale: str = "linear"
-    dims: tuple[str, ...] = ()
-    formula: Formula | None = None
+    kind: Kind | None  # of the values in the deck
+    values: tuple[Any, ...]  # as in a deck; empty for a range in a Latin hypercube
+    bounds: tuple[float, float] | None = None  # ends of a range, SI
+    scale: str = "linear"  # spacing of the values in a range: linear or log
+    dims: tuple[str, ...] = ()  # of the result, along which it varies
+    formula: Formula | None = None  # its value in each case
 
     @property
     def key(self) -> str:

@@ -54,15 +54,7 @@ def backend(word: str, annotation: Any = None, default: Any = None) -> Callable[
 
 
 class Backend:
-    """A backend: it runs cases, several at a time.
-
-    Parameters
-    ----------
-    settings : object
-        Value of the key of the backend in a study file.
-    cases : int
-        Number of cases to run, at least 1.
-    """
+    """Run cases, several at a time, with the settings of the backend in a study file."""
 
     def __init__(self, settings: Any, cases: int) -> None:
         raise NotImplementedError

@@ -40,23 +40,9 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> xarray.Dataset:
-    """Combine the finished cases in one dataset.
+    """Combine the finished cases in one dataset: the last load step of each, or all along ``step``.
 
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    folder : StudyFolder
-        Folder of its cases.
-    steps : str
-        last: values of the last load step; all: the whole history, with the dimension ``step``.
-    attributes : dict
-        Attributes of the dataset.
-
-    Returns
-    -------
-    xarray.Dataset
-        NaN where a case is not done, for the reason in ``status``, ``exit_code`` and ``message``.
+    Values of other cases are NaN, for the reason in ``status``, ``exit_code`` and ``message``.
     """
     import xarray
 
@@ -144,13 +130,6 @@ def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
 
     The texts `about` are attributes of the group ``study``: xarray does not combine datasets whose own
     attributes differ.
-
-    Raises
-    ------
-    DeckError
-        If the path holds another file.
-    ResourceError
-        If the file cannot be written.
     """
     refuse_foreign(path)
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.

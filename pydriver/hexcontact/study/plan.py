@@ -88,28 +88,11 @@ def plan(
     check: CheckLevel,
     skip_invalid: bool,
 ) -> Plan:
-    """Build and check all cases of a study.
+    """Build and check all cases of a study; raise a DeckError with a sentence for each fault.
 
-    Parameters
-    ----------
-    file : StudyFile
-        The study.
-    base : mapping
-        Its base deck, whose output file is ignored.
-    source : Source
-        Source of the base deck, for messages.
-    study : str
-        Name of the study in messages.
-    check : str
-        windows: also find the window of every case by a coarse solution; decks: only decks and loads;
-        nothing: only build the decks.
-    skip_invalid : bool
-        Mark wrong cases instead of raising an error, unless all are wrong.
-
-    Raises
-    ------
-    DeckError
-        With a sentence for each fault, which names the parameter.
+    Of `base` the output file is ignored. Check "windows" finds the window of every case by a coarse solution,
+    "decks" tests decks and loads, "nothing" builds the decks alone. With `skip_invalid` wrong cases are
+    marked, unless all are wrong.
     """
     tolerant = skip_invalid or check == "nothing"
     base = {key: value for key, value in base.items() if key != "output"} | _output(base)

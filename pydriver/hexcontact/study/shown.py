@@ -26,13 +26,7 @@ _STATE = ("status", "exit_code", "message")
 
 
 def study_of(path: Path) -> Path | None:
-    """Return the result of a study by its file or the folder of its cases; None for other files.
-
-    Raises
-    ------
-    DeckError
-        If there are only the cases.
-    """
+    """Return the result of a study by its file or the folder of its cases; None for other files."""
     if path.is_dir():
         if not (path / INDEX).is_file():
             return None

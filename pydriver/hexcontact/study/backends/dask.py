@@ -67,13 +67,7 @@ def _package(name: str, install: str) -> Any:
 
 @backend("dask", Dask | None)
 class DaskPool(Backend):
-    """Workers of a Dask cluster that is joined or started.
-
-    Raises
-    ------
-    DeckError
-        If Dask is not installed, no scheduler answers, or the cluster refuses its options.
-    """
+    """Run cases on the workers of a Dask cluster that is joined or started."""
 
     def __init__(self, settings: Dask, cases: int) -> None:
         distributed = _package("distributed", "distributed")

@@ -348,7 +348,6 @@ def test_plot_draws_what_is_asked(solved: Path) -> None:
         2,
         "cannot draw overview of sphere.nc: .*xyz",
     )
-    refused(inside(solved, "plot", "-w", "pyramid", "-o", "cut.xyz"), 2, "cannot draw pyramid: .*xyz")
     refused(
         inside(solved, "plot", "sphere.nc", "-o", "no/cut.png"),
         2,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..plotting.registry import Entry
     from ..result.result import Result
 
-_DRAWS = "Draw a result, or the influence functions and load shapes."
+_DRAWS = "Draw a result, or the cases of a study."
 _ALL = "all"
 
 
@@ -36,24 +36,19 @@ def _help() -> str:
     """Return the help, with a line for each figure: this imports the packages that draw."""
     from ..plotting.registry import entries
 
-    choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
-    choices.append(("result", _ALL, "every figure of the result, each in its own file"))
-    width = 2 + max(len(name) for _, name, _ in choices)
-    of_a_result, of_a_study, of_none = (
-        "\n".join(f"{name:<{width}}{words}" for kind, name, words in choices if kind == wanted)
-        for wanted in ("result", "study", "")
+    figures = entries().values()
+    of_results = [(figure.name, figure.help) for figure in figures if figure.of_a_result]
+    of_results.append((_ALL, "every figure of the result, each in its own file"))
+    of_studies = [(figure.name, figure.help) for figure in figures if figure.of_a_study]
+    width = 2 + max(len(name) for name, _ in of_results)
+    results, studies = (
+        "\n".join(f"{name:<{width}}{words}" for name, words in group) for group in (of_results, of_studies)
     )
     return (
         f"{_DRAWS}\n\n"
         "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
-        f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
-        f"\b\nOf a study:\n{of_a_study}\n\n\b\nWithout FILE:\n{of_none}"
+        f"apply.\n\n\b\nChoices of --what:\n{results}\n\n\b\nOf a study:\n{studies}"
     )
-
-
-def _kind(entry: Entry) -> str:
-    """Return what the FILE of a figure is: a result, a study, or nothing."""
-    return "result" if entry.of_a_result else "study" if entry.of_a_study else ""
 
 
 @command(
@@ -105,25 +100,22 @@ def plot(
         Format | None, option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
-    """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
+    """Draw a result or a study; `_help` makes the help from the figures."""
     from ..plotting.registry import entries
     from ..result.store import open_result
     from ..study.shown import read_study, study_of
 
-    files = files or []
     figures = entries()
     if what not in (known := [*figures, _ALL]):
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
+    if not files:
+        raise DeckError(f"--what {what}: expected the FILE of a result")
     study = study_of(files[0]) if len(files) == 1 else None
     if study is not None and what == "overview":
         what = "study"
-    shows = "result" if what == _ALL else _kind(figures[what])
-    if files and shows and (study is not None) != (shows == "study"):
+    if (study is not None) != (what != _ALL and figures[what].of_a_study):
         kind = "the result of a study; expected --what study" if study else "not the result of a study"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
-    if bool(files) != bool(shows):
-        expected = "expected no FILE" if files else "expected the FILE of a result"
-        raise DeckError(f"--what {what}: {expected}")
     results: list[Any] = [open_result(file) for file in files] if study is None else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
@@ -147,8 +139,8 @@ def plot(
         return
     if study is not None:
         files, results = [study], [read_study(study)]
-    default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
-    print_output(f"written: {picture_of(results, what, output or default, chosen)}")
+    picture = output or beside(files[0], f"_{what}{suffix}")
+    print_output(f"written: {picture_of(results, what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------
@@ -207,7 +199,7 @@ def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str,
 
 
 def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapping[str, Any]) -> Path:
-    """Draw a picture of one result, of several, or of none, with the given options; return its file."""
+    """Draw a picture of one result, or of several, with the given options; return its file."""
     from ..plotting.registry import entries
 
     entry = entries()[what]

@@ -23,7 +23,6 @@ from .boundary import contact_boundary
 from .history import history, loop, torsion
 from .compliance import compliance
 from .overview import overview
-from . import influence as influence
 from . import study as study
 from .registry import entries
 

@@ -62,7 +62,7 @@ class Entry:
     @property
     def of_a_result(self) -> bool:
         """Whether it shows a result."""
-        return self.of_several or "result" in self.options
+        return not self.of_a_study
 
     @property
     def of_a_study(self) -> bool:

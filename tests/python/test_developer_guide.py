@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact.cli import guard, parser
+from hexcontact.cli import app, frame
 from hexcontact.plotting import registry
 
 ROOT = Path(__file__).parents[2]
@@ -64,7 +64,7 @@ def test_example_of_a_surface_has_its_closed_solution(monkeypatch: pytest.Monkey
 
 def test_examples_of_a_figure_and_a_command_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_ENTRIES", dict(registry._ENTRIES))
-    monkeypatch.setitem(guard.COMMANDS, "energy", None)  # for other tests it is not there
+    monkeypatch.setattr(frame.app, "registered_commands", [*app.app.registered_commands])
     executed("Add a figure", "hexcontact.plotting.history")
     executed("Add a command", "hexcontact.cli.show")
     case = hexcontact.Case(
@@ -78,7 +78,7 @@ def test_examples_of_a_figure_and_a_command_work(tmp_path: Path, monkeypatch: py
     drawn = registry.entries()["work"].draw(result)
     assert isinstance(drawn, matplotlib.figure.Figure)
     assert drawn.axes[0].lines[0].get_ydata().tolist() == result.dissipated_energy.values.tolist()
-    done = CliRunner().invoke(parser.parser(), ["energy", str(tmp_path / "out.nc")])
+    done = CliRunner().invoke(frame.app, ["energy", str(tmp_path / "out.nc")])
     assert done.exit_code == 0
     assert [line.split()[0] for line in done.output.splitlines()] == ["1", "2"]
 

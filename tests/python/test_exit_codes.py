@@ -27,14 +27,14 @@ DECK = commands.DECK.replace("steps = 2", "steps = 4")
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact.cli import app as cli, json_output, messages
+from hexcontact.cli import app as cli, frame, messages
 from hexcontact.result import journal, store
 
 number, sent = int(sys.argv.pop(1)), []
 def signaled(module, name):
     original = getattr(module, name)
     def call(*arguments, **options):
-        if sent or name == "write":
+        if sent or name in ("write", "write_json"):
             os.kill(os.getpid(), number)
             time.sleep(0.02)  # for the thread that waits for it
             sent.append(name)
@@ -46,7 +46,7 @@ signaled(journal.Journal, "remove")
 signaled(store.Store, "close")
 signaled(messages, "overview")
 signaled(messages.Messages, "conclude")
-signaled(json_output, "write")
+signaled(frame, "write_json")
 atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join(sent))))
 cli.main()
 """

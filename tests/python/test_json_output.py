@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import hexcontact
 from hexcontact import Case, ConvergenceError
-from hexcontact.cli import json_output, verify
+from hexcontact.cli import frame, verify
 from hexcontact.cli.app import app
 from hexcontact.cli.deck import check
 from hexcontact.errors import Fault
@@ -151,7 +151,7 @@ def test_infinity_and_what_is_not_there_are_json_too(folder: Path) -> None:
         "d": Path("x"),
         5: (True, None),
     }
-    assert json_output.jsonable(odd) == {
+    assert frame.jsonable(odd) == {
         "a": None,
         "b": ["-inf", 1.5],
         "c": [0, 1],

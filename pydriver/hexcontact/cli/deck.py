@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..files import beginning, replacing
 from ..text import did_you_mean, listed, visible
-from .guard import Content, command, print_error, print_output
+from .frame import Content, command, print_error, print_output
 from .options import AsJson, DeckFile, Settings, argument, case_of, flag, output_to, target_of
 
 if TYPE_CHECKING:

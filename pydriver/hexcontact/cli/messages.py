@@ -21,8 +21,8 @@ from ..solve import run as solving
 from ..solve.interruption import Interrupted, in_background
 from ..solve.progress import reporter
 from ..text import listed, visible
-from . import json_output, tables
-from .guard import print_error, print_output
+from . import tables
+from .frame import Report, print_error, print_output, write_json
 from .options import LogLevel
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Messages:
             log.logger.disabled = True  # for threads that still run
             print_error(message)
             if self.as_json:
-                json_output.write(self.command, json_output.error(message, signaled.exit_code))
+                write_json(self.command, Report(message, signaled.exit_code).content())
             sys.stdout.flush()
             sys.stderr.flush()
         os._exit(signaled.exit_code)

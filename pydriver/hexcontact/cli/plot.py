@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from typer.core import TyperCommand
+
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
-from .guard import command, print_output
+from .frame import command, print_output
 from .options import Shown, argument, beside, labels_of, option, output_to, steps_of, steps_option
 
 if TYPE_CHECKING:
@@ -51,10 +53,16 @@ def _help() -> str:
     )
 
 
+class _WithFigures(TyperCommand):
+    """The command whose help is written when it is read."""
+
+    help = property(lambda _: _help(), lambda _, __: None)
+
+
 @command(
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
-    help=_help,
+    cls=_WithFigures,
 )
 def plot(
     files: Annotated[

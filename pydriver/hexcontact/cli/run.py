@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..solve.interruption import signal_pipe
-from .guard import Content, command, print_error
+from .frame import Content, command, print_error
 from .options import (
     AsJson,
     DeckFile,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..errors import DeckError
-from .guard import Content, command, print_output
+from .frame import Content, command, print_output
 from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_to, steps_of, steps_option
 
 

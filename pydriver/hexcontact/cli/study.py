@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
-from .guard import Content, Failure, command, print_error, print_output
+from .frame import Content, Failure, command, print_error, print_output
 from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to, steps_of
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -45,32 +44,12 @@ _MOST_ROWS = 24  # steps shown of a long history
 _PIPE = 130  # characters of a line where there is no terminal
 
 
-def console() -> Console | Pipe:
-    """Return what prints tables: with colors on a terminal or by FORCE_COLOR, else plain wide text."""
-    colored = sys.stdout.isatty() or os.environ.get("FORCE_COLOR")
-    return rich_console() if colored else Pipe()
-
-
-def rich_console() -> Console:
-    """Return the console of `rich` on standard output."""
+def console() -> Console:
+    """Return the console on standard output: with colors on a terminal or by FORCE_COLOR, else wide."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else _PIPE
     return Console(highlight=False, markup=False, emoji=False, width=width)
-
-
-class Pipe:
-    """Prints as `rich` does where there is no terminal, without `rich` if tables are not too wide for it."""
-
-    width = _PIPE
-
-    def print(self, shown: TextTable | str, *, soft_wrap: bool = False) -> None:
-        """Print a table, or a line of text."""
-        text = shown.plain(self.width) if isinstance(shown, TextTable) else shown
-        if text is None:
-            rich_console().print(shown, soft_wrap=soft_wrap)
-        else:
-            print(text)
 
 
 def pairs(title: str, rows: Iterable[Row]) -> TextTable:
@@ -217,7 +196,7 @@ def _recorded_case(deck: str) -> tuple[Problem | None, str]:
 # --- the history ----------------------------------------------------------------------------------
 
 
-def history_table(histories: Sequence[History], console: Console | Pipe) -> TextTable:
+def history_table(histories: Sequence[History], console: Console) -> TextTable:
     """Return a table of the load steps; of a long history only ends of segments, peaks and the last step.
 
     The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
@@ -236,12 +215,8 @@ def history_table(histories: Sequence[History], console: Console | Pipe) -> Text
     return shown
 
 
-def _fits(table: TextTable, console: Console | Pipe) -> bool:
+def _fits(table: TextTable, console: Console) -> bool:
     """Return whether a table needs no more width than a console has."""
-    if isinstance(console, Pipe):
-        if table.plain(console.width) is not None:
-            return True
-        console = rich_console()
     return console.measure(table, options=console.options.update_width(1000)).maximum <= console.width
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from ..errors import DeckError
-from .guard import Content, command
+from .frame import Content, command
 from .options import AsJson, argument, flag
 
 
@@ -156,9 +156,9 @@ def show(check: Check, comparison: Comparison) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from .tables import rich_console
+    from .tables import console
 
-    screen = rich_console()
+    screen = console()
     screen.width = max(screen.width, 150)  # a narrow terminal wraps lines, it does not lose digits
     shown = Table(
         title=Text(check.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False

@@ -14,9 +14,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hexcontact import DeckError
-from hexcontact.cli import verify
-from hexcontact.cli.verify import HEADERS, Check, Comparison, cells_of, judge_column
+from validation import frame
 from validation.checks import CHECKS
+from validation.frame import HEADERS, Check, Comparison, cells_of, judge_column
 
 
 def markdown(check: Check, comparison: Comparison) -> str:
@@ -55,9 +55,9 @@ def main() -> int:
     words = parser.parse_args()
     if words.table:
         print(PREAMBLE)
-    output = (lambda check, found: print(markdown(check, found))) if words.table else verify.show
+    output = (lambda check, found: print(markdown(check, found))) if words.table else frame.show
     try:
-        return verify.main(words.names, checks=CHECKS, output=output, listing=words.list)
+        return frame.main(words.names, checks=CHECKS, output=output, listing=words.list)
     except DeckError as error:
         parser.error(str(error))
 

@@ -6,7 +6,7 @@ import importlib
 import re
 import sys
 import threading
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -86,18 +86,11 @@ def test_examples_of_a_figure_and_a_command_work(tmp_path: Path, monkeypatch: py
 def test_example_of_a_study_backend_yields_what_the_jobs_return(monkeypatch: pytest.MonkeyPatch) -> None:
     from hexcontact.study import backend
 
-    def submit(work: Callable[..., str], job: str, apart: bool, done: Callable[[str], None]) -> None:
-        done(work(job, apart))
-
     monkeypatch.setattr(backend, "BACKENDS", dict(backend.BACKENDS))
     monkeypatch.setattr(backend, "KEYS", dict(backend.KEYS))
-    others = {
-        "Queue": SimpleNamespace,
-        "connected": lambda address: SimpleNamespace(submit=submit, close=lambda: None),
-        "solve_case": lambda job, apart: f"outcome of {job}",
-    }
+    monkeypatch.setattr(backend, "solve_case", lambda job, apart: f"outcome of {job}, {apart}")
+    others = {"Queue": SimpleNamespace, "connected": lambda address: ThreadPoolExecutor(1)}
     executed("Add a study backend", "hexcontact.study.backends.dask", **others)
-    pool = backend.BACKENDS["queue"](SimpleNamespace(address="here"), 2)
-    found = list(pool.outcomes(["one", "two"], threading.Event()))
-    pool.stop()
-    assert found == ["outcome of one", "outcome of two"]
+    with backend.BACKENDS["queue"](SimpleNamespace(address="here"), 2) as pool:
+        found = list(backend.outcomes(pool, ["one", "two"], threading.Event()))
+    assert found == ["outcome of one, True", "outcome of two, True"]

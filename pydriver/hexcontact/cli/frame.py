@@ -73,7 +73,8 @@ class Report(NamedTuple):
             "message": seen_from_here(self.message),
             "exit_code": self.exit_code,
             "faults": [
-                {name: part or None for name, part in fault._asdict().items()} for fault in self.faults
+                {name: part or None for name, part in fault._asdict().items() if name != "sentence"}
+                for fault in self.faults
             ],
             **(self.details or {}),
         }

@@ -15,7 +15,7 @@ from ..deck.interface import FrictionKind, NodalCoefficient, TwoCoefficients
 from ..deck.kinds import Kind, OrShare, Quantity, Share, Whole, WordOr
 from ..deck.model import Table, kind_of
 from ..deck.units import NUMBER, UnitError, to_si
-from ..errors import DeckError
+from ..errors import DeckError, Fault
 from ..text import shown
 from .tables import Parameter, StudyFile
 
@@ -219,12 +219,16 @@ def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str
         try:
             numbers[name] = default if value == {} or kind is None else float(kind.parse(value))
         except PydanticCustomError as error:
-            raise DeckError(f"{where}: {key} = {shown(value)}: {error.message()}") from None
+            raise _fault(axis, f"{where}: {key} = {shown(value)}: {error.message()}") from None
     try:
         found = axis.formula.value(numbers)
     except ValueError as error:
-        raise DeckError(f"{where}: {error}") from None
+        raise _fault(axis, f"{where}: {error}") from None
     return axis.in_deck(found)
+
+
+def _fault(axis: Axis, message: str) -> DeckError:
+    return DeckError(message, [Fault(message, axis.key)])
 
 
 def _latin_hypercube(file: StudyFile, axes: Sequence[Axis]) -> list[dict[str, Any]]:

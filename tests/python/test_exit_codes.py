@@ -27,7 +27,7 @@ DECK = commands.DECK.replace("steps = 2", "steps = 4")
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact.cli import app as cli, frame, messages
+from hexcontact.cli import app as cli, frame, solving
 from hexcontact.result import journal, store
 
 number, sent = int(sys.argv.pop(1)), []
@@ -44,8 +44,8 @@ def signaled(module, name):
 signaled(store, "write")  # the output is assembled
 signaled(journal.Journal, "remove")
 signaled(store.Store, "close")
-signaled(messages, "overview")
-signaled(messages.Messages, "conclude")
+signaled(solving, "overview")
+signaled(solving.Messages, "conclude")
 signaled(frame, "write_json")
 atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join(sent))))
 cli.main()

@@ -61,7 +61,7 @@ except ResourceError as error:
 # Says how much address space the command and the buffers of numpy take before it begins to work.
 BEGUN = """
 import numpy
-import hexcontact.core._core, hexcontact.cli.messages
+import hexcontact.core._core, hexcontact.cli.solving
 numpy.linalg.lstsq(numpy.eye(9), numpy.ones(9))
 print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
 """

@@ -42,7 +42,7 @@ from hexcontact.study.backend import BACKENDS, KEYS, Backend
 from hexcontact.study.backends.processes import LocalPool
 from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
-from hexcontact.study.tables import StudyFile
+from hexcontact.study.study_file import StudyFile
 
 CASES = Path(__file__).parents[2] / "cases"
 

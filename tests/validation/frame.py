@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hexcontact.cli.tables import console
+from hexcontact.cli.printed import console
 from hexcontact.errors import DeckError
 
 UNITS = dict.fromkeys(("-", "s", "N", "m", "Pa", "rad"), 1.0)

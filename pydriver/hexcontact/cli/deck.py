@@ -23,11 +23,11 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
     from ..problem.overview import case_rows
     from ..problem.refinement import least_and_most
     from ..solve.frictionless import peak_memory, require_memory
-    from . import tables
+    from . import printed
 
     case = case_of(deck, settings)
     if not as_json:
-        tables.console().print(tables.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
+        printed.console().print(printed.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first possible result
     require_memory(first, first.lattice)
     target = target_of(case, deck)
@@ -35,7 +35,7 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
         return case_content(case, target)
     for sentence in plausibility.warnings(case):
         print_error(f"warning: {sentence}")
-    tables.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
+    printed.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
     return None
 
 
@@ -75,7 +75,7 @@ def schema(
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.schema import deck_schema
-    from ..study.tables import study_schema
+    from ..study.study_file import study_schema
 
     text = json.dumps(study_schema() if study else deck_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None or str(output) == "-":

@@ -111,7 +111,7 @@ def plot(
     """Draw a result or a study; `_help` makes the help from the figures."""
     from ..plotting.registry import entries
     from ..result.store import open_result
-    from ..study.shown import read_study, study_of
+    from ..study.dataset import read_study, study_of
 
     figures = entries()
     if what not in (known := [*figures, _ALL]):

@@ -25,12 +25,12 @@ from ..errors import DeckError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
 from ..interior.tables import read_table, tables_of
-from ..plotting.report_data import drawn_data, kept_steps
+from ..plotting.report_data import drawn_data, mapped_steps
 from ..problem.overview import case_rows
 from ..result.history import energy_table, load_or_motion, worth_showing
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
-from . import tables
+from . import printed
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
@@ -54,9 +54,9 @@ def write_report(result: Result, target: Path) -> Path:
 
 def report(result: Result) -> str:
     """Return the page of a result, finished or not, as HTML."""
-    summary = tables.Summary.of_result(result)
+    summary = printed.Summary.of_result(result)
     histories = summary.steps()
-    numbers = kept_steps(result)
+    numbers = mapped_steps(result)
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     environment = jinja2.Environment(
@@ -78,8 +78,8 @@ def report(result: Result) -> str:
         below=_below(result),
         pictures=list(_pictures(result)) if numbers else [],
         deck=result.deck,
-        hertz=(tables.HERTZ_HEADERS, tables.hertz_rows(summary.hertz, histories[-1])),
-        accuracy=(tables.TRIAL_HEADERS, tables.trial_rows(result)),
+        hertz=(printed.HERTZ_HEADERS, printed.hertz_rows(summary.hertz, histories[-1])),
+        accuracy=(printed.TRIAL_HEADERS, printed.trial_rows(result)),
         residuals=_residuals(histories),
         provenance=_provenance(result, histories),
         data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -121,13 +121,13 @@ def _inputs(result: Result, case: Problem | None) -> list[tuple[str, ...]]:
         modulus = quantity(float(attributes["effective_modulus"]), "Pa")
         beta, gamma = (float(attributes[n]) for n in ("dundurs_beta", "tangential_compliance_ratio"))
         pair = f"E* = {modulus}, beta = {beta:.4g}, gamma = {gamma:.4g}"
-        rows = [("pair", pair), ("algorithm", tables.algorithm(attributes)), spacing]
+        rows = [("pair", pair), ("algorithm", printed.algorithm(attributes)), spacing]
     planned = int(attributes["planned_steps"])
     steps = f"{len(result)}" + (f" of {planned}" if planned else "")
     return [*rows, ("window", f"{sizes['row']} x {sizes['col']} nodes at the end"), ("load steps", steps)]
 
 
-def _provenance(result: Result, histories: Sequence[tables.History]) -> list[tuple[str, ...]]:
+def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tuple[str, ...]]:
     attributes, deck = result.dataset.attrs, result.deck
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     return [
@@ -143,7 +143,7 @@ def _provenance(result: Result, histories: Sequence[tables.History]) -> list[tup
     ]
 
 
-def _loads(histories: Sequence[tables.History]) -> Table:
+def _loads(histories: Sequence[printed.History]) -> Table:
     """Return the loads at the end of each segment as a table."""
     ends = {int(history.get("segment", 1)): history for history in histories}
     names = worth_showing(histories)
@@ -177,8 +177,7 @@ def _below(result: Result) -> Table:
 
 def _pictures(result: Result) -> Iterator[tuple[str, str]]:
     """Yield title and data (PNG, base64) of a picture of each kind of what `_below` lists."""
-    from ..plotting.fatigue import fatigue
-    from ..plotting.stress import stress
+    from ..plotting.below import fatigue, stress
 
     kinds = {type(table) for table in tables_of(result.deck).values()}
     for kind, draw, title in (
@@ -194,7 +193,7 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
             yield title, base64.b64encode(data.getvalue()).decode()
 
 
-def _residuals(histories: Sequence[tables.History]) -> Table:
+def _residuals(histories: Sequence[printed.History]) -> Table:
     signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
     rows = [
         (

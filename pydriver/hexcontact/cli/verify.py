@@ -97,7 +97,7 @@ def compared(check: Check) -> list[dict[str, Any]]:
 
 def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
     """Print a check as a table."""
-    from .tables import console
+    from .printed import console
 
     def number(row: Mapping[str, Any], of: str) -> str:
         units = VARIABLES[row["quantity"]].units if row["quantity"] in VARIABLES else ""

@@ -37,7 +37,7 @@ def rounded(values: Any, digits: int = 4) -> list[float | None]:
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.ravel(values).tolist()]
 
 
-def kept_steps(result: Result) -> list[int]:
+def mapped_steps(result: Result) -> list[int]:
     """Return the numbers of the steps with maps, the last among them."""
     data = dataset_of(result)
     if "pressure" not in data:
@@ -52,7 +52,7 @@ def kept_steps(result: Result) -> list[int]:
 def drawn_data(
     result: Result, histories: Sequence[Mapping[str, Any]], numbers: Sequence[int]
 ) -> dict[str, Any]:
-    """Return the data of charts and maps for JSON; maps of the steps with some numbers, see `kept_steps`."""
+    """Return the data of charts for JSON, and of maps of the steps with some numbers."""
     palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
     return {
         "palette": np.round(255 * palette).astype(int).ravel().tolist(),

@@ -17,7 +17,7 @@ from ..deck.model import Table, kind_of
 from ..deck.units import NUMBER, UnitError, to_si
 from ..errors import DeckError, Fault
 from ..text import shown
-from .tables import Parameter, StudyFile
+from .study_file import Parameter, StudyFile
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..problem.problem import Problem
 from ..text import shown
 from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins
 from .job import MOST_CASES, hash_of
-from .tables import StudyFile
+from .study_file import StudyFile
 
 CheckLevel = Literal["windows", "decks", "nothing"]
 """What is checked when cases are planned."""

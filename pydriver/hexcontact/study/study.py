@@ -28,11 +28,11 @@ from ..text import quantity
 from .backend import BACKENDS, Backend, outcomes
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
-from .collect import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
+from .dataset import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
 from .folder import StudyFolder
 from .job import Job, Outcome, solve_case
 from .plan import CheckLevel, Plan, PlannedCase, plan
-from .tables import StudyFile
+from .study_file import StudyFile
 
 if TYPE_CHECKING:
     import xarray

@@ -21,7 +21,7 @@ from ..solve import run as solving
 from ..solve.interruption import Interrupted, in_background
 from ..solve.progress import reporter
 from ..text import listed, visible
-from . import tables
+from . import printed
 from .frame import Report, print_error, print_output, write_json
 from .options import LogLevel
 
@@ -80,7 +80,7 @@ class Messages:
     ) -> dict[str, Any] | None:
         """Print or return the result of a run, with a message on an accuracy that was not reached."""
         refined = open_result(target) if case.accuracy else None
-        summary = tables.Summary.of_run(case, histories, refined, extent)
+        summary = printed.Summary.of_run(case, histories, refined, extent)
         shortfall = refined.shortfall if refined is not None else ""
         if shortfall:
             print_error(shortfall)
@@ -92,7 +92,7 @@ class Messages:
         if not self.quiet:
             summary.print()
             files = f"{target}, {picture}" if picture else f"{target}"
-            tables.console().print(visible(f"written: {files}"), soft_wrap=True)
+            printed.console().print(visible(f"written: {files}"), soft_wrap=True)
         if shortfall:
             raise SystemExit(AccuracyWarning.exit_code)
         return None
@@ -100,7 +100,7 @@ class Messages:
     def was_finished(self, file: Path, picture: Path | None) -> dict[str, Any] | None:
         """Print or return that all load steps were finished before."""
         if self.as_json:
-            summary = tables.Summary.of_result(open_result(file))
+            summary = printed.Summary.of_result(open_result(file))
             written = {"output": file, "picture": picture, "warnings": summary.remarks}
             return written | summary.as_run()
         if not self.quiet:

@@ -82,9 +82,7 @@ def schema(
         print(text, end="")
         return
     if (start := beginning(output, 1000)) and b'"title": "hexcontact ' not in start:
-        raise DeckError(
-            f"{output} is there and no schema of hexcontact, so it is not overwritten; choose another output"
-        )
+        raise DeckError(f"{output} exists and is not a hexcontact schema; choose another output")
     with replacing(output) as path:
         path.write_text(text, encoding="utf-8")
     print_output(

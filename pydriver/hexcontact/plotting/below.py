@@ -41,6 +41,7 @@ from .style import (
     new_figure,
     set_title,
     shades,
+    titled,
 )
 from .zones import draw_zone_bars
 
@@ -213,7 +214,7 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
         return 1.0, "cycles to a crack, up to $10^9$"
     largest = float(abs(field).max())
     factor, unit = scaled(largest, units) if units in ("Pa", "m") else (1.0, units.replace("1", ""))
-    return factor, f"{named} ({unit})" if unit else named
+    return factor, titled(named, unit)
 
 
 def _map_of(field: xarray.DataArray) -> str:
@@ -364,7 +365,7 @@ def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArra
         axes.set_yscale("log")
     else:
         axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
-    axes.set_ylabel(f"{named} ({unit})" if unit else named)
+    axes.set_ylabel(titled(named, unit))
     axes.grid(color="0.9", lw=0.5)
 
 

@@ -23,7 +23,7 @@ from ..result.view import Results, as_list, dataset_of, title_of
 from ..text import scaled, worded
 from ..variables import PANELS, VARIABLES, names_where, spelled
 from .registry import SEVERAL_RUNS, figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades
+from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
 
 if TYPE_CHECKING:
     import xarray
@@ -163,7 +163,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     place, label = dataset["step"].values, "load step"
     if over != "step":
         along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-        place, label = values_of(dataset, over) * along, _titled(over, length)
+        place, label = values_of(dataset, over) * along, titled(_spelled(over), length)
     begun = begins_at_zero([*names, *([over] if over != "step" else [])])
     place = np.insert(place, 0, 0.0) if begun else place
     marker = "o" if place.size <= _MANY else ""
@@ -175,7 +175,8 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
-    axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
+    named = _spelled(names[0] if len(names) == 1 else _common(names))
+    axes.set(xlabel=label, ylabel=titled(named, unit))
     if len(names) > 1:
         axes.legend([_apart(name, names) for name in names], handlelength=2.2)
     axes.grid(color="0.9", lw=0.5)
@@ -186,8 +187,8 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
                 axes.axvline(float(place[change + begun]), color=GUIDE, lw=0.7, ls=":", zorder=0)
 
 
-def _titled(name: str, unit: str) -> str:
-    return spelled(name.removesuffix("_fit")) + (f" ({unit})" if unit else "")
+def _spelled(name: str) -> str:
+    return spelled(name.removesuffix("_fit"))
 
 
 def _common(names: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefin
 from ..arrays import Array, Mask
 from ..core.edges import ZoneMesh
 from ..core.interpolation import linear
+from ..result.mesh import triangles
 from ..result.result import Result
 from ..result.view import StepView
 from ..text import scaled
@@ -50,13 +51,9 @@ def _whole_mesh(view: StepView, values: Array) -> ZoneMesh:
     shown = view.contact | (values != 0.0)
     stride = _stride(shown)
     x, y, values, shown = (field[::stride, ::stride] for field in (view.x, view.y, values, shown))
-    number = np.arange(shown.size).reshape(shown.shape)
-    corners = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
-    triangles = np.concatenate(
-        [np.stack([corners[k].ravel() for k in three], axis=1) for three in ((0, 1, 2), (1, 3, 2))]
-    )
-    inside = shown.ravel()[triangles].any(axis=1)
-    return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), triangles[inside])
+    corners = triangles(*shown.shape).astype(int)
+    inside = shown.ravel()[corners].any(axis=1)
+    return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), corners[inside])
 
 
 def _stride(shown: Mask) -> int:

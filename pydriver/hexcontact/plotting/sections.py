@@ -161,21 +161,16 @@ class Cut:
         along_axes = {"x": ("$q_x$", "$q_y$"), "y": ("$q_y$", "$-q_x$")}
         return along_axes.get(self.axis, ("$q$ along the line", "$q$ across the line"))
 
-    @property
-    def few(self) -> bool:
-        """Whether nodes are distinguishable."""
-        return self.at_nodes
-
     def look(self) -> dict[str, Any]:
         """Return the style of values: circles at nodes if they are distinguishable."""
-        if not self.few:
+        if not self.at_nodes:
             return {"ls": "-"}
         size = 3.5 if self.place.size < 80 else 2.5
         return {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9, "ls": ""}
 
     def beside(self, color: str) -> dict[str, Any]:
         """Return the style of a closed solution: a line under circles, dashes over a line."""
-        dash, order = ("-", 2) if self.few else ("--", 5)
+        dash, order = ("-", 2) if self.at_nodes else ("--", 5)
         return {"color": color, "ls": dash, "zorder": order}
 
 
@@ -217,8 +212,8 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
         bottom.plot(cut.along(cut.place), difference, lw=0.7, **style)
 
     bottom.axhline(0.0, color=GUIDE, lw=0.7)
-    dots = {"marker": "o" if cut.few else "", "ms": 2.5}
-    squares: dict[str, Any] = {"marker": "s" if cut.few else "", "mfc": "none", "ms": 3.5}
+    dots = {"marker": "o" if cut.at_nodes else "", "ms": 2.5}
+    squares: dict[str, Any] = {"marker": "s" if cut.at_nodes else "", "mfc": "none", "ms": 3.5}
     edges = view.tractions.source == "edges"
     color = THIRD if edges else COMPUTED
     draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)

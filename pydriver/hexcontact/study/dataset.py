@@ -126,7 +126,7 @@ def is_study(path: Path) -> bool:
 def refuse_foreign(path: Path) -> None:
     """Raise a DeckError if a file exists that is not the result of a study."""
     if path.exists() and not is_study(path):
-        raise DeckError(f"{path} is there and not the result of a study; choose another output")
+        raise DeckError(f"{path} exists and is not the result of a study; choose another output")
 
 
 def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:

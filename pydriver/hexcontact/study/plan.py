@@ -17,7 +17,7 @@ from ..errors import DeckError, Fault
 from ..problem.checks import checked
 from ..problem.problem import Problem
 from ..text import shown
-from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins
+from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins, wrong
 from .job import MOST_CASES, hash_of
 from .study_file import StudyFile
 
@@ -96,9 +96,9 @@ def plan(
     about = replace(source, overrides=frozenset(keys), of_override=mark)
     for key in keys:
         if key == "output" or key.startswith("output.file"):
-            raise DeckError(f"{mark}{key}: a study names the files of its cases itself")
+            raise wrong(study, key, "a study names the files of its cases itself")
         if keys.count(key) > 1:
-            raise DeckError(f"{mark}{key}: expected each key only once")
+            raise wrong(study, key, "expected each key only once")
     names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
     deck = _first_deck(file, base, about, mark, tolerant, names)
     given = [axis_of(entry, deck, file.combine, study) for entry in file.parameter]
@@ -128,8 +128,8 @@ def plan(
             lines |= {message: line for message, line in of_case.items() if message not in lines}
         messages = "\n".join(fault.message for fault in faults)
         cases.append(PlannedCase(position, values, as_toml(merged), messages, names))
-    wrong = sum(bool(case.fault) for case in cases)
-    if wrong and not (tolerant and wrong < len(cases)):
+    invalid = sum(bool(case.fault) for case in cases)
+    if invalid and not (tolerant and invalid < len(cases)):
         more = f"... and {len(lines) - _MOST_LINES} more"
         shown_lines = [*lines.values()][:_MOST_LINES] + [more] * (len(lines) > _MOST_LINES)
         raise DeckError("\n".join(shown_lines))

@@ -115,11 +115,9 @@ def _report_of(error: BaseException) -> Report | None:
     if isinstance(error, KeyboardInterrupt):
         return Report("interrupted", 130)
     if isinstance(error, HexcontactError):
-        message, faults = (
-            "\n".join([str(error), *getattr(error, "__notes__", ())]),
-            getattr(error, "faults", ()),
-        )
-        return Report(message, error.exit_code, faults, getattr(error, "details", None))
+        message = "\n".join([str(error), *getattr(error, "__notes__", ())])
+        faults, details = getattr(error, "faults", ()), getattr(error, "details", None)
+        return Report(message, error.exit_code, faults, details)
     if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
         return Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):

@@ -40,6 +40,10 @@ if TYPE_CHECKING:
 History = Mapping[str, Any]
 Row = tuple[str, ...]
 
+Table = tuple[Sequence[str], Sequence[Row]]  # headers and rows
+
+_LAST = "Last load step"
+_TRIALS = ("", "first lattice", "last but one", "last", "largest error")
 _MOST_ROWS = 24  # steps shown of a long history
 _PIPE = 130  # characters of a line where there is no terminal
 
@@ -107,26 +111,32 @@ class Summary(NamedTuple):
 
     def print(self, whole_file: bool = False) -> None:
         """Print the history, the last step, its comparison with Hertz, lattices; origin of a file."""
-        shown, last, named = console(), self.histories[-1], ""
+        shown, named = console(), ""
         if whole_file and self.result is not None:
             shown.print(pairs(self.title, file_rows(self.result)))
         elif self.title:
             named = f" of {self.title!r}"
         if whole_file or len(self.histories) > 1:
             shown.print(history_table(self.histories, shown))
-        headers, energies = energy_table(self.histories, _MOST_ROWS)
-        if energies:
-            shown.print(TextTable("Dissipated energy", headers, energies))
-        shown.print(pairs(f"Last load step{named}", step_rows(last, self.extent)))
-        if rows := hertz_rows(self.hertz, last):
-            shown.print(TextTable("Against Hertz", HERTZ_HEADERS, rows))
-        if self.result is not None and (rows := trial_rows(self.result)):
-            shown.print(TextTable("Accuracy", TRIAL_HEADERS, rows))
+        for title, (headers, rows) in self.tables(_MOST_ROWS).items():
+            if rows:
+                words = f"{title}{named}" if title == _LAST else title
+                shown.print(TextTable(words, headers, rows))
         before = () if whole_file else ("warnings", "notes")  # printed before the run
         printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
             if remark not in printed:
                 shown.print(f"note: {remark}", soft_wrap=True)
+
+    def tables(self, most: int) -> dict[str, Table]:
+        """Return the tables that terminal and page share, by title; `most` rows of energies."""
+        last = self.histories[-1]
+        return {
+            "Dissipated energy": energy_table(self.histories, most),
+            _LAST: (("", ""), step_rows(last, self.extent)),
+            "Against Hertz": (("", "Hertz", "computed", "difference"), hertz_rows(self.hertz, last)),
+            "Accuracy": (_TRIALS, [] if self.result is None else trial_rows(self.result)),
+        }
 
     def steps(self) -> list[dict[str, Any]]:
         """Return the histories, each with the number of its step."""
@@ -298,13 +308,7 @@ def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: Histo
     return rows
 
 
-HERTZ_HEADERS = ("", "Hertz", "computed", "difference")
-
-
 # --- accuracy -------------------------------------------------------------------------------------
-
-
-TRIAL_HEADERS = ("", "first lattice", "last but one", "last", "largest error")
 
 
 def trial_rows(result: Result) -> list[Row]:

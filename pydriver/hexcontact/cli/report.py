@@ -27,7 +27,7 @@ from ..interior.extremes import place_of
 from ..interior.tables import read_table, tables_of
 from ..plotting.report_data import drawn_data, mapped_steps
 from ..problem.overview import case_rows
-from ..result.history import energy_table, load_or_motion, worth_showing
+from ..result.history import load_or_motion, worth_showing
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
 from . import printed
@@ -35,8 +35,6 @@ from . import printed
 if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..result.result import Result
-
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
 
 _MOST_PARTS = 200  # segments, and cycles, in the table of energies
 _DATA = resources.files("hexcontact").joinpath("data")
@@ -55,7 +53,7 @@ def write_report(result: Result, target: Path) -> Path:
 def report(result: Result) -> str:
     """Return the page of a result, finished or not, as HTML."""
     summary = printed.Summary.of_result(result)
-    histories = summary.steps()
+    histories, tables = summary.steps(), summary.tables(_MOST_PARTS)
     numbers = mapped_steps(result)
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
@@ -74,12 +72,12 @@ def report(result: Result) -> str:
         kept=_kept(len(numbers), len(histories)),
         inputs=_inputs(result, summary.case),
         loads=_loads(histories),
-        energies=energy_table(histories, _MOST_PARTS),
+        energies=tables["Dissipated energy"],
         below=_below(result),
         pictures=list(_pictures(result)) if numbers else [],
         deck=result.deck,
-        hertz=(printed.HERTZ_HEADERS, printed.hertz_rows(summary.hertz, histories[-1])),
-        accuracy=(printed.TRIAL_HEADERS, printed.trial_rows(result)),
+        hertz=tables["Against Hertz"],
+        accuracy=tables["Accuracy"],
         residuals=_residuals(histories),
         provenance=_provenance(result, histories),
         data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -143,7 +141,7 @@ def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tu
     ]
 
 
-def _loads(histories: Sequence[printed.History]) -> Table:
+def _loads(histories: Sequence[printed.History]) -> printed.Table:
     """Return the loads at the end of each segment as a table."""
     ends = {int(history.get("segment", 1)): history for history in histories}
     names = worth_showing(histories)
@@ -158,7 +156,7 @@ def _loads(histories: Sequence[printed.History]) -> Table:
     return ("segment", "label", "steps", *symbols), rows
 
 
-def _below(result: Result) -> Table:
+def _below(result: Result) -> printed.Table:
     """Return the tables [[stress]] and [[fatigue]] of the deck, with their files, as a table."""
     rows = []
     for name, table in tables_of(result.deck).items():
@@ -193,7 +191,7 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
             yield title, base64.b64encode(data.getvalue()).decode()
 
 
-def _residuals(histories: Sequence[printed.History]) -> Table:
+def _residuals(histories: Sequence[printed.History]) -> printed.Table:
     signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
     rows = [
         (

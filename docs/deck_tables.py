@@ -16,7 +16,7 @@ from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Severa
 from hexcontact.deck.model import Table, expectation, kind_of
 from hexcontact.problem import plausibility
 from hexcontact.study.backends.dask import Dask
-from hexcontact.study.tables import Parameter, StudyFile
+from hexcontact.study.study_file import Parameter, StudyFile
 from hexcontact.text import shown
 from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 

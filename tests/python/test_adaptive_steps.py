@@ -12,7 +12,7 @@ from rich.console import Console
 from validation.hard_problems import errors_over_bounds
 
 from hexcontact import Case, ConvergenceError, DeckError
-from hexcontact.cli import tables
+from hexcontact.cli import printed
 from hexcontact.core.steps import LEAST
 from hexcontact.deck.schema import deck_schema
 from hexcontact.problem import estimates, overview
@@ -349,7 +349,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     rows = dict(history.step_rows(result.history.iloc[-1].to_dict()))
     assert rows["load steps"].startswith("stick area within ")
     console = Console(file=io.StringIO(), width=150)
-    console.print(tables.pairs("", overview.case_rows(case)))
+    console.print(printed.pairs("", overview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "chosen on the way in 2 segments (step_tolerance 0.1)" in text
     assert "a third or three times as much" in estimates.work(case)
@@ -371,7 +371,7 @@ def test_an_unfinished_run_does_not_name_a_number(tmp_path: Path) -> None:
     part = open_result(out)
     assert not part.complete
     assert repr(part).splitlines()[1].startswith("  1 load step (unfinished run), ")
-    assert ("load steps", "1 (unfinished, their number was open)") in tables.file_rows(part)
+    assert ("load steps", "1 (unfinished, their number was open)") in printed.file_rows(part)
     journal = Journal(journal_of(out), companions=True)
     assert not journal.complete
     (step,) = journal

@@ -16,7 +16,7 @@ from hexcontact.result.journal import journal_of, write_record
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
 from hexcontact.result.trials import Solution, TrialFolder
-from hexcontact.study.collect import histories
+from hexcontact.study.dataset import histories
 from hexcontact.variables import LARGEST, RESIDUALS, VARIABLES
 
 MATERIALS = {

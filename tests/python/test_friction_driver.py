@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
-from hexcontact.cli import report, tables
+from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
 from hexcontact.core import _core, calls, contact, friction, influence, memory
 from hexcontact.core.calls import HeldState
@@ -645,7 +645,7 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     assert all(sentence in html.unescape(page) for sentence in told)
     shown = CliRunner().invoke(app, ["info", str(file)]).output
     assert all(f"note: {sentence}" in shown for sentence in told)
-    assert [said for said in tables.file_content(result)["warnings"] if said in told] == told
+    assert [said for said in printed.file_content(result)["warnings"] if said in told] == told
 
 
 def sphere_of(pair: ElasticPair, friction_coefficient: float) -> tuple[FrictionalContact, float]:
@@ -764,7 +764,7 @@ def test_all_that_moves_is_shown() -> None:
 )
 def test_the_table_fits_the_terminal(sheared: Result, width: int, dropped: set[str]) -> None:
     console = Console(width=width, file=io.StringIO())
-    console.print(tables.history_table(sheared.history.to_dict("records"), console))
+    console.print(printed.history_table(sheared.history.to_dict("records"), console))
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     assert max(map(len, lines)) <= width
     assert "…" not in "".join(lines)
@@ -837,6 +837,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
 
 def test_hertz_is_left_alone(sheared: Result) -> None:
-    assert tables.against_hertz(sphere(), sheared.history.to_dict("records")[-1]) == []
+    assert printed.against_hertz(sphere(), sheared.history.to_dict("records")[-1]) == []
     exact = hertz_sphere(sphere().pair.effective_modulus, 1e-3, normal_load=31.5)
     assert float(sheared.max_pressure[1]) == pytest.approx(1.034 * exact.max_pressure, rel=0.01)

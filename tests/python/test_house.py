@@ -18,7 +18,7 @@ from hexcontact.cli.app import app
 from hexcontact.core.lattice import Lattice
 from hexcontact.result import journal, trials
 from hexcontact.result.layout import Metadata
-from hexcontact.study.collect import STUDY_VERSION
+from hexcontact.study.dataset import STUDY_VERSION
 from hexcontact.variables import SCHEMA_VERSION
 
 ROOT = Path(__file__).parents[2]

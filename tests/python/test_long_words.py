@@ -26,7 +26,7 @@ from hexcontact.deck.series import read_series
 from hexcontact.deck.surfaces import SHAPES
 from hexcontact.deck.tables import Deck
 from hexcontact.deck.write import starter
-from hexcontact.study.tables import StudyFile
+from hexcontact.study.study_file import StudyFile
 
 PACKAGE = Path(hexcontact.__file__).parent
 METHODS = ("match", "fullmatch", "search", "sub", "split", "findall", "finditer")

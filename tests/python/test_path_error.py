@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexcontact import Case
-from hexcontact.cli.tables import Summary
+from hexcontact.cli.printed import Summary
 from hexcontact.problem import plausibility
 
 P, MU, RADIUS = 20.0, 0.3, 10e-3

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import types
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,7 +42,7 @@ from hexcontact.study.backend import BACKENDS, KEYS, Backend
 from hexcontact.study.backends.processes import LocalPool
 from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
-from hexcontact.study.tables import StudyFile
+from hexcontact.study.study_file import StudyFile
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -105,12 +106,12 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Solve cases in this process, which is quicker; return the list of those that were solved."""
     solved: list[str] = []
 
-    def outcomes(self: Any, jobs: Any, cancel: Any) -> Any:
+    def outcomes(pool: Any, jobs: Any, cancel: Any) -> Any:
         for job in jobs:
             solved.append(job.hash)
             yield solve_case(job)
 
-    monkeypatch.setattr(LocalPool, "outcomes", outcomes)
+    monkeypatch.setattr(study_module, "outcomes", outcomes)
     return solved
 
 
@@ -718,12 +719,11 @@ def test_a_new_backend_has_its_key_and_runs_the_cases(folder: Path, monkeypatch:
         def __init__(self, settings: int, cases: int) -> None:
             self.said = settings, cases
 
-        def outcomes(self, jobs: Any, cancel: Any) -> Any:
-            assert self.said == (3, len(jobs))
-            yield from map(solve_case, jobs)
-
-        def stop(self) -> None:
-            pass
+        def submit(self, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
+            assert self.said == (3, 2)
+            future: Future[Any] = Future()
+            future.set_result(work(*args, **options))
+            return future
 
     file = extended(StudyFile, {"here": backend_registry.KEYS["here"]})
     monkeypatch.setattr(study_module, "StudyFile", file)

@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hexcontact.cli.verify import Check
-
+from .frame import Check
 from .reference import Comparison, reference
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from hexcontact.cli.verify import HEADERS, Check, Comparison, Row, cells_of
+from validation.frame import HEADERS, Check, Comparison, Row, cells_of
 
 PAGE = Path(__file__).parents[2] / "docs/validation.md"
 COLUMNS = ("check", *HEADERS[:-1], "against", "result")

@@ -14,10 +14,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hexcontact import DeckError
-from hexcontact.cli import verify
-from hexcontact.cli.verify import Check, Comparison
-from validation import page
+from validation import frame, page
 from validation.checks import CHECKS
+from validation.frame import Check, Comparison
 
 
 def main() -> int:
@@ -31,12 +30,12 @@ def main() -> int:
     words = parser.parse_args()
 
     def output(check: Check, found: Comparison) -> None:
-        verify.show(check, found)
+        frame.show(check, found)
         if words.write:
             page.write(check, found, CHECKS)
 
     try:
-        return verify.main(words.names, checks=CHECKS, output=output, listing=words.list)
+        return frame.main(words.names, checks=CHECKS, output=output, listing=words.list)
     except DeckError as error:
         parser.error(str(error))
 

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from ..arrays import Array
 from ..text import scaled, worded
-from .fatigue import LEVELS, colored_values, map_of, mark_worst, section_of
-from .lines import draw_tables
+from .below import LEVELS, colored_values, draw_tables, map_of, mark_worst, section_of
 from .registry import figure
 from .style import new_figure, set_title
 

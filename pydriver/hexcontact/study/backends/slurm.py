@@ -64,17 +64,7 @@ class JobArray:
         self.in_a_task = self.options.pop(_CASES, None)
 
     def script(self, numbers: Sequence[int], path: Path, output: Path, retry: bool) -> str:
-        """Return the script.
-
-        Parameters
-        ----------
-        numbers : sequence of int
-            The cases to run.
-        path, output : Path
-            The study file, and the file of its result.
-        retry : bool
-            Also run cases that would fail again.
-        """
+        """Return the script that runs some cases; `retry` includes those that would fail again."""
         if not numbers:
             return "#!/bin/sh\n# no case is missing"
         files = [str(path.resolve()), os.path.abspath(output)]

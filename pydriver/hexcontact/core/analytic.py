@@ -17,20 +17,7 @@ axisymmetric = _core.hc_f2py_axisymmetric
 def at_points(
     procedure: Callable[..., Any], contact: tuple[float, ...], points: Sequence[Array], *others: float
 ) -> Array:
-    """Evaluate a contact at points; the result has the shape of one value, then that of the points.
-
-    Parameters
-    ----------
-    procedure : callable
-        One of `flat`, a function of the components of a contact, the coordinates of points, and other
-        numbers.
-    contact : tuple of float
-        Components of the contact.
-    points : sequence of ndarray
-        Coordinates; their shapes broadcast.
-    *others : float
-        Other numbers.
-    """
+    """Evaluate a contact at points; the result has the shape of one value, then that of the points."""
     points = np.broadcast_arrays(*points)
     shape, size = points[0].shape, points[0].size
     # f2py takes no empty arrays

@@ -56,15 +56,7 @@ class Handle:
 
 
 class HeldState:
-    """A state in the memory of the core, which is freed with the last array that is a view of it.
-
-    Parameters
-    ----------
-    handle : int
-        Handle of the state.
-    shape : tuple of int
-        Rows and columns of its window.
-    """
+    """A state in the memory of the core, which is freed with the last array that is a view of it."""
 
     def __init__(self, handle: int, shape: tuple[int, int]) -> None:
         self.handle, self._shape = handle, shape

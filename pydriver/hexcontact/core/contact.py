@@ -405,21 +405,7 @@ def memory_needed(
     part: Literal["problem", "operator", "set-up of the operator"] = "problem",
     threads: int = 1,
 ) -> int:
-    """Return the memory (bytes) of a frictionless problem on a window.
-
-    Parameters
-    ----------
-    method
-        ``"direct"`` or ``"fft"``.
-    n_row, n_col
-        Rows and columns of the window.
-    contact
-        Nodes in contact; default: all.
-    part
-        The whole problem; the full 3x3 flexibility operator; or the additional memory of its set-up.
-    threads
-        Number of threads.
-    """
+    """Return the memory (bytes) of a frictionless problem on a window."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
     return int(_api.memory_needed(*window, code, thread_count(threads)))

@@ -33,41 +33,12 @@ _Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; w
 def tractions_memory(
     n_row: int, n_col: int, contact: int, sheared: bool, unlike: bool, threads: int = 0
 ) -> int:
-    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns.
-
-    Parameters
-    ----------
-    n_row, n_col : int
-        Rows and columns of the window.
-    contact : int
-        Nodes in contact.
-    sheared : bool
-        Whether the shear tractions change.
-    unlike : bool
-        Whether the materials are dissimilar.
-    threads : int
-        Number of threads; 0: as many as OpenMP would take.
-    """
+    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns."""
     return int(_api.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
 
 
 class Edge(NamedTuple):
-    """An area of the plane whose edge runs between the nodes.
-
-    Parameters
-    ----------
-    area : float
-        Its area, m^2.
-    radius : float
-        Radius (m) of the disc with the same area.
-    length : float
-        Length of the edge, m.
-    segments : ndarray, shape (n, 2, 2)
-        Unordered pieces of the edge, each from a point to a point (m); none where the zone ends at nodes that
-        cannot touch.
-    ellipse : Ellipse
-        Ellipse with the second moments of the area; of an elliptic area it is the edge.
-    """
+    """An area of the plane whose edge runs between the nodes."""
 
     area: float
     radius: float
@@ -77,17 +48,7 @@ class Edge(NamedTuple):
 
 
 class ZoneMesh(NamedTuple):
-    """Triangles that fill an area of the plane up to its edge between the nodes, and a field there.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Corners, m.
-    values : ndarray, shape (n,)
-        The field there.
-    triangles : ndarray of int, shape (m, 3)
-        Corners of each triangle, counterclockwise.
-    """
+    """Triangles that fill an area of the plane up to its edge between the nodes, and a field there."""
 
     x: Array
     y: Array
@@ -167,24 +128,7 @@ class TractionField:
 
 
 class ContactEdges:
-    """The edges of a contact and of the stick area in it.
-
-    Parameters
-    ----------
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    gap : ndarray, shape (n_row, n_col)
-        Gap, m; that of nodes that cannot touch has no effect.
-    contact : ndarray of bool, shape (n_row, n_col)
-        Nodes in contact.
-    candidate : ndarray of bool, shape (n_row, n_col)
-        Nodes that can touch. Where a contact ends at others, as at the rim of a punch, its pressure does not
-        vanish, and its edge is that of the cells of its nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the (equilateral) lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
-    """
+    """The edges of a contact and of the stick area in it."""
 
     def __init__(
         self,
@@ -203,27 +147,11 @@ class ContactEdges:
         return self._edge(self._whole())
 
     def stick(self, stick: Mask, reserve: Array) -> Edge:
-        """Return the part of the contact area that sticks.
-
-        Parameters
-        ----------
-        stick : ndarray of bool, shape (n_row, n_col)
-            Nodes that stick, all in contact.
-        reserve : ndarray, shape (n_row, n_col)
-            Reserve of friction beyond the shear traction, mu p - |q| (Pa), at these nodes.
-        """
+        """Return the part of the contact area that sticks."""
         return self._edge(self._zone(stick, reserve, True))
 
     def contact_mesh(self, field: Array, vanishes: bool) -> ZoneMesh:
-        """Return a mesh of the contact area, with a field up to its edge.
-
-        Parameters
-        ----------
-        field : ndarray, shape (n_row, n_col)
-            Values at the nodes in contact.
-        vanishes : bool
-            Whether it is zero at the edge, like tractions; else it is linear from the nodes inside.
-        """
+        """Return a mesh of the contact area, with a field up to its edge."""
         return self._mesh(self._whole(), field, vanishes)
 
     def stick_mesh(self, stick: Mask, reserve: Array) -> ZoneMesh:
@@ -241,18 +169,7 @@ class ContactEdges:
     def field(
         self, shear: Array | None = None, stick: Mask | None = None, limits: Limits | None = None
     ) -> TractionField:
-        """Return pressure and shear traction between the nodes, to the edges.
-
-        Parameters
-        ----------
-        shear : ndarray, shape (2, n_row, n_col), optional
-            Shear traction along x and y, Pa.
-        stick : ndarray of bool, shape (n_row, n_col), optional
-            Nodes that stick, all in contact.
-        limits : tuple of array_like, optional
-            Finite coefficient of friction, and bound of the shear traction (Pa); by default they are unknown,
-            and the shear traction is linear between the nodes.
-        """
+        """Return pressure and shear traction between the nodes, to the edges."""
         part = self._around_contact()
         limited = not (shear is None or stick is None or limits is None)
         count = _LIMITED if limited else _UNLIMITED
@@ -282,24 +199,7 @@ class ContactEdges:
         return rows, cols
 
     def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
-        """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.
-
-        Parameters
-        ----------
-        shear : ndarray, shape (2, n_row, n_col)
-            Shear traction along x and y, Pa.
-        stick : ndarray of bool, shape (n_row, n_col)
-            Nodes that stick, all in contact.
-        friction : ndarray, shape (n_row, n_col)
-            Coefficient of friction; unless it is positive and finite, the shear traction does not change.
-        pair : ElasticPair
-            The two bodies.
-
-        Returns
-        -------
-        ndarray, shape (3, n_row, n_col)
-            With the loads of the nodal tractions, Pa. Nodes next to the edge but outside carry small values.
-        """
+        """Return pressure and shear tractions corrected at the edges of the contact and of the stick area."""
         pressure, gap = self._fields
         _, zones, _ = self._zone(stick, gap, True)
         given = np.stack([pressure, *shear]).T
@@ -318,29 +218,7 @@ class ContactEdges:
         poisson_ratio: float,
         points: Array,
     ) -> tuple[Array, float]:
-        """Return the stress (Pa) that hats of the corrected tractions miss next to the edges.
-
-        Parameters
-        ----------
-        shear, stick, friction
-            As of `tractions`.
-        corrected : ndarray, shape (3, n_row, n_col)
-            What that returned, Pa.
-        body : int
-            1 or 2.
-        poisson_ratio : float
-            Its Poisson's ratio.
-        points : ndarray, shape (n, 3)
-            x, y and depth below the surface of the body, m.
-
-        Returns
-        -------
-        ndarray, shape (n, 6)
-            Components xx, yy, zz, xy, yz, xz.
-        float
-            Share of the edge of the contact near the points where the pressure does not vanish like a root,
-            so that nothing is corrected.
-        """
+        """Return the stress (Pa) that hats of the corrected tractions miss next to the edges."""
         pressure, gap = self._fields
         _, zones, _ = self._zone(stick, gap, True)
         given = np.stack([pressure, *shear]).T

@@ -19,19 +19,7 @@ _api = _core.hc_f2py_measures
 
 @dataclass(frozen=True)
 class CircleFit:
-    """Circle through the boundary nodes, equations (9.1)-(9.4).
-
-    Parameters
-    ----------
-    radius : float
-        a, mean of the radii r_i = |X_i - X_0| + l_e/2 of the boundary nodes: (9.1), (9.2).
-    mean_deviation : float
-        E_a = mean |r_i - a| / a (9.3).
-    standard_deviation : float
-        sigma = sqrt(mean (r_i - a)^2) / a (9.4).
-    count : int
-        Number of boundary nodes.
-    """
+    """Circle through the boundary nodes, equations (9.1)-(9.4)."""
 
     radius: float
     mean_deviation: float
@@ -56,23 +44,7 @@ def boundary(zone: Mask) -> Mask:
 def boundary_circle(
     x: Array, y: Array, zone: Mask, spacing: float, center: tuple[float, float] = (0.0, 0.0)
 ) -> CircleFit:
-    """Fit a circle to the boundary nodes of a zone as in (9.1)-(9.4).
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    zone : ndarray of bool, shape (n_row, n_col)
-        Nodes of the zone; not empty.
-    spacing : float
-        l_e, m.
-    center : tuple of float
-        X_0, m.
-
-    Returns
-    -------
-    CircleFit
-    """
+    """Fit a circle to the boundary nodes of a zone as in (9.1)-(9.4)."""
     numbers, count = _api.circle_of_zone(x.T, y.T, zone.T, spacing, center)
     radius, mean, standard = numbers.tolist()
     return CircleFit(radius, mean, standard, count)
@@ -91,22 +63,6 @@ def edge_radius(
     Near the edge p^2 is linear in r^2 (p grows like the square root of the distance). A straight line through
     the nodes with a_A - 6 l_e <= r <= a_A - l_e gives the zero; the outermost nodes, which carry most of the
     discretization error, are left out. a_A is the area-equivalent radius.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    spacing : float
-        l_e, m.
-    center : tuple of float
-        Center of the contact, m.
-
-    Returns
-    -------
-    float
-        Radius, m; nan if fewer than three nodes are in the band.
     """
     return float(_api.radius_of_pressure(x.T, y.T, pressure.T, spacing, center))
 
@@ -118,19 +74,7 @@ def pressure_center(x: Array, y: Array, pressure: Array) -> tuple[float, float]:
 
 
 def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
-    """Return the ellipse with the second moments of the nodes of a zone (variance a^2/4 along a).
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    zone : ndarray of bool, shape (n_row, n_col)
-        Nodes of the zone; not empty.
-
-    Returns
-    -------
-    Ellipse
-    """
+    """Return the ellipse with the second moments of the nodes of a zone (variance a^2/4 along a)."""
     return _ellipse(_api.ellipse_of_zone(x.T, y.T, zone.T))
 
 
@@ -139,24 +83,6 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
 
     The square of the pressure is a quadratic polynomial near the edge; it is fitted to the nodes between
     1 - 6 l_e/b and 1 - l_e/b of the way from the center to the moment ellipse with the minor semi-axis b.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    spacing : float
-        l_e, m.
-
-    Returns
-    -------
-    Ellipse
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than six nodes to fit, or the fit is no ellipse.
     """
     return _ellipse(called(_api.ellipse_of_pressure, x.T, y.T, pressure.T, spacing))
 
@@ -168,22 +94,6 @@ def limits_of_error(
 
     A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted: docs/theory/error_bars.md,
     (A1) to (A3).
-
-    Parameters
-    ----------
-    spacings : ndarray, (n,)
-        Spacings in units of the first.
-    values : ndarray, (n, m)
-        m quantities, on each of the lattices.
-    rough : ndarray of bool, (m,), optional
-        Quantities that depend on a few nodes at the edge of a zone: an order of 1/2 is possible, too.
-    unresolved : ndarray of bool, (m,), optional
-        Quantities that depend on a slip zone narrower than the lattice resolves: still slower orders are.
-
-    Returns
-    -------
-    ndarray, (m,)
-        Bounds that hardly any error exceeds; NaN for NaN.
     """
     rough, unresolved = (
         np.zeros(values.shape[1], dtype=bool) if mask is None else mask for mask in (rough, unresolved)
@@ -194,17 +104,7 @@ def limits_of_error(
 def unresolved_slip_zones(
     spacing: float, contact_area: Array, stick_area: Array, max_traction: Array, max_pressure: Array
 ) -> Mask:
-    """Test whether the slip zones of load steps are narrower than the lattice resolves.
-
-    Parameters
-    ----------
-    spacing : float
-        Spacing (m).
-    contact_area, stick_area : ndarray, (n,)
-        Areas to the edge between the nodes (m2).
-    max_traction, max_pressure : ndarray, (n,)
-        Largest shear tractions and pressures (Pa).
-    """
+    """Test whether the slip zones of load steps are narrower than the lattice resolves."""
     areas, tractions = (contact_area, stick_area), (max_traction, max_pressure)
     return np.asarray(called(_api.unresolved_slip_zones, spacing, *areas, *tractions)) != 0
 
@@ -214,24 +114,7 @@ LATTICE_ERRORS = ("max_pressure", "contact_area", "stick_area", "dissipated_ener
 
 
 def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> tuple[Array, float]:
-    """Estimate the largest relative errors of a lattice; docs/theory/expected_errors.md, (X1), (X2).
-
-    Parameters
-    ----------
-    spacings : float
-        Spacings in the radius.
-    load_ratio : float
-        Tangential load Q/mu P; 0: nothing slips.
-    goal : float
-        Target of the error.
-
-    Returns
-    -------
-    errors : ndarray, (4,)
-        Of `LATTICE_ERRORS`.
-    needed : float
-        Spacings for the goal.
-    """
+    """Estimate the largest relative errors of a lattice; docs/theory/expected_errors.md, (X1), (X2)."""
     errors, needed = _core.hc_f2py_steps.errors_of_lattice(spacings, load_ratio, goal)
     return np.asarray(errors), float(needed)
 
@@ -239,24 +122,7 @@ def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> 
 def expected_entry_error(
     before: Array, after: Array, stick: float, load_ratio: float | None, goal: float
 ) -> tuple[float, float, float]:
-    """Estimate the error of the shear tractions by nodes that enter a growing contact, (X3)-(X5).
-
-    Parameters
-    ----------
-    before, after : ndarray, (n,)
-        Contact radius (m) before and after each of the load steps in which it grows.
-    stick : float
-        mu/abs(beta); 0: the materials are alike.
-    load_ratio : float or None
-        Q/mu P of a tangential load that grows at the same time.
-    goal : float
-        Target of the error.
-
-    Returns
-    -------
-    error, steps, needed : float
-        The error as a share of all shear tractions; effective number of steps; number for the goal.
-    """
+    """Estimate the error of the shear tractions by nodes that enter a growing contact, (X3)-(X5)."""
     ratio = -1.0 if load_ratio is None else load_ratio
     steps, error, needed = _core.hc_f2py_steps.errors_of_entry(
         before, after, min(stick, np.finfo(float).max), ratio, goal
@@ -265,19 +131,7 @@ def expected_entry_error(
 
 
 def expected_turning_error(shear: Array) -> float:
-    """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6).
-
-    Parameters
-    ----------
-    shear : ndarray, (n, 3)
-        Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each
-        load step.
-
-    Returns
-    -------
-    float
-        The error as a share of the energy.
-    """
+    """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6)."""
     return float(_core.hc_f2py_steps.error_of_turns(shear.T)) if len(shear) else 0.0
 
 

@@ -428,24 +428,6 @@ def memory_needed(
     unlike: bool = True,
     threads: int = 1,
 ) -> int:
-    """Return the memory (bytes) of a problem with friction on a window.
-
-    Parameters
-    ----------
-    method
-        ``"direct"`` or ``"fft"``.
-    n_row, n_col
-        Rows and columns of the window.
-    contact
-        Nodes in contact; default: all.
-    loads
-        Number of prescribed loads, 1 to 4; the other motions are prescribed.
-    coupled
-        Whether pressure and shear are coupled.
-    unlike
-        Whether the materials are dissimilar.
-    threads
-        Number of threads.
-    """
+    """Return the memory (bytes) of a problem with friction on a window."""
     window = window_size(method, n_row, n_col, contact)
     return int(_api.friction_memory_needed(*window, loads, coupled, unlike, thread_count(threads)))

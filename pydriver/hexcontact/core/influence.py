@@ -304,53 +304,19 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
 
 
 def load_potential(shape: str, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the integral of a load on a node over the distance of points, in spacings.
-
-    Parameters
-    ----------
-    shape : str
-        One of `LOAD_SHAPES`; each load has the volume sqrt(3)/2 of the unit pyramid.
-    x, y : array_like
-        Points relative to the node, in spacings.
-    """
+    """Return the integral of a load on a node over the distance of points, in spacings."""
     number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
     return _evaluate(_flat.potential_of_load, x, y, shape_number=number)
 
 
 def displacement_errors(shape: str, nodes_in_radius: float, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface.
-
-    Parameters
-    ----------
-    shape : str
-        One of `LOAD_SHAPES`.
-    nodes_in_radius : float
-        Spacings in the contact radius.
-    x, y : array_like
-        Points relative to the center, a node, in spacings.
-
-    Returns
-    -------
-    ndarray
-        Errors over the approach, in the common shape of the points.
-    """
+    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface."""
     number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
     return _evaluate(_flat.errors_of_displacement, x, y, shape_number=number, radius=nodes_in_radius)
 
 
 def pressure_errors(nodes_in_radius: float) -> tuple[float, float]:
-    """Return the largest errors of Hertz's pressure for r < 0.8 a: constant on cells, linear between nodes.
-
-    Parameters
-    ----------
-    nodes_in_radius : float
-        Spacings in the contact radius.
-
-    Returns
-    -------
-    tuple of float
-        Over the largest pressure.
-    """
+    """Return the largest errors of Hertz's pressure, r < 0.8 a: constant on cells, linear between nodes."""
     constant, linear = _flat.errors_of_pressure(nodes_in_radius).tolist()
     return constant, linear
 

@@ -56,19 +56,7 @@ def nearest(
 def section_ends(
     lattice: Lattice, pressure: Array, angle: float, through: Point | None
 ) -> tuple[Point, Point, float]:
-    """Return the ends of a line across a contact, and the distance of its zero from the first one (m).
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    angle : float
-        Direction from x, rad.
-    through : tuple of float, optional
-        A point of the line, m; default: the node next to the centroid of the pressure.
-    """
+    """Return the ends of a line across a contact, and the distance of its zero from the first one (m)."""
     where = lattice.basis.T, lattice.first, lattice.origin, pressure.T
     point = (0.0, 0.0) if through is None else through
     ends, zero = called(_flat.section_of_pressure, *where, angle, through is not None, point)

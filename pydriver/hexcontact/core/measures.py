@@ -53,21 +53,7 @@ def bulk_strain(
 def measures(
     lattice: Lattice, friction: FrictionLaw, initial_gap: Array, candidate: Mask, solution: NormalSolution
 ) -> dict[str, float]:
-    """Return the measures of a state in the load history, by the names of `hexcontact.variables`.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    friction : FrictionLaw
-        Friction at the nodes.
-    initial_gap : ndarray, shape (n_row, n_col)
-        Gap before loading, m; only that of nodes in contact has effect.
-    candidate : ndarray of bool, shape (n_row, n_col)
-        Nodes that can touch.
-    solution : NormalSolution
-        The state, with friction or without.
-    """
+    """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
     frictional = isinstance(solution, ContactState)
     numbers = called(
         _api.measures_of_state,
@@ -104,20 +90,7 @@ def _vectors(solution: NormalSolution, *names: str) -> Array:
 
 
 def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:
-    """Return the direction of the line on which tangential loads lie.
-
-    Parameters
-    ----------
-    load : ndarray, shape (2, n)
-        The loads, N.
-    least, aside : float
-        Largest size of no load, and largest distance from the line (N).
-
-    Returns
-    -------
-    tuple of float or None
-        A unit vector whose larger component is positive; None if there is no load, or no such line.
-    """
+    """Return the direction of the line on which tangential loads lie."""
     size = np.hypot(*load)
     largest = load[:, int(np.argmax(size))]
     if not size.max() > least:

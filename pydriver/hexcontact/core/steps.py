@@ -36,24 +36,7 @@ _TRACTIONS = ("pressure", "traction_x", "traction_y")
 
 
 class Change(NamedTuple):
-    """Changes by halving a load step.
-
-    Attributes
-    ----------
-    stick : float
-        Change of the stick area, as a share of the largest contact area.
-    traction : float
-        Change of the shear tractions, as a share of those at full slip.
-    added : float
-        The part of `traction` due to this load step.
-    lattice : float
-        Possible change of the stick area by rings of nodes that enter, for any steps; a share, too.
-    gain : float
-        Change of the stick area over that of the tractions, both as shares, during the second half.
-    spent, turned : float
-        Dissipated energy of the halves, and the part that is uncertain since the load turns in each, over the
-        area of a node (J/m2).
-    """
+    """Changes by halving a load step."""
 
     stick: float = 0.0
     traction: float = 0.0
@@ -71,22 +54,7 @@ def change_by_halving(
     states: Sequence[ContactState | None],
     area: float,
 ) -> Change:
-    """Compare the two solutions at the end of a load step.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window of all states.
-    candidate : ndarray of bool, (n_row, n_col)
-        Nodes that can touch.
-    friction : FrictionLaw
-        Friction at the nodes.
-    states : sequence of ContactState or None
-        The end of the path in whole steps, the middle and the end of that in halves, and both paths at the
-        beginning of the step (None before the first load).
-    area : float
-        Largest contact area of the history (m2).
-    """
+    """Compare the two solutions at the end of a load step."""
     fields = np.zeros((len(states), len(_FIELDS), *lattice.shape))
     zones = np.zeros((len(states), *lattice.shape), dtype=np.int32)
     for number, state in enumerate(states):
@@ -116,30 +84,7 @@ def is_shear_free(state: ContactState | None) -> bool:
 def worn(
     lattice: Lattice, friction: FrictionLaw, coefficient: float, energy: Array, cycles: float, depth: Array
 ) -> tuple[Array, float, float]:
-    """Wear the surfaces by cycles that are all alike: docs/theory/wear.md, (V3).
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    friction : FrictionLaw
-        Friction at the nodes.
-    coefficient : float
-        Coefficient of wear of both bodies together (m2/N).
-    energy : ndarray, (n_row, n_col)
-        Energy that friction dissipates in a cycle, by area (J/m2).
-    cycles : float
-        Number of cycles.
-    depth : ndarray, (n_row, n_col)
-        Worn depth before (m).
-
-    Returns
-    -------
-    depth : ndarray, (n_row, n_col)
-        Worn depth after (m).
-    volume, deepest : float
-        Worn volume (m3), largest worn depth (m).
-    """
+    """Wear the surfaces by cycles that are all alike: docs/theory/wear.md, (V3)."""
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
     found = _wear.wear_of_cycles(energy.T, coefficient, mu.T, cycles, lattice.cell_area, depth.T)
     return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
@@ -148,22 +93,7 @@ def worn(
 def wear_left(
     friction: FrictionLaw, energies: Sequence[Array], before: ContactState, after: ContactState
 ) -> float:
-    """Bound the change of the wear of a cycle by further repetitions: docs/theory/wear.md, (V9).
-
-    Parameters
-    ----------
-    friction : FrictionLaw
-        Friction at the nodes.
-    energies : sequence of ndarray, (n_row, n_col)
-        Energy that friction dissipates in each of the last cycles, at most three, by area (J/m2).
-    before, after : ContactState
-        Beginning and end of the last cycle.
-
-    Returns
-    -------
-    float
-        Share of the largest wear of a node.
-    """
+    """Bound the change of the wear of a cycle by further repetitions: docs/theory/wear.md, (V9)."""
     mu = np.broadcast_to(friction.coefficient, after.pressure.shape)
     tractions = np.array([[state.traction_x, state.traction_y] for state in (before, after)])
     return float(_wear.wear_left_open(np.array(energies).T, tractions.T, after.pressure.T, mu.T))
@@ -172,24 +102,7 @@ def wear_left(
 def expected_end(
     last: Array, ahead: float, before: Array | None = None, pressure: Array | None = None
 ) -> tuple[Array, Array]:
-    """Expect the end of a load step of the next cycle of wear, to start it from.
-
-    Parameters
-    ----------
-    last : ndarray of float32, (2, 3, n_row, n_col)
-        Tractions when the load step was solved last (Pa), and their rates by cycle.
-    ahead : float
-        Cycles since then.
-    before, pressure : ndarray, (n_row, n_col)
-        Pressure that was expected at the end of the load step before, and that at its end (Pa).
-
-    Returns
-    -------
-    tractions : ndarray, (3, n_row, n_col)
-        Pressure and tractions along x and y (Pa).
-    expected : ndarray of float32, (n_row, n_col)
-        The pressure without the correction by the load step before.
-    """
+    """Expect the end of a load step of the next cycle of wear, to start it from."""
     shape = last.shape[2:]
     follows = before is not None and pressure is not None
     expected: Array = np.zeros(shape, np.float32) if before is None else before.copy()
@@ -223,25 +136,7 @@ def energy_of_jump(
     cycles: float,
     tolerance: float,
 ) -> Array:
-    """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V4).
-
-    Parameters
-    ----------
-    lattice, friction, coefficient
-        As of `worn`.
-    pair, interface, candidate
-        Elastic constants, compliance of the interface, nodes that can touch.
-    cycle : tuple of ndarray, (n_row, n_col)
-        Energy that friction dissipates in the cycle before the jump, by area (J/m2), and path of slip (m).
-    state : ContactState
-        End of that cycle.
-    by_load : bool
-        The normal load is prescribed, not the approach.
-    cycles : float
-        Cycles of the jump.
-    tolerance : float
-        Bound of the residual of the pressure.
-    """
+    """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V4)."""
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
     fields = *cycle, state.pressure, np.where(candidate, state.gap, 0.0)
     ahead = called(
@@ -263,32 +158,7 @@ def change_by_jump(
     cycles: float,
     max_pressure: float,
 ) -> tuple[Change, Array, Array]:
-    """Compare two jumps with one of both: docs/theory/wear.md, (V5) and (V6).
-
-    Parameters
-    ----------
-    lattice, friction, coefficient
-        As of `worn`.
-    pair : ElasticPair
-        Elastic constants.
-    energies : tuple of ndarray, (n_row, n_col)
-        Energies by which the first jump wears, the second one, and one that is as long as both (J/m2).
-    path : ndarray, (n_row, n_col)
-        Path of slip of the cycle between the two (m).
-    cycles : float
-        Cycles of each jump.
-    max_pressure : float
-        Largest pressure (Pa).
-
-    Returns
-    -------
-    change : Change
-        For `StepControl`; its tolerance is that of the worn depth over the indentation of a node.
-    slower : ndarray, (n_row, n_col)
-        By how much the two wear more (m).
-    second : ndarray, (n_row, n_col)
-        Energy by which the second jump wears, corrected (J/m2).
-    """
+    """Compare two jumps with one of both: docs/theory/wear.md, (V5) and (V6)."""
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
     change, slower, second = called(
         _wear.change_by_jump,
@@ -316,13 +186,7 @@ class Attempt:
 
 
 class StepControl:
-    """Control of load steps: the size of the next one, and the changes by the last ones.
-
-    Parameters
-    ----------
-    least : float
-        Smallest load step, as a part of its segment.
-    """
+    """Control of load steps: the size of the next one, and the changes by the last ones."""
 
     def __init__(self, least: float = LEAST) -> None:
         self._numbers = np.array([1.0, 0.5, *[0.0] * 6])

@@ -11,6 +11,5 @@ hc_f2py_measures: Any
 hc_f2py_edges: Any
 hc_f2py_steps: Any
 hc_f2py_wear: Any
-hc_f2py_analytic: Any
-hc_f2py_axisymmetric: Any
 hc_f2py_fatigue: Any
+hc_flat: Any

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, Mask, integer, number, reals, word
 from ..errors import DeckError, RimWarning, warn
 from . import _core
-from .calls import Handle, called
+from .calls import called
+from .handles import Handle
 from .lattice import Lattice
 
 _api = _core.hc_f2py_normal

@@ -15,7 +15,7 @@ from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
 from . import _core
-from .calls import SLIP, HeldState, called
+from .calls import called
 from .contact import (
     UNILATERAL,
     Contact,
@@ -33,6 +33,7 @@ from .contact import (
     why_stopped,
     window_size,
 )
+from .handles import SLIP, HeldState
 from .lattice import Lattice
 
 _api = _core.hc_f2py_friction

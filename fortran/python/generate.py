@@ -1,19 +1,16 @@
-#!/usr/bin/env python3
 """Write flat Fortran procedures for f2py, and the Python functions that call them, from the rows of a table.
 
-    generate.py procedures.toml flat.f90 flat.py
-
-A row of the table,
+Its arguments are the table, the Fortran file and the Python file. A row,
 
     [procedures.mindlin_traction]
     does = "Compute the shear traction between spheres under a first tangential load."
-    takes = "mindlin spheres; r(*) [m]; load [N]"
+    takes = "Mindlin spheres; r(*) [m]; load [N]"
     gives = "traction(*) [Pa]"
     calls = "traction = spheres%traction(r, load)"
 
 becomes a Fortran procedure, whose arguments f2py can wrap and of which it counts the points,
 
-    subroutine mindlin_traction(n_any, spheres_numbers, r, load, traction)
+    subroutine mindlin_traction(spheres_numbers, r, load, n_any, traction)
       ... declarations ...
       spheres%friction_coefficient = spheres_numbers(1)   ! and so on: numbers of a record, by name
       traction = spheres%traction(r, load)
@@ -23,6 +20,7 @@ and a Python function `mindlin_traction(spheres, r, load)` with this sentence an
 
 An argument is `kind name(shape) [unit] = default`. The kind is real (if left out), int, long, single, flag
 (with a shape a mask), text, a record of [records], or one of [kinds]: an object of several flat arguments.
+The default of a number of a record is its component in Fortran, if this has another name.
 Python has the axes of Fortran in reverse order; `*` stands for points of any shape. An array that is taken
 and given changes in place; a record that is given under the name of an object is read from it. A procedure
 with an `error` ends with a status, which becomes an exception. `gil = true` holds the interpreter's lock.
@@ -32,18 +30,12 @@ import re
 import sys
 import textwrap
 import tomllib
+from collections import namedtuple
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-DECLARED = {
-    "real": "real(c_double)",
-    "int": "integer(c_int)",
-    "long": "integer(c_int64_t)",
-    "single": "real(c_float)",
-    "flag": "integer(c_int)",
-    "text": "character(len=*)",
-}
-ZERO = {"real": "0.0_c_double", "text": "''"}
+DECLARED = {"real": "real(c_double)", "int": "integer(c_int)", "flag": "integer(c_int)"}
+DECLARED |= {"long": "integer(c_int64_t)", "single": "real(c_float)", "text": "character(len=*)"}
 # A number of a record: from the array, into it, and its Python type.
 NUMBER = {
     "real": ("{}", "{}", "float"),
@@ -51,16 +43,7 @@ NUMBER = {
     "flag": ("{} > 0.5_c_double", "merge(1.0_c_double, 0.0_c_double, {})", "bool"),
 }
 ARGUMENT = re.compile(r"(?:(\w+) )?(\w+)(?:\((.*?)\))?(?: \[(.*)\])?(?: = (.*))?", re.DOTALL)
-
-
-class Argument(NamedTuple):
-    """An argument of a procedure, or a number of a record."""
-
-    kind: str
-    name: str
-    shape: list[str]
-    unit: str
-    default: str
+Argument = namedtuple("Argument", "kind name shape unit default")
 
 
 def parsed(text: str) -> list[Argument]:
@@ -73,51 +56,57 @@ def parsed(text: str) -> list[Argument]:
     return found
 
 
-def listed(start: str, words: list[str], end: str) -> str:
-    """Return a list of words over lines of Fortran."""
-    return " &\n".join(textwrap.wrap(f"{start}{', '.join(words)}{end}", 118, subsequent_indent="    "))
+def listed(text: str) -> str:
+    """Return a statement over lines of Fortran."""
+    return " &\n".join(textwrap.wrap(text, 118, subsequent_indent="    "))
 
 
-def class_of(kind: str) -> str:
-    """Return the name of the Python class of a record."""
-    return kind.title().replace("_", "")
+def kind_of(name: str, record: dict[str, str]) -> dict[str, Any]:
+    """Return a record as a kind of object, which one array of numbers makes."""
+    numbers = [(NUMBER[n.kind], f"{{0}}%{n.default or n.name}") for n in parsed(record["numbers"])]
+    made = (
+        f"{place} = {kind[0].format(f'{{0}}_numbers({k})')}" for k, (kind, place) in enumerate(numbers, 1)
+    )
+    return {
+        "flat": f"numbers({len(numbers)})",
+        "python": f"[getattr({{0}}, name) for name in {name}._fields]",
+        "local": f"type({record['type']}) :: {{0}}",
+        "set": "\n".join(made),
+        "found": f"{{0}}_found = [{', '.join(kind[1].format(place) for kind, place in numbers)}]",
+    }
 
 
 class Procedure:
     """A row of the table."""
 
-    def __init__(self, name: str, row: dict[str, Any], table: dict[str, Any]) -> None:
-        self.name, self.row = name, row
-        self.records, self.kinds = table["records"], table["kinds"]
+    def __init__(self, name: str, row: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> None:
+        self.name, self.row, self.kinds = name, row, kinds
         self.takes, gives = parsed(row.get("takes", "")), parsed(row.get("gives", ""))
-        taken = {argument.name for argument in self.takes}
-        self.changed = {g.name for g in gives if g.name in taken and g.kind not in self.records}
+        taken = [argument.name for argument in self.takes]
+        self.changed = [given.name for given in gives if given.name in taken and given.kind in DECLARED]
         self.gives = [given for given in gives if given.name not in self.changed]
-        self.counts = {
-            name: text.format(argument.name)
-            for argument in self.takes
-            for name, text in self.kinds.get(argument.kind, {}).get("counts", {}).items()
-        }
-        sets = [self.kinds[taken.kind]["set"] for taken in self.takes if taken.kind in self.kinds]
-        self.guarded = any("error" in text for text in sets)
+        # objects before those that have to be left again
+        self.objects = [argument for argument in self.takes if argument.kind in kinds]
+        self.objects.sort(key=lambda argument: "after" in kinds[argument.kind])
+        counts = [kinds[a.kind]["counts"].format(a.name) for a in self.objects if "counts" in kinds[a.kind]]
+        self.counts = counts[-1] if counts else ""
+        self.guarded = any(re.search(r"\berror\b", kinds[argument.kind]["set"]) for argument in self.objects)
         self.fails = self.guarded or bool(re.search(r"\berror\b", row["calls"]))
 
-    def flat(self, argument: Argument, ending: str) -> list[Argument]:
+    def flat(self, argument: Argument, given: bool = False) -> list[Argument]:
         """Return what stands for an argument in the flat procedure."""
-        if argument.kind in self.records:
-            size = len(parsed(self.records[argument.kind]["numbers"]))
-            return [Argument("real", argument.name + ending, [f"{size}"], "", "")]
-        parts = parsed(self.kinds[argument.kind]["flat"]) if argument.kind in self.kinds else []
-        return [part._replace(name=f"{argument.name}_{part.name}") for part in parts] or [argument]
+        if argument.kind in DECLARED:
+            return [argument]
+        parts = parsed(self.kinds[argument.kind]["flat"])
+        return [part._replace(name=f"{argument.name}_{'found' if given else part.name}") for part in parts]
 
     def fortran(self) -> str:
         """Return the flat procedure."""
-        takes = [part for argument in self.takes for part in self.flat(argument, "_numbers")]
-        gives = [part for argument in self.gives for part in self.flat(argument, "_found")]
-        known = {part.name for part in takes if not part.shape}
-        axes = [axis for part in takes for axis in part.shape if not axis.isdecimal() and axis not in known]
-        counts = dict.fromkeys([*self.counts, *axes])
-        takes = [Argument("int", name, [], "-", "") for name in counts] + takes
+        takes = [part for argument in self.takes for part in self.flat(argument)]
+        gives = [part for argument in self.gives for part in self.flat(argument, given=True)]
+        axes = [axis for part in takes for axis in part.shape if not axis.isdecimal()]
+        counts = dict.fromkeys([*re.findall(r"(\w+)=", self.counts), *axes])
+        takes += [Argument("int", name, [], "-", "") for name in counts]
         lines = [] if self.row.get("gil") else ["!f2py threadsafe"]
         for part in sorted(takes + gives, key=lambda part: part.kind != "int" or bool(part.shape)):
             intent = "inout" if part.name in self.changed else "in" if part in takes else "out"
@@ -129,39 +118,34 @@ class Procedure:
             names += ["code", "message"]
             lines += ["integer(c_int), intent(out) :: code", "character(len=512), intent(out) :: message"]
             lines += ["type(error_t), allocatable :: error"]
-        objects = {argument.name: argument.kind for argument in [*self.gives, *self.takes]}
+        objects = {a.name: a.kind for a in [*self.gives, *self.takes] if a.kind in self.kinds}
         for name, kind in objects.items():
-            lines += [f"type({self.records[kind]['type']}) :: {name}"] if kind in self.records else []
-            lines += self.kinds[kind]["local"].format(name).splitlines() if kind in self.kinds else []
-        lines += [*self.row.get("local", "").splitlines(), "", *self.statements(gives)]
-        text = textwrap.indent("\n".join(lines), "    ")
-        return listed(f"  subroutine {self.name}(", names, ")") + f"\n{text}\n  end subroutine {self.name}\n"
+            lines += self.kinds[kind]["local"].format(name).strip().splitlines()
+        lines += [*self.row.get("local", "").strip().splitlines(), "", *self.statements(gives)]
+        head, text = (
+            f"  subroutine {self.name}({', '.join(names)})",
+            textwrap.indent("\n".join(lines), "    "),
+        )
+        return f"{listed(head)}\n{text}\n  end subroutine {self.name}\n"
 
     def statements(self, gives: list[Argument]) -> list[str]:
         """Return the body: objects from their arguments, calls, records to numbers, status."""
-        lines = [f"{part.name} = {ZERO.get(part.kind, '0')}" for part in gives if self.fails]
-        calls, after = self.row["calls"].strip(), []
-        for argument in self.takes:
-            name, kind = argument.name, self.kinds.get(argument.kind, {})
-            for place, (number, component) in enumerate(self.numbers(argument), 1):
-                lines.append(f"{component} = {NUMBER[number.kind][0].format(f'{name}_numbers({place})')}")
-            for line in kind.get("set", "").format(name).splitlines():
-                lines.append(f"if (.not. allocated(error)) {line}" if "error" in line else line)
-            after += kind.get("after", "").format(name).splitlines()
-            calls = re.sub(rf"\b{name}\b", f"({name} /= 0)", calls) if argument.kind == "flag" else calls
-        for argument in self.gives:
-            found = [NUMBER[n.kind][1].format(component) for n, component in self.numbers(argument)]
-            after = [*([listed(f"{argument.name}_found = [", found, "]")] if found else []), *after]
-        inner = "\n".join([*calls.splitlines(), *after])
+        lines = [f"{part.name} = 0" for part in gives if self.fails]
+        records = (argument for argument in self.gives if argument.kind in self.kinds)
+        after = [listed(self.kinds[given.kind]["found"].format(given.name)) for given in records]
+        for argument in self.objects:
+            kind = self.kinds[argument.kind]
+            for line in kind["set"].format(argument.name).strip().splitlines():
+                can_fail = line.startswith("call ") and "error" in line
+                lines.append(f"if (.not. allocated(error)) {line}" if can_fail else line)
+            after += [kind["after"].format(argument.name)] if "after" in kind else []
+        calls = self.row["calls"].strip()
+        for flag in (argument.name for argument in self.takes if argument.kind == "flag"):
+            calls = re.sub(rf"\b{flag}\b(?! *=[^=])", f"({flag} /= 0)", calls)
+        inner = "\n".join([*map(listed, calls.splitlines()), *after])
         if self.guarded:
             inner = f"if (.not. allocated(error)) then\n{textwrap.indent(inner, '  ')}\nend if"
         return [*lines, inner, *(["call report(error, code, message)"] if self.fails else [])]
-
-    def numbers(self, argument: Argument) -> list[tuple[Argument, str]]:
-        """Return the numbers of a record with their components in Fortran, by default of the same name."""
-        record = self.records.get(argument.kind, {"numbers": ""})
-        named = record.get("components", {})
-        return [(n, f"{argument.name}%{named.get(n.name, n.name)}") for n in parsed(record["numbers"])]
 
     def python(self) -> str:
         """Return the function that calls the flat procedure."""
@@ -169,15 +153,12 @@ class Procedure:
         lines = [f"points, {', '.join(points)} = flattened({', '.join(points.values())})"] if points else []
         passed = [f"_flat.{self.name}"] if self.fails else []
         for argument in self.takes:
-            name, kind = argument.name, argument.kind
-            if kind in self.records:
-                passed.append(f"[getattr({name}, name) for name in {class_of(kind)}._fields]")
-            elif kind in self.kinds:
-                passed.append(self.kinds[kind]["python"].format(name))
-            else:
-                turned = len(argument.shape) > 1 and name not in points
-                passed.append(f"np.asarray({name}).T" if turned else name)
-        passed += [f"{name}={count}" for name, count in self.counts.items()]
+            name, kind = argument.name, self.kinds.get(argument.kind)
+            turned = len(argument.shape) > 1 and name not in points
+            lines += [kind["prepare"].format(name)] if kind and "prepare" in kind else []
+            value = f"np.asarray({name}).T" if turned else name
+            passed.append(kind["python"].format(name) if kind else value)
+        passed += [self.counts] if self.counts else []
         call = f"{'called' if self.fails else f'_flat.{self.name}'}({', '.join(passed)})"
         results = ", ".join(f"{given.name}_" for given in self.gives)
         lines.append(f"{results} = {call}" if results else call)
@@ -190,8 +171,8 @@ class Procedure:
     def returned(self, given: Argument) -> str:
         """Return what the function makes of a result."""
         name = f"{given.name}_"
-        if given.kind in self.records:
-            return f"record({class_of(given.kind)}, {name})"
+        if given.kind in self.kinds:
+            return f"record({given.kind}, {name})"
         name += ".decode(errors='replace').strip()" * (given.kind == "text") + ".T" * (len(given.shape) > 1)
         name = f"shaped({given.name}_, points)" if "n_any" in given.shape else name
         return f"{name} != 0" if given.kind == "flag" else name
@@ -200,21 +181,22 @@ class Procedure:
 def main(source: str, fortran: str, python: str) -> None:
     """Write both files."""
     table = tomllib.loads(Path(source).read_text())
-    rows = [Procedure(name, row, table) for name, row in table["procedures"].items()]
+    kinds = table["kinds"] | {name: kind_of(name, record) for name, record in table["records"].items()}
+    rows = [Procedure(name, row, kinds) for name, row in table["procedures"].items()]
     text = ["module hc_flat\n  use iso_c_binding, only: c_double, c_float, c_int, c_int64_t"]
-    text += [listed(f"  use {module}, only: ", [names], "") for module, names in table["use"].items()]
+    text += [listed(f"  use {module}, only: {names}") for module, names in table["use"].items()]
     text += [
         "  implicit none\n  private",
-        listed("  public :: ", list(table["procedures"]), ""),
+        listed(f"  public :: {', '.join(table['procedures'])}"),
         "\ncontains\n",
     ]
     Path(fortran).write_text("\n".join([*text, *(row.fortran() for row in rows), "end module hc_flat\n"]))
     lines = ["from typing import NamedTuple\n\nimport numpy as np\n\nfrom . import _core"]
-    lines += ["from .calls import called, flattened, record, shaped\n\n_flat = _core.hc_flat"]
-    lines += ["LIBRARY = str(_core.__file__)\n"]
+    lines += ["from .calls import called, flattened, record, shaped\n"]
+    lines += ["_flat = _core.hc_flat\nLIBRARY = str(_core.__file__)\n"]
     for kind, row in table["records"].items():
         numbers = [f"    {n.name}: {NUMBER[n.kind][2]}  # [{n.unit}]" for n in parsed(row["numbers"])]
-        lines += [f'\nclass {class_of(kind)}(NamedTuple):\n    """{row["does"]}"""\n', *numbers, ""]
+        lines += [f'\nclass {kind}(NamedTuple):\n    """{row["does"]}"""\n', *numbers, ""]
     Path(python).write_text("\n".join(lines) + "".join(row.python() for row in rows))
 
 

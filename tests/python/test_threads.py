@@ -31,7 +31,7 @@ from hexcontact import (
     Step,
     open_result,
 )
-from hexcontact.core import contact, friction
+from hexcontact.core import flat
 from hexcontact.core.contact import ElasticPair, Method
 from hexcontact.deck.surfaces import Sphere
 from hexcontact.netcdf_library import LOCK
@@ -208,9 +208,9 @@ class Timed:
     def __getattr__(self, name: str) -> Callable[..., Any]:
         procedure = getattr(self.module, name)
 
-        def timed(*arguments: Any) -> Any:
+        def timed(*arguments: Any, **named: Any) -> Any:
             self.begun = time.perf_counter()
-            found = procedure(*arguments)
+            found = procedure(*arguments, **named)
             self.ended = time.perf_counter()
             return found
 
@@ -223,9 +223,8 @@ def test_python_goes_on_while_the_core_works(
 ) -> None:
     """Without a switch between its own instructions another thread runs only where the core lets go."""
     call = work()
-    module = friction if work is shear else contact
-    core = Timed(module._api)
-    monkeypatch.setattr(module, "_api", core)
+    core = Timed(flat._flat)
+    monkeypatch.setattr(flat, "_flat", core)
 
     def ticked_meanwhile() -> bool:
         call()

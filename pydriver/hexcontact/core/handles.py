@@ -5,20 +5,14 @@ from __future__ import annotations
 import ctypes
 import math
 import weakref
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
-from ..errors import DeckError, ResourceError
 from ..variables import CORE
-from . import _core, kernel_cache
-from .calls import called
-
-SLIP = ("slip_increment_x", "slip_increment_y")
-"""Fields of a step with friction, from which the next one does not start."""
+from . import flat, kernel_cache
 
 
 class Handle:
@@ -28,75 +22,66 @@ class Handle:
 
     def _create(self, procedure: Callable[..., int], *arguments: Any) -> None:
         kernel_cache.take_settings()
-        self._handle = called(procedure, *arguments)
-        weakref.finalize(self, _core.hc_f2py_normal.free_handle, self._handle)
+        self._handle = procedure(*arguments)
+        weakref.finalize(self, flat.free_object, self._handle)
         kernel_cache.warn_of_faults()
-
-    def _solve(self, procedure: Callable[..., Any], *arguments: Any, held: Any = None) -> Any:
-        """Call a solver; `held` makes an object of its first result, a handle, before any warning."""
-        try:
-            first, *others = called(procedure, self._handle, *arguments)
-            return [held(first) if held else first, *others]
-        finally:
-            kernel_cache.warn_of_faults()
 
 
 class HeldState:
     """A state in the memory of the core, which is freed with the last array that is a view of it."""
 
-    def __init__(self, handle: int, shape: tuple[int, int]) -> None:
-        self.handle, self._shape = handle, shape
-        self._places = dict(
-            zip(CORE["fields"], _core.hc_f2py_states.state_places(handle).tolist(), strict=True)
-        )
-        if not self._places["pressure"]:
-            raise DeckError("the handle is stale: its state has been freed")
-        self._recorded: tuple[Any, ...] = ()
+    def __init__(self, handle: int, shape: tuple[int, ...]) -> None:
+        self.handle, self.shape = handle, shape
         # at the end of the process arrays may still be in use
-        weakref.finalize(self, _core.hc_f2py_states.free_state, handle).atexit = False
+        weakref.finalize(self, flat.free_object, handle).atexit = False
+
+    @property
+    def held(self) -> HeldState:
+        """The state itself, where a solution may stand."""
+        return self
+
+    def view(self, name: str) -> NDArray[Any]:
+        """Return a field, which is no copy."""
+        number = ctypes.c_int if name == "zone" else ctypes.c_double
+        memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
+        memory.held = self
+        return np.frombuffer(memory, dtype=number).reshape(self.shape)
 
     @classmethod
-    def copied(cls, shape: tuple[int, int], fields: Sequence[Array], numbers: Sequence[float]) -> HeldState:
-        """Return a copy of a state: its fields but for the slip of the step, and its numbers."""
-        if handle := _core.hc_f2py_states.hold_state(shape[1], shape[0], *fields, numbers):
-            return cls(handle, shape)
-        raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
+    def copied(cls, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, float]) -> HeldState:
+        """Return a copy of a state."""
+        shape = fields["pressure"].shape
+        history = flat.History(**{name: numbers.get(name, 0.0) for name in CORE["numbers"]})
+        held = cls(flat.new_state(shape[1], shape[0], history), shape)
+        for name, field in fields.items():
+            held.view(name)[:] = field
+        return held
 
-    @staticmethod
-    def of(state: Any, numbers: list[float]) -> HeldState | None:
-        """Return what a state with these numbers is the record of, if a step starts from the same."""
-        view = getattr(state.pressure, "base", None)
-        held = getattr(getattr(view, "base", None), "held", None)
-        return held if isinstance(held, HeldState) and held._is_record(state, numbers) else None
 
-    def view(self, name: str) -> Array:
-        """Return a field, which is no copy."""
-        memory: Any = (ctypes.c_double * math.prod(self._shape)).from_address(self._places[name])
-        memory.held = self
-        return np.frombuffer(memory).reshape(self._shape)
+class Solved:
+    """A solution, and its state in the core, unless it was made or changed in Python."""
 
-    def take_zones(self) -> NDArray[np.int8]:
-        """Return the zones, which the core then forgets."""
-        zones: NDArray[Any] = _core.hc_f2py_states.take_zones(self.handle, math.prod(self._shape))
-        return zones.astype(np.int8).reshape(self._shape)
+    __slots__ = ("_held",)
 
-    def record(self, gap: Array, numbers: list[float]) -> None:
-        """Remember the recorded gap, which differs where nothing can touch, and numbers of the state."""
-        self._recorded = weakref.ref(gap), numbers
+    def behind(self, held: HeldState | None) -> Self:
+        """Return the solution with the state that it is the record of."""
+        object.__setattr__(self, "_held", held)
+        return self
 
-    def _is_record(self, state: Any, numbers: list[float]) -> bool:
-        if not self._recorded:
-            return False
-        gap, recorded = self._recorded
-        if gap() is not state.gap or numbers != recorded:
-            return False
-        # a copy where nothing can touch
-        if not (np.isnan(state.gap) | (state.gap == self.view("gap"))).all():
-            return False
-        names = (name for name in self._places if name != "gap" and name not in SLIP)
-        return all(self._is_view(name, getattr(state, name)) for name in names)
+    @property
+    def held(self) -> HeldState:
+        """Its state in the core, or a copy there."""
+        return self.copied() if self.known is None else self.known
 
-    def _is_view(self, name: str, values: Any) -> bool:
-        if not isinstance(values, np.ndarray) or values.shape != self._shape:
-            return False
-        return values.ctypes.data == self._places[name] and values.flags.c_contiguous
+    def copied(self) -> HeldState:
+        """Return a copy of its state in the core."""
+        names = [name for name in (*CORE["fields"], *CORE["zone"]) if name in vars(self)]
+        return HeldState.copied({name: vars(self)[name] for name in names}, vars(self))
+
+    @property
+    def known(self) -> HeldState | None:
+        """Its state in the core."""
+        return getattr(self, "_held", None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self)

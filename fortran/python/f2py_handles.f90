@@ -325,7 +325,7 @@ contains
     !> Status
     integer(c_int), intent(out) :: code
     !> Message of the error
-    character(len=*), intent(out) :: message
+    character(len=512), intent(out) :: message
 
     code = status%ok
     message = ''

@@ -63,16 +63,15 @@ def listed(text: str) -> str:
 
 def kind_of(name: str, record: dict[str, str]) -> dict[str, Any]:
     """Return a record as a kind of object, which one array of numbers makes."""
-    numbers = [(NUMBER[n.kind], f"{{0}}%{n.default or n.name}") for n in parsed(record["numbers"])]
-    made = (
-        f"{place} = {kind[0].format(f'{{0}}_numbers({k})')}" for k, (kind, place) in enumerate(numbers, 1)
-    )
+    parts = parsed(record["numbers"])
+    numbers = [(NUMBER[n.kind], f"{{0}}%{n.default or n.name}", k) for k, n in enumerate(parts, 1)]
+    made = [f"{place} = {kind[0].format(f'{{0}}_numbers({k})')}" for kind, place, k in numbers]
     return {
         "flat": f"numbers({len(numbers)})",
         "python": f"[getattr({{0}}, name) for name in {name}._fields]",
         "local": f"type({record['type']}) :: {{0}}",
         "set": "\n".join(made),
-        "found": f"{{0}}_found = [{', '.join(kind[1].format(place) for kind, place in numbers)}]",
+        "found": f"{{0}}_found = [{', '.join(kind[1].format(place) for kind, place, _ in numbers)}]",
     }
 
 
@@ -82,12 +81,12 @@ class Procedure:
     def __init__(self, name: str, row: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> None:
         self.name, self.row, self.kinds = name, row, kinds
         self.takes, gives = parsed(row.get("takes", "")), parsed(row.get("gives", ""))
-        taken = [argument.name for argument in self.takes]
-        self.changed = [given.name for given in gives if given.name in taken and given.kind in DECLARED]
+        names = {argument.name for argument in self.takes}
+        self.changed = {given.name for given in gives if given.name in names and given.kind in DECLARED}
         self.gives = [given for given in gives if given.name not in self.changed]
         # objects before those that have to be left again
-        self.objects = [argument for argument in self.takes if argument.kind in kinds]
-        self.objects.sort(key=lambda argument: "after" in kinds[argument.kind])
+        objects = (argument for argument in self.takes if argument.kind in kinds)
+        self.objects = sorted(objects, key=lambda argument: "after" in kinds[argument.kind])
         counts = [kinds[a.kind]["counts"].format(a.name) for a in self.objects if "counts" in kinds[a.kind]]
         self.counts = counts[-1] if counts else ""
         self.guarded = any(re.search(r"\berror\b", kinds[argument.kind]["set"]) for argument in self.objects)
@@ -113,9 +112,8 @@ class Procedure:
             kind = DECLARED[part.kind].replace("*", "*" if intent == "in" else "2048")
             shape = f"({', '.join(part.shape)})" if part.shape else ""
             lines.append(f"{kind}, intent({intent}) :: {part.name}{shape} ! [{part.unit}]")
-        names = [part.name for part in takes + gives]
+        names = [part.name for part in takes + gives] + ["code", "message"] * self.fails
         if self.fails:
-            names += ["code", "message"]
             lines += ["integer(c_int), intent(out) :: code", "character(len=512), intent(out) :: message"]
             lines += ["type(error_t), allocatable :: error"]
         objects = {a.name: a.kind for a in [*self.gives, *self.takes] if a.kind in self.kinds}
@@ -158,7 +156,7 @@ class Procedure:
             lines += [kind["prepare"].format(name)] if kind and "prepare" in kind else []
             value = f"np.asarray({name}).T" if turned else name
             passed.append(kind["python"].format(name) if kind else value)
-        passed += [self.counts] if self.counts else []
+        passed += filter(None, [self.counts])
         call = f"{'called' if self.fails else f'_flat.{self.name}'}({', '.join(passed)})"
         results = ", ".join(f"{given.name}_" for given in self.gives)
         lines.append(f"{results} = {call}" if results else call)
@@ -192,8 +190,8 @@ def main(source: str, fortran: str, python: str) -> None:
     ]
     Path(fortran).write_text("\n".join([*text, *(row.fortran() for row in rows), "end module hc_flat\n"]))
     lines = ["from typing import NamedTuple\n\nimport numpy as np\n\nfrom . import _core"]
-    lines += ["from .calls import called, flattened, record, shaped\n"]
-    lines += ["_flat = _core.hc_flat\nLIBRARY = str(_core.__file__)\n"]
+    lines += ["from .calls import called, flattened, record, shaped\n\n_flat = _core.hc_flat"]
+    lines += ["LIBRARY = str(_core.__file__)\n"]
     for kind, row in table["records"].items():
         numbers = [f"    {n.name}: {NUMBER[n.kind][2]}  # [{n.unit}]" for n in parsed(row["numbers"])]
         lines += [f'\nclass {kind}(NamedTuple):\n    """{row["does"]}"""\n', *numbers, ""]

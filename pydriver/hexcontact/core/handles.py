@@ -42,10 +42,10 @@ class HeldState:
 
     def view(self, name: str) -> NDArray[Any]:
         """Return a field, which is no copy."""
-        number = ctypes.c_int if name == "zone" else ctypes.c_double
+        number, kind = (ctypes.c_int, "i4") if name == "zone" else (ctypes.c_double, "f8")
         memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
         memory.held = self
-        return np.frombuffer(memory, dtype=number).reshape(self.shape)
+        return np.frombuffer(memory, dtype=kind).reshape(self.shape)
 
     @classmethod
     def copied(cls, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, float]) -> HeldState:

@@ -50,7 +50,7 @@ ifneq ($(shell PYTHON='$(PYTHON)' sh .ci/bootstrap.sh --venv-ok && echo ok),ok)
 endif
 
 build_files := pyproject.toml meson.build meson.options $(wildcard fortran/meson.build fortran/*/meson.build pydriver/meson.build)
-library_sources := $(wildcard fortran/*.f90 fortran/*/*.f90 fortran/*/*.c)
+library_sources := $(wildcard fortran/*.f90 fortran/*/*.f90 fortran/*/*.c fortran/*.py fortran/python/*.py fortran/python/*.toml)
 python_sources := $(shell find pydriver -type f ! -name '*.so' ! -name '*.pyc')
 fortran_tests := $(shell find tests/fortran tests/bench -type f ! -name '*.pyc' 2>/dev/null)
 sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)

@@ -21,11 +21,11 @@ from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
-from hexcontact.core import _core, calls, contact, friction, influence, memory
-from hexcontact.core.calls import HeldState
+from hexcontact.core import contact, flat, friction, handles, influence, memory
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.handles import HeldState
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
@@ -406,22 +406,21 @@ def test_a_state_behind_a_stale_handle_is_an_error(monkeypatch: pytest.MonkeyPat
     pair, gap = ElasticPair(1.0, 0.0, 1.0), 0.5 * (lattice.x**2 + lattice.y**2)
     problem = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
     for handle in (0, 1, 7, -5, 2**24, 2**24 + 3_000_000, 2**62):
-        with pytest.raises(DeckError, match="the handle is stale: its state has been freed"):
-            HeldState(handle, lattice.shape)
+        with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
+            HeldState(handle, lattice.shape).view("pressure")
     states = [problem._held(problem.virgin()) for _ in range(200)]
     assert len({state.handle for state in states}) == 200
     loads = ["force"] * 3 + ["displacement"], (0.003, 0.0, 0.0, 0.0)
     monkeypatch.setattr(problem, "_held", lambda state: states[0])
     assert problem.advance(problem.virgin(), *loads).converged
     for _ in range(2):  # a stale handle is ignored
-        _core.hc_f2py_states.free_state(states[0].handle)
-    assert not any(_core.hc_f2py_states.take_zones(states[0].handle, lattice.size))
+        flat.free_object(states[0].handle)
     other = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
     assert other.advance(other.virgin(), *loads).converged  # in the slot that is free again
     with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
         problem.advance(problem.virgin(), *loads)
     small = Lattice(0.1, -1, -1, 3, 3)
-    held = HeldState.copied(small.shape, [np.zeros(small.size)] * 8, [0.0] * 13)
+    held = HeldState.copied({"pressure": np.zeros(small.shape)}, {})
     monkeypatch.setattr(problem, "_held", lambda state: held)
     with pytest.raises(HexcontactError, match="stale"):
         problem.advance(problem.virgin(), *loads)
@@ -674,16 +673,17 @@ def test_a_warning_that_is_an_error_does_not_leave_a_state_behind(monkeypatch: p
     def fault() -> None:
         raise KernelFolderWarning("the folder is full")
 
-    held: list[weakref.ref[calls.HeldState]] = []
+    held: list[weakref.ref[HeldState]] = []
 
-    class Counted(calls.HeldState):
+    class Counted(HeldState):
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)
             held.append(weakref.ref(self))
 
     problem, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.3)
     monkeypatch.setattr(friction, "HeldState", Counted)
-    monkeypatch.setattr(calls.kernel_cache, "warn_of_faults", fault)
+    monkeypatch.setattr(contact, "HeldState", Counted)
+    monkeypatch.setattr(handles.kernel_cache, "warn_of_faults", fault)
     with pytest.raises(KernelFolderWarning):
         problem.advance(problem.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0])
     gc.collect()

@@ -18,6 +18,7 @@ from ..core.friction import ContactState
 from ..core.steps import (
     FAILED,
     LIMITED,
+    NO_CHANGE,
     REJECTED,
     Attempt,
     Change,
@@ -132,7 +133,7 @@ class AdaptivePath(GivenPath):
             attempt, taken, verdict = self._taken(state, target, begun)
             found = taken.change
             bound, traction_bound = self._size.accept(attempt, found, tolerance, verdict)
-            reached = dataclasses.replace(taken.halves, **self._work)
+            reached = taken.halves.recounted(**self._work)
             part = dataclasses.replace(self._numbered(target.until(attempt.end)), ramp=target.ramp)
             step = self.window.step(part, reached, self._before, started)
             contact = float(step.history["contact_area_fit"])
@@ -211,7 +212,7 @@ class AdaptivePath(GivenPath):
         if whole is None:
             return None
         if self._whole is None and is_shear_free(start) and is_shear_free(whole):
-            return _Solved(whole, whole, Change())  # no history, so that no halves are needed
+            return _Solved(whole, whole, NO_CHANGE)  # no history, so that no halves are needed
         half = self._advanced(start, target, begun, 0.5 * (self.fraction + end))
         halves = None if half is None else self._advanced(half, target, begun, end)
         if half is None or halves is None:

@@ -19,6 +19,8 @@ COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
 PERTURBED_BUILD := build/perturbed
 PERTURBED_SITE := build/perturbed-site
+FLANG := flang-22
+FLANG_BUILD := build/flang
 
 # Least share of lines that tests must reach, percent.
 COVERED_FORTRAN := 97
@@ -48,7 +50,7 @@ ifneq ($(shell PYTHON='$(PYTHON)' sh .ci/bootstrap.sh --venv-ok && echo ok),ok)
 endif
 
 build_files := pyproject.toml meson.build meson.options $(wildcard fortran/meson.build fortran/*/meson.build pydriver/meson.build)
-library_sources := $(wildcard fortran/*.f90 fortran/*/*.f90 fortran/*/*.c)
+library_sources := $(wildcard fortran/*.f90 fortran/*/*.f90 fortran/*/*.c fortran/*.py fortran/python/*.py fortran/python/*.toml)
 python_sources := $(shell find pydriver -type f ! -name '*.so' ! -name '*.pyc')
 fortran_tests := $(shell find tests/fortran tests/bench -type f ! -name '*.pyc' 2>/dev/null)
 sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
@@ -56,7 +58,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -101,10 +103,10 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 	cd output && hexcontact plot dissimilar_fretting.nc --what history
 	cd output && hexcontact report dissimilar_fretting.nc
 
-verify: install  ## compare with published, discrete and analytic solutions (minutes)
-	$(py) tests/validation/run.py $(CHECKS)
+verify: install  ## compare with published, discrete and analytic solutions; updates docs/validation.md and .csv (minutes)
+	$(py) tests/validation/run.py --write $(CHECKS)
 
-bench: install  ## work, times, memory, other codes side by side: tables of docs/performance.md and others (BENCH_ARGS=--quick: minutes)
+bench: install  ## work, times, memory, other codes side by side: docs/measurements.md and other pages (BENCH_ARGS=--quick: minutes)
 	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)
 
 # --- tests -------------------------------------------------------------------
@@ -135,6 +137,13 @@ debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extr
 	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) $(pytest) $(if $(filter debug-check,$@),$(CHECKED:%=tests/python/test_%.py))
 debug-test:  ## all tests on a build that checks bounds and traps NaN
 debug-check:  ## the tests of the solvers on that build (minutes)
+
+# With openmp=enabled, so that a build in one thread does not pass for one with threads.
+flang-check: $(STAMPS)/build-tools  ## Fortran unit tests on a build of LLVM's flang, which apt installs where it is missing
+	@sh .ci/bootstrap.sh --flang $(FLANG)
+	@echo "Building hexcontact with $(FLANG) ($(FLANG_BUILD))"
+	@[ -e $(FLANG_BUILD)/build.ninja ] || FC=$(FLANG) meson setup $(FLANG_BUILD) -Dopenmp=enabled -Dwarning_level=0
+	@meson test -C $(FLANG_BUILD) --print-errorlogs --timeout-multiplier 5
 
 perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
 	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"

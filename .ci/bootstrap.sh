@@ -4,6 +4,7 @@
 # possible without a question, and creates the virtual environment .venv.
 #
 #   sh .ci/bootstrap.sh            check, install what is missing, create .venv
+#   sh .ci/bootstrap.sh --flang flang-22  the same, with that flang and its OpenMP
 #   sh .ci/bootstrap.sh --venv-ok  say nothing; succeed if .venv is usable
 #
 # PYTHON=/path/to/python3.12  uses that interpreter
@@ -13,6 +14,8 @@ set -u
 cd "$(dirname "$0")/.." || exit 1
 
 oldest_python='3.11'
+flang=''
+[ "${1:-}" != --flang ] || flang=$2
 venv="$PWD/.venv"
 # A new environment must not be made with the interpreter of the old one.
 PATH=$(printf '%s' "$PATH" | sed "s|$venv/bin:||g")
@@ -121,6 +124,7 @@ look_around() {
   python=$(find_python) || python=''
   compiles_c || need 'a C compiler' 'gcc libc6-dev'
   compiles_fortran || need 'a Fortran compiler' 'gfortran'
+  [ -z "$flang" ] || FC=$flang compiles_fortran -fopenmp || need "$flang with OpenMP" "$flang libomp-${flang##*-}-dev"
   pkgconfig --version >/dev/null || need 'pkg-config' 'pkg-config'
   links openblas || links lapack blas || need 'OpenBLAS (or LAPACK and BLAS)' 'libopenblas-dev'
   links fftw3 fftw3f || need 'FFTW 3' 'libfftw3-dev'

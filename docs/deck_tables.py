@@ -1,13 +1,13 @@
-"""Fill the tables of docs/deck.md and docs/studies.md from the models: they say what the program checks.
+"""Fill the tables of keys, limits and variables in docs/ from the models and tables of the program.
 
-Run it after a change of the deck format: ``python docs/deck_tables.py``.
+Run it after a change of the deck format or of `VARIABLES`: ``python docs/deck_tables.py``.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,16 @@ from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Severa
 from hexcontact.deck.table_base import Table, expectation, kind_of
 from hexcontact.problem import plausibility
 from hexcontact.study.backends.dask import Dask
-from hexcontact.study.tables import Parameter, StudyFile
+from hexcontact.study.study_file import Parameter, StudyFile
 from hexcontact.text import shown
+from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 
-PAGE = Path(__file__).with_name("deck.md")
-PAGES = (PAGE, PAGE.with_name("studies.md"), PAGE.with_name("theory") / "expected_errors.md")
+PAGE = Path(__file__).with_name("keys.md")
+PAGES = (
+    PAGE,
+    PAGE.with_name("variables.md"),
+    PAGE.with_name("theory") / "expected_errors.md",
+)
 TABLES: dict[str, type[Table]] = {
     "deck": deck_keys.Deck,
     "body": deck_keys.Body,
@@ -137,11 +142,31 @@ def limits() -> str:
     return "\n".join(lines) + "\n"
 
 
+def variables(belongs: Callable[[str, Variable], bool]) -> str:
+    lines = [row(("name", "unit", "meaning")), "|---|---|---|"]
+    for name, variable in VARIABLES.items():
+        if belongs(name, variable) and name not in OF_EACH:
+            lines.append(row((f"`{name}`", variable.units or "–", variable.long_name)))
+    return "\n".join(lines) + "\n"
+
+
+COORDINATES = ("step", "row", "col", "x", "y")
+OF_EACH = {word.format(name) for name in ESTIMATED for word in ("{}_error", "trial_{}")}
+OTHERS: dict[str, Callable[[], str]] = {
+    "shapes": shapes,
+    "limits": limits,
+    "coordinates": lambda: variables(lambda name, _: name in COORDINATES),
+    "fields": lambda: variables(lambda name, v: len(v.dims) > 1 and name not in COORDINATES),
+    "history": lambda: variables(lambda name, v: v.dims == ("step",) and name not in COORDINATES),
+    "trials": lambda: variables(lambda _, v: v.dims == ("trial",)),
+}
+
+
 def filled(text: str) -> str:
     """Return the page with its tables as the models have them now."""
 
     def fill(block: re.Match[str]) -> str:
-        other = {"shapes": shapes, "limits": limits}.get(block[2])
+        other = OTHERS.get(block[2])
         return block[1] + (other() if other else keys_of(TABLES[block[2]])) + block[3]
 
     return BLOCK.sub(fill, text)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-SECONDS, TOGETHER = 0.3, 0.6
+SECONDS, TOGETHER = 0.2, 0.4
 ROOT = Path(__file__).parents[1]
 TIMES, LIST = ROOT / "build/times.json", ROOT / "tests/check.txt"
 

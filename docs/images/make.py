@@ -4,6 +4,7 @@ import contextlib
 import functools
 import os
 import re
+import runpy
 import shlex
 import tempfile
 from collections.abc import Callable
@@ -20,7 +21,6 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, Result, plotting
 from hexcontact.cli.app import app
-from hexcontact.plotting.registry import entries
 
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"
@@ -147,11 +147,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "interface": stiffening_interface,
     "path_dependence": path_dependence,
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
-    **{
-        name.replace("-", "_"): figure.draw
-        for name, figure in entries().items()
-        if not (figure.of_a_result or figure.needs)
-    },
+    **runpy.run_path(str(HERE / "influence.py"))["FIGURES"],
 }
 
 
@@ -170,6 +166,8 @@ COARSER = {
 }
 HEADER = """\
 # Gallery
+
+Made by `python docs/images/make.py`; do not edit.
 
 The decks of `cases/`, each with its picture; [a table](cases.md) lists what they are compared with.
 """

@@ -40,7 +40,7 @@ def drawn_arrows() -> Arrows:
             a, b = rooms[user], rooms[used]
             if a != b and not {a, b} & UNSEEN and f"{user} -> {used}" not in exceptions:
                 between.add((f"{language}.{a}", f"{language}.{b}"))
-            if used.endswith("._core"):
+            if used.endswith(".core.flat"):
                 between.add((f"{language}.{a}", "fortran.python"))
     return {(a, b) for a, b in between if b not in reached(a, between - {(a, b)})}
 

@@ -335,8 +335,6 @@ contains
     real(wp), intent(in) :: x
     real(wp) :: value
 
-    associate (unused => self)
-    end associate
     value = (2.0_wp*sinh(x) - atan(sinh(x)))*sinh(x)*cosh(x)
   end function rounded_load_integrand
 

@@ -119,8 +119,6 @@ contains
     real(wp), intent(in) :: x
     real(wp) :: value
 
-    associate (unused => self)
-    end associate
     value = 2.0_wp*x**5*twist_factor(x**2)
   end function slip_torque
 

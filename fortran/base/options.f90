@@ -6,7 +6,7 @@
 !> Beside their formulas stand numbers that only guard against overflow and dependent equations, those that define a residual,
 !> the ranges of series in elasticity/, on which the spectra in a cache depend to the bit, and sizes of blocks that fit a cache.
 module hc_options
-  use hc_precision, only: wp
+  use hc_precision, only: wp, pi
   implicit none
   private
 
@@ -35,6 +35,9 @@ module hc_options
     !> Motions that are tried for the least load factor of (F14), and the relative gain below which no more are
     integer :: max_limit_motions = 100
     real(wp) :: least_limit_gain = 1.0e-9_wp
+  contains
+    !> The parameter of a classification
+    procedure :: classification_parameter
   end type contact_options_t
 
   !> Frictionless contact on FFTs (docs/theory/normal_contact.md, "FFT method").
@@ -100,8 +103,8 @@ module hc_options
     !> Compliance of the spring of a slipping node, over that of the node, below which its component across is left as a start
     real(wp) :: soft_spring = 8.0_wp
     !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
-    !> there the zones are far from those of the solution
-    real(wp) :: cautious_share = 0.2_wp
+    !> there the zones are far from those of the solution. 1 takes a little less work, 3 fails for beta = -0.3 and mu = 0.8
+    real(wp) :: cautious_share = 0.6_wp
     !> Sweeps after which the classification parameter is halved and a whole step taken again; how small its factor gets
     integer :: sweeps_per_cut = 10
     real(wp) :: least_share_of_r = 1.0e-3_wp
@@ -368,5 +371,18 @@ module hc_options
     type(cycle_options_t) :: cycles
     type(accuracy_options_t) :: accuracy
   end type options_t
+
+contains
+
+  !> Compute kappa/(2 pi lambda a) for a contact of an area pi a^2, (F8) [Pa/m].
+  pure real(wp) function classification_parameter(self, lambda, area) result(r)
+    class(contact_options_t), intent(in) :: self
+    !> Constant of the displacement, lambda_1 along the normal [1/Pa]
+    real(wp), intent(in) :: lambda
+    !> Area of the contact [m^2]
+    real(wp), intent(in) :: area
+
+    r = self%classification_scale/(2.0_wp*pi*lambda*sqrt(area/pi))
+  end function classification_parameter
 
 end module hc_options

@@ -320,8 +320,8 @@ contains
     !> Nodes in contact
     integer, intent(in) :: n_contact
 
-    r = self%options%contact%classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
-                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+    r = self%options%contact%classification_parameter(self%pair%lambda_1 + self%pair%lambda_5, &
+                                                      self%lattice%cell_area()*max(n_contact, 1))
     r = r/(1.0_wp + r*self%pair%tangential_layer)
   end function classification_parameter
 
@@ -331,8 +331,7 @@ contains
     !> Nodes in contact
     integer, intent(in) :: n_contact
 
-    r = self%options%contact%classification_scale/(2.0_wp*pi*self%pair%lambda_1 &
-                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+    r = self%options%contact%classification_parameter(self%pair%lambda_1, self%lattice%cell_area()*max(n_contact, 1))
   end function normal_classification_parameter
 
   !> Compute the compliance beyond which a spring of a compliant law has no effect [m/Pa].
@@ -341,7 +340,7 @@ contains
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
 
-    softest_spring = self%options%contact%softest_layer*self%sprung_compliance(p_max)
+    softest_spring = self%normal_law%softest_spring(self%options%contact%softest_layer, self%normal_compliance, p_max)
   end function softest_spring
 
   !> Compute the compliance of a node along the normal, with that of the layer under the largest pressure [m/Pa].

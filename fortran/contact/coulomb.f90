@@ -72,10 +72,8 @@ contains
 
     sound = self%no_slip .or. ieee_is_finite(self%coefficient)
     if (sound .and. .not. self%no_slip) sound = self%coefficient >= 0.0_wp
-    associate (same_everywhere => lattice)
-      if (sound) return
-      call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
-    end associate
+    if (sound) return
+    call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
   end subroutine check
 
   !> Return mu; infinite without slip.
@@ -83,10 +81,8 @@ contains
     class(coulomb_t), intent(in) :: self
     real(wp), intent(in) :: p_max
 
-    associate (under_any => p_max)
-      strength = huge(1.0_wp)
-      if (.not. self%no_slip) strength = self%coefficient
-    end associate
+    strength = huge(1.0_wp)
+    if (.not. self%no_slip) strength = self%coefficient
   end function strength_of_disc
 
   !> Compute mu p of a row; without slip there is no bound.
@@ -98,15 +94,13 @@ contains
 
     integer :: i
 
-    associate (same_everywhere => first)
-      if (self%no_slip) then
-        bound = huge(1.0_wp)
-      else
-        do i = 1, size(p)
-          bound(i) = self%coefficient*max(p(i), 0.0_wp)
-        end do
-      end if
-    end associate
+    if (self%no_slip) then
+      bound = huge(1.0_wp)
+    else
+      do i = 1, size(p)
+        bound(i) = self%coefficient*max(p(i), 0.0_wp)
+      end do
+    end if
   end subroutine find_bounds
 
   !> Return mu at each node of a row.
@@ -116,9 +110,7 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out), contiguous :: bound(:)
 
-    associate (same_everywhere => first, linear_in => p)
-      bound = self%slope()
-    end associate
+    bound = self%slope()
   end subroutine find_slopes
 
   !> Return mu and the pressures of a row.
@@ -129,10 +121,8 @@ contains
     real(wp), intent(out) :: slope
     real(wp), intent(out), contiguous :: pressed(:)
 
-    associate (same_everywhere => first)
-      slope = self%slope()
-      pressed = p
-    end associate
+    slope = self%slope()
+    pressed = p
   end subroutine find_disc
 
 end module hc_coulomb

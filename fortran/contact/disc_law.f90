@@ -28,7 +28,7 @@ module hc_disc_law
   implicit none
   private
 
-  public :: disc_law_t, linearize, on_cone, normal_to, magnitude, residual_row, zone_row, cone_row
+  public :: disc_law_t, normal_to, residual_row, zone_row, cone_row
 
   !> Squares below this count as nothing
   real(wp), parameter :: nothing = 1.0e-200_wp
@@ -81,9 +81,7 @@ contains
     class(disc_law_t), intent(in) :: self
     real(wp) :: stretches(2)
 
-    associate (disc => self)
-      stretches = 1.0_wp
-    end associate
+    stretches = 1.0_wp
   end function stretches
 
   !> Compute the largest traction over the largest pressure: the longer semi-axis of an ellipse.
@@ -247,59 +245,6 @@ contains
       compliance(i) = 0.0_wp
     end do
   end subroutine linearize_disc
-
-  !> Classify a node in contact, and linearise the law if it slips.
-  pure subroutine linearize(traction, slip_increment, bound, largest_bound, r, zone, direction, compliance)
-    !> Traction q [Pa] and change of the relative displacement ds [m] of the last iterate
-    real(wp), intent(in) :: traction(2), slip_increment(2)
-    !> Radius b(p) at the node and its largest value anywhere [Pa]
-    real(wp), intent(in) :: bound, largest_bound
-    !> Parameter r [Pa/m]
-    real(wp), intent(in) :: r
-    !> stick or slip
-    integer, intent(out) :: zone
-    !> Direction e of the traction in slip; (1, 0) in stick
-    real(wp), intent(out) :: direction(2)
-    !> Compliance D across that direction [m/Pa]; 0 in stick
-    real(wp), intent(out) :: compliance
-    real(wp) :: unit, d(1)
-    integer :: found(1)
-
-    unit = 1.0_wp
-    if (largest_bound > 0.0_wp) unit = 1.0_wp/min(largest_bound, widest**2)
-    call linearize_disc(1, unit, [bound], largest_bound, r, [.true.], traction(1:1), traction(2:2), slip_increment(1:1), &
-                        slip_increment(2:2), found, direction, d)
-    zone = found(1)
-    compliance = d(1)
-  end subroutine linearize
-
-  !> Project a traction on the disc of radius b(p).
-  pure function on_cone(traction, bound) result(projected)
-    !> Traction [Pa]
-    real(wp), intent(in) :: traction(2)
-    !> Radius b(p) [Pa]
-    real(wp), intent(in) :: bound
-    real(wp) :: projected(2), length
-
-    projected = traction
-    length = magnitude(traction)
-    if (length > bound) projected = traction*(bound/length)
-  end function on_cone
-
-  !> Compute the length of a vector: by squares where they neither overflow nor vanish, which is much faster than `hypot`.
-  pure real(wp) function magnitude(vector)
-    !> The vector
-    real(wp), intent(in) :: vector(2)
-    real(wp), parameter :: least = 1.0e-140_wp, largest = 1.0e140_wp
-    real(wp) :: longer
-
-    longer = max(abs(vector(1)), abs(vector(2)))
-    if (longer > least .and. longer < largest) then
-      magnitude = sqrt(vector(1)**2 + vector(2)**2)
-    else
-      magnitude = hypot(vector(1), vector(2))
-    end if
-  end function magnitude
 
   !> Return the unit vector t, a quarter turn ahead of e.
   pure function normal_to(direction) result(t)

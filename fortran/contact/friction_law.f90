@@ -170,9 +170,7 @@ contains
   pure logical function is_isotropic(self)
     class(friction_law_t), intent(in) :: self
 
-    associate (any => self)
-      is_isotropic = .true.
-    end associate
+    is_isotropic = .true.
   end function is_isotropic
 
   !> Return the symmetric matrix A with determinant 1 that makes the admissible set of a disc.
@@ -180,9 +178,7 @@ contains
     class(friction_law_t), intent(in) :: self
     real(wp) :: matrix(2, 2)
 
-    associate (any => self)
-      matrix = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-    end associate
+    matrix = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
   end function stretch
 
   !> Compute |A^-1 q| of a row [Pa].
@@ -229,9 +225,7 @@ contains
     !> The law there
     class(friction_law_t), allocatable, intent(out) :: law
 
-    associate (same_everywhere => self, here => from, there => onto)
-      allocate (law, source=self)
-    end associate
+    allocate (law, source=self)
   end subroutine on_lattice
 
 end module hc_friction_law

@@ -69,7 +69,7 @@ contains
       !$omp end parallel do
       n_contact = max(nint(sum(nodes)), 1)
       ! nothing turns a single node
-      self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
+      self%motion = pack([along_x, along_y, about_z], control(along_x:about_z) == force_control .and. &
                          [.true., .true., n_contact > 1])
       if (sum(nodes) > 0.0_wp) then
         middle = [sum(columns), dot_product(nodes, [(real(row, wp), row=1, size(nodes))])]/n_contact + lattice%first - 1

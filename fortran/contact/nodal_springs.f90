@@ -41,7 +41,7 @@ contains
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)
 
-    associate (scale => r, pressure => p, opening => gap, springs => self%spring(first:first + size(p) - 1))
+    associate (springs => self%spring(first:first + size(p) - 1))
       compliance = merge(min(springs, softest), 0.0_wp, contact)
       offset = 0.0_wp
     end associate

@@ -32,6 +32,8 @@ module hc_normal_law
     procedure(law_check), deferred :: check
     !> Compliance of the layer under a pressure
     procedure(law_compliance), deferred :: compliance_under
+    !> Compliance beyond which a spring has no effect
+    procedure, non_overridable :: softest_spring
     !> Springs of the linearised law
     procedure(law_linearize), deferred :: linearize
     !> Find the nodes in contact by p - r g
@@ -111,13 +113,20 @@ module hc_normal_law
 
 contains
 
+  !> Compute the compliance beyond which a spring has no effect [m/Pa].
+  pure real(wp) function softest_spring(self, softest_layer, compliance, p_max)
+    class(normal_law_t), intent(in) :: self
+    !> The spring over a node with the layer under the largest pressure; compliance of a node [m/Pa]; largest pressure [Pa]
+    real(wp), intent(in) :: softest_layer, compliance, p_max
+
+    softest_spring = softest_layer*(compliance + self%compliance_under(p_max))
+  end function softest_spring
+
   !> Return false: there is no layer.
   pure logical function unilateral_is_compliant(self) result(is_compliant)
     class(unilateral_t), intent(in) :: self
 
-    associate (law => self)
-      is_compliant = .false.
-    end associate
+    is_compliant = .false.
   end function unilateral_is_compliant
 
   !> Accept: there are no numbers.
@@ -125,8 +134,6 @@ contains
     class(unilateral_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
 
-    associate (law => self)
-    end associate
   end subroutine unilateral_check
 
   !> Return 0: there is no layer.
@@ -134,9 +141,7 @@ contains
     class(unilateral_t), intent(in) :: self
     real(wp), intent(in) :: pressure
 
-    associate (law => self, under_any => pressure)
-      compliance = 0.0_wp
-    end associate
+    compliance = 0.0_wp
   end function unilateral_compliance
 
   !> Return springs of no compliance.
@@ -148,10 +153,8 @@ contains
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)
 
-    associate (law => self, same_everywhere => first, scale => r, bound => softest, pressure => p, opening => gap, nodes => contact)
-      compliance = 0.0_wp
-      offset = 0.0_wp
-    end associate
+    compliance = 0.0_wp
+    offset = 0.0_wp
   end subroutine unilateral_linearize
 
   !> Find the nodes in contact: those with p - r g > 0, whatever the law.
@@ -192,12 +195,10 @@ contains
     integer :: i
 
     stiffness = 1.0_wp/compliance
-    associate (law => self, same_everywhere => first)
-      !$omp simd reduction(max: worst)
-      do i = 1, size(p)
-        worst = max(worst, abs(min(p(i), stiffness*gap(i)))*merge(1.0_wp, 0.0_wp, candidate(i)))
-      end do
-    end associate
+    !$omp simd reduction(max: worst)
+    do i = 1, size(p)
+      worst = max(worst, abs(min(p(i), stiffness*gap(i)))*merge(1.0_wp, 0.0_wp, candidate(i)))
+    end do
   end subroutine unilateral_violation
 
 end module hc_normal_law

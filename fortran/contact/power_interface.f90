@@ -80,9 +80,7 @@ contains
   pure logical function is_compliant(self)
     class(power_interface_t), intent(in) :: self
 
-    associate (law => self)
-      is_compliant = .true.
-    end associate
+    is_compliant = .true.
   end function is_compliant
 
   !> Refuse a coefficient that is not positive and an exponent below 1.
@@ -119,22 +117,20 @@ contains
     real(wp) :: penetration, pressure
     integer :: i
 
-    associate (same_everywhere => first)
-      do i = 1, size(p)
-        compliance(i) = 0.0_wp
-        offset(i) = 0.0_wp
-        if (.not. contact(i)) cycle
-        compliance(i) = softest
-        pressure = least_share*abs(p(i))
-        if (p(i) - r*gap(i) > 0.0_wp) then
-          pressure = max(pressure, self%pressure_under(self%shared_penetration(r, p(i) - r*gap(i))))
-        end if
-        if (.not. pressure > 0.0_wp) cycle
-        penetration = self%compression(pressure)
-        if (pressure*softest*self%exponent > penetration) compliance(i) = penetration/(self%exponent*pressure)
-        offset(i) = penetration - compliance(i)*pressure
-      end do
-    end associate
+    do i = 1, size(p)
+      compliance(i) = 0.0_wp
+      offset(i) = 0.0_wp
+      if (.not. contact(i)) cycle
+      compliance(i) = softest
+      pressure = least_share*abs(p(i))
+      if (p(i) - r*gap(i) > 0.0_wp) then
+        pressure = max(pressure, self%pressure_under(self%shared_penetration(r, p(i) - r*gap(i))))
+      end if
+      if (.not. pressure > 0.0_wp) cycle
+      penetration = self%compression(pressure)
+      if (pressure*softest*self%exponent > penetration) compliance(i) = penetration/(self%exponent*pressure)
+      offset(i) = penetration - compliance(i)*pressure
+    end do
   end subroutine linearize
 
   !> Measure |p - c psi_+^m|, or |g + sigma(p)|/d_n where the layer is stiffer than a node: for c -> infinity |min(p, g/d_n)|.
@@ -148,19 +144,17 @@ contains
     real(wp) :: wrong
     integer :: i
 
-    associate (same_everywhere => first)
-      do i = 1, size(p)
-        if (.not. candidate(i)) cycle
-        wrong = abs(p(i) - self%pressure_under(-gap(i)))
-        if (.not. wrong > worst) cycle
-        if (p(i) >= 0.0_wp) then
-          wrong = min(wrong, abs(gap(i) + self%compression(p(i)))/compliance)
-        else
-          wrong = min(wrong, max(-p(i), -gap(i)/compliance))
-        end if
-        worst = max(worst, wrong)
-      end do
-    end associate
+    do i = 1, size(p)
+      if (.not. candidate(i)) cycle
+      wrong = abs(p(i) - self%pressure_under(-gap(i)))
+      if (.not. wrong > worst) cycle
+      if (p(i) >= 0.0_wp) then
+        wrong = min(wrong, abs(gap(i) + self%compression(p(i)))/compliance)
+      else
+        wrong = min(wrong, max(-p(i), -gap(i)/compliance))
+      end if
+      worst = max(worst, wrong)
+    end do
   end subroutine violation
 
 end module hc_power_interface

@@ -30,6 +30,27 @@ module hc_convolution
 
   public :: convolution_t, new_convolution, kernel_source_t
 
+  !> Plans of FFTW with a count of their users, of whom the last one frees them.
+  type :: plans_t
+    type(c_ptr) :: row = c_null_ptr, column = c_null_ptr
+    integer :: users = 1
+  end type plans_t
+
+  !> What convolutions share, each with a count of its users: plans, spectra, memory. A copy is one user more.
+  !>
+  !> gfortran (12 to 14) copies allocatable components without the assignment below. Such a copy lies elsewhere than its
+  !> `place`: it is no user, and frees nothing.
+  type :: holdings_t
+    integer(c_intptr_t) :: place = 0
+    type(plans_t), pointer :: plans => null()
+    type(kernel_spectrum_t), pointer :: spectrum => null()
+    type(scratch_t), pointer :: scratch => null()
+  contains
+    procedure, private :: share
+    generic :: assignment(=) => share
+    final :: let_go
+  end type holdings_t
+
   !> Plans, spectra and scratch space.
   type :: convolution_t
     !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
@@ -50,14 +71,9 @@ module hc_convolution
     integer, private :: n_frequency = 0, leading = 0
     !> Number of kernels, the first odd one
     integer, private :: n_kernel = 0, first_odd = 0
-    !> The spectra with the count of their users
-    type(kernel_spectrum_t), pointer, private :: shared => null()
-    type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
-    !> Address of the object that frees them: its copies, which use the same plans and spectra, do not
-    integer(c_intptr_t), private :: owner = 0
+    type(holdings_t), private :: held
     !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share; the same as vectors
     complex(wp), pointer, contiguous, private :: work(:, :, :) => null(), lines(:, :) => null()
-    type(scratch_t), pointer, private :: scratch => null()
     !> Two padded rows before and after their transform, for each thread
     complex(wp), allocatable, private :: row_buffer(:, :, :)
     !> One column block of each component before and after its transform, for each thread; column by column
@@ -73,7 +89,6 @@ module hc_convolution
     procedure :: frequencies
     !> The transforms of one scalar product and nothing else
     procedure :: time_transforms
-    final :: free
   end type convolution_t
 
   !> Source of the kernels at lattice offsets.
@@ -112,7 +127,6 @@ contains
     integer, intent(in), optional :: first_odd
     integer :: stat
 
-    self%owner = address(self)
     self%space = space
     self%n_kernel = n_kernel
     self%first_odd = n_kernel + 1
@@ -123,9 +137,10 @@ contains
     self%width = block_width(padded(2))
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
-    self%scratch => space%scratch
-    if (.not. associated(self%scratch)) allocate (self%scratch)
-    call self%scratch%reserve(int(self%leading, int64)*even(extent(2))*n_component*(storage_size((1.0_wp, 0.0_wp))/8), stat)
+    self%held%place = address(self%held)
+    self%held%scratch => space%scratch
+    if (.not. associated(self%held%scratch)) allocate (self%held%scratch)
+    call self%held%scratch%reserve(int(self%leading, int64)*even(extent(2))*n_component*(storage_size((1.0_wp, 0.0_wp))/8), stat)
     if (stat == 0) allocate (self%row_buffer(padded(1), 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
     if (stat == 0) allocate (self%block_buffer(self%width*padded(2), n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), &
                              stat=stat)
@@ -151,18 +166,18 @@ contains
 
     shape_wanted = [self%width*self%padded(2), self%n_block, self%n_kernel]
     found = .false.
-    call release(self%shared)
+    call release(self%held%spectrum)
     if (present(cache)) then
-      if (associated(cache)) call cache%find(key, self%shared)
+      if (associated(cache)) call cache%find(key, self%held%spectrum)
     end if
-    if (associated(self%shared)) then
-      call self%shared%point(shape_wanted, self%spectrum)
+    if (associated(self%held%spectrum)) then
+      call self%held%spectrum%point(shape_wanted, self%spectrum)
       found = associated(self%spectrum)
       if (found) return
-      call release(self%shared)
+      call release(self%held%spectrum)
     end if
-    allocate (self%shared)
-    call self%shared%reserve(shape_wanted, self%spectrum, stat)
+    allocate (self%held%spectrum)
+    call self%held%spectrum%reserve(shape_wanted, self%spectrum, stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
       return
@@ -179,7 +194,7 @@ contains
     type(kernel_key_t), intent(in), optional :: key
 
     if (.not. present(cache)) return
-    if (associated(cache)) call cache%store(key, self%shared)
+    if (associated(cache)) call cache%store(key, self%held%spectrum)
   end subroutine store_spectra
 
   !> Make the plans of the transforms.
@@ -190,16 +205,19 @@ contains
 
     n1 = self%padded(1)
     width = self%width
+    allocate (self%held%plans)
     ! FFTW_ESTIMATE: the same plan, and the same result, in every run
     call lock(fftw_planner)
     length = n1
-    self%row_plan = fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
-                                       self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
+    self%held%plans%row = &
+      fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
+                         self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
     length = self%padded(2)
-    self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer(:, 1, 1, 1), length, 1_c_int, length(1), &
-                                          self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
+    self%held%plans%column = &
+      fftw_plan_many_dft(1_c_int, length, width, self%block_buffer(:, 1, 1, 1), length, 1_c_int, length(1), &
+                         self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
     call unlock(fftw_planner)
-    if (.not. (c_associated(self%row_plan) .and. c_associated(self%column_plan))) then
+    if (.not. (c_associated(self%held%plans%row) .and. c_associated(self%held%plans%column))) then
       call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
     end if
   end subroutine make_plans
@@ -245,7 +263,7 @@ contains
           given(:n(1)) = scale*cmplx(kernel(m, 0:, 1), kernel(m, 0:, 2), wp)
           given(n(1) + 1:) = 0.0_wp
           given(self%padded(1) - n(1) + 2:) = scale*cmplx(kernel(m, :-1, 1), kernel(m, :-1, 2), wp)
-          call fftw_execute_dft(self%row_plan, given, transformed)
+          call fftw_execute_dft(self%held%plans%row, given, transformed)
           call split_rows(transformed, rows(:self%n_frequency, j, m), rows(:self%n_frequency, j + 1, m))
         end associate
         rows(self%n_frequency + 1:, j:j + 1, m) = 0.0_wp
@@ -265,7 +283,7 @@ contains
               line(length - n(2) + 2:) = sign*conjg(line(n(2):2:-1))
             end associate
           end do
-          call fftw_execute_dft(self%column_plan, given, transformed)
+          call fftw_execute_dft(self%held%plans%column, given, transformed)
           if (m < self%first_odd) then
             self%spectrum(:, b, m) = real(transformed, wp)
           else
@@ -308,7 +326,7 @@ contains
 
     n = self%extent
     thread = 1
-    call c_f_pointer(self%scratch%place(), self%work, [self%leading, even(n(2)), max(size(field, 3), size(result, 3))])
+    call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(n(2)), max(size(field, 3), size(result, 3))])
     self%lines(1:self%leading*even(n(2)), 1:size(self%work, 3)) => self%work
     !$omp parallel num_threads(self%space%threads) private(i, o, row, b) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
@@ -333,7 +351,7 @@ contains
         if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
-          call fftw_execute_dft(self%row_plan, joined, transformed)
+          call fftw_execute_dft(self%held%plans%row, joined, transformed)
           result(:, row, o) = self%factor*real(transformed(:n(1)), wp)
           if (row < n(2)) result(:, row + 1, o) = -self%factor*aimag(transformed(:n(1)))
         end associate
@@ -389,7 +407,7 @@ contains
       else
         given(:n) = field(:, row)
       end if
-      call fftw_execute_dft(self%row_plan, given, transformed)
+      call fftw_execute_dft(self%held%plans%row, given, transformed)
       call split_rows(transformed, self%work(:self%n_frequency, row, component), &
                       self%work(:self%n_frequency, row + 1, component))
     end associate
@@ -411,7 +429,7 @@ contains
     associate (given => self%block_buffer(:, :, 1, thread), transformed => self%block_buffer(:, :, 2, thread))
       do i = 1, size(kernel, 2)
         call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
-        call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
+        call fftw_execute_dft(self%held%plans%column, given(:, i), transformed(:, i))
       end do
       if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
@@ -419,7 +437,7 @@ contains
         call multiply(self%spectrum(:, b, :), self%first_odd, self%whole, kernel, transformed, given)
       end if
       do o = 1, size(kernel, 1)
-        call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
+        call fftw_execute_dft(self%held%plans%column, given(:, o), transformed(:, o))
         call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), &
                              self%lines(first:last, o))
       end do
@@ -437,12 +455,12 @@ contains
     do k = 1, 2
       !$omp do schedule(static)
       do row = 1, self%extent(2), 2
-        call fftw_execute_dft(self%row_plan, self%row_buffer(:, 1, thread), self%row_buffer(:, 2, thread))
+        call fftw_execute_dft(self%held%plans%row, self%row_buffer(:, 1, thread), self%row_buffer(:, 2, thread))
       end do
       !$omp end do
       !$omp do schedule(static)
       do b = 1, self%n_block
-        call fftw_execute_dft(self%column_plan, self%block_buffer(:, 1, 1, thread), self%block_buffer(:, 1, 2, thread))
+        call fftw_execute_dft(self%held%plans%column, self%block_buffer(:, 1, 1, thread), self%block_buffer(:, 1, 2, thread))
       end do
       !$omp end do
     end do
@@ -451,24 +469,48 @@ contains
 
   !> Compute the address of an object.
   integer(c_intptr_t) function address(self)
-    type(convolution_t), intent(in), target :: self
+    type(holdings_t), intent(in), target :: self
+
     address = transfer(c_loc(self), address)
   end function address
 
-  !> Free plans and spectra.
-  impure elemental subroutine free(self)
-    type(convolution_t), intent(inout) :: self
+  !> Hold what another convolution holds.
+  subroutine share(self, from)
+    class(holdings_t), intent(inout) :: self
+    !> What the other one holds
+    type(holdings_t), intent(in) :: from
+    integer :: stat
 
-    if (self%owner /= address(self)) return
     call lock(fftw_planner)
-    if (c_associated(self%row_plan)) call fftw_destroy_plan(self%row_plan)
-    if (c_associated(self%column_plan)) call fftw_destroy_plan(self%column_plan)
+    if (associated(from%plans)) from%plans%users = from%plans%users + 1
     call unlock(fftw_planner)
-    self%row_plan = c_null_ptr
-    self%column_plan = c_null_ptr
-    self%spectrum => null()
-    call release(self%shared)
+    if (associated(from%spectrum)) call from%spectrum%retain()
+    if (associated(from%scratch)) call from%scratch%reserve(0_int64, stat)
+    call let_go(self)
+    self%place = address(self)
+    self%plans => from%plans
+    self%spectrum => from%spectrum
+    self%scratch => from%scratch
+  end subroutine share
+
+  !> Hold nothing any more.
+  impure elemental subroutine let_go(self)
+    type(holdings_t), intent(inout) :: self
+
+    if (self%place /= address(self)) return
+    if (associated(self%plans)) then
+      call lock(fftw_planner)
+      self%plans%users = self%plans%users - 1
+      if (self%plans%users == 0) then
+        if (c_associated(self%plans%row)) call fftw_destroy_plan(self%plans%row)
+        if (c_associated(self%plans%column)) call fftw_destroy_plan(self%plans%column)
+        deallocate (self%plans)
+      end if
+      call unlock(fftw_planner)
+      self%plans => null()
+    end if
+    call release(self%spectrum)
     call release_scratch(self%scratch)
-  end subroutine free
+  end subroutine let_go
 
 end module hc_convolution

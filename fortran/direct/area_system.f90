@@ -12,7 +12,7 @@ module hc_area_system
   use hc_flexibility, only: flexibility_t, normal, along_x
   use hc_contact_problem, only: friction_problem_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, satisfy_constraints, solution_accurate
+  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints, solution_accurate
   use hc_projected_gmres, only: projected_gmres
   use hc_area_factors, only: area_factors_t
   implicit none
@@ -32,7 +32,7 @@ module hc_area_system
     real(wp), allocatable :: weight(:, :), traction(:, :), spring(:)
   contains
     procedure :: product
-    procedure :: precondition
+    procedure :: precondition_packed
   end type area_system_t
 
 contains
@@ -84,11 +84,10 @@ contains
     determined = pack([(k, k=1, size(load))], [(any(abs(rhs(:, k)) > 0.0_wp), k=1, size(load))])
     columns = rhs(:, determined)
     rows = resultant(:, determined)
-    allocate (mb(n, size(determined)), ax(n))
-    do k = 1, size(determined)
-      call system%precondition(columns(:, k), mb(:, k), error)
-      if (allocated(error)) return
-    end do
+    allocate (ax(n))
+    call new_active_set(nodes, spread(.true., 1, n), system%space)
+    call precondition_constraints(system, nodes, n, columns, mb, error)
+    if (allocated(error)) return
     call satisfy_constraints(rows, mb, load(determined) - matmul(x, rows), x, solved, system%space)
     if (.not. solved) return
     call system%product(x, ax, error)
@@ -101,7 +100,6 @@ contains
     if (problem%friction%is_bounded()) then
       if (problem%friction%resists()) scale = min(scale, problem%friction%largest_bound(largest))
     end if
-    call new_active_set(nodes, spread(.true., 1, n), system%space)
     allocate (multiplier(size(determined)), source=0.0_wp)
     call projected_gmres(system, nodes, columns, mb, rows, [1.0_wp], right, x, ax, accuracy*scale*real(n, wp)**0.25_wp, &
                          problem%options%direct%max_directions, problem%options%direct%max_directions, multiplier, independent, &
@@ -136,15 +134,15 @@ contains
     end do
   end subroutine product
 
-  subroutine precondition(self, x, y, error)
+  subroutine precondition_packed(self, nodes, n, r, z, error)
     class(area_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (error => error)
-      call self%factors%apply(x, y)
-    end associate
-  end subroutine precondition
+    call self%factors%apply(r, z)
+  end subroutine precondition_packed
 
 end module hc_area_system

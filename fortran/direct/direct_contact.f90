@@ -100,14 +100,12 @@ contains
 
     again = allocated(start%pressure)
     if (again) again = any(start%pressure > 0.0_wp)
-    associate (reference => reference)
-      if (again) then
-        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
-                        start%pressure > 0.0_wp)
-      else
-        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
-      end if
-    end associate
+    if (again) then
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
+                      start%pressure > 0.0_wp)
+    else
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+    end if
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.
@@ -247,8 +245,8 @@ contains
     real(wp) :: r, softest
 
     associate (options => self%options%contact, pair => self%flexibility%pair, lattice => self%flexibility%lattice)
-      r = options%classification_scale/(2.0_wp*pi*pair%lambda_1*sqrt(lattice%cell_area()*count(active)/pi))
-      softest = options%softest_layer*(self%compliance + self%law%compliance_under(maxval(abs(p))))
+      r = options%classification_parameter(pair%lambda_1, lattice%cell_area()*max(count(active), 1))
+      softest = self%law%softest_spring(options%softest_layer, self%compliance, maxval(abs(p)))
     end associate
     call self%law%find_contact(r, p, gap, candidate, active)
     if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)

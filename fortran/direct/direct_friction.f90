@@ -17,8 +17,8 @@ module hc_direct_friction
   use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, separated, stick, slip, &
-    normal, along_x, force_control, displacement_control, loads_not_carried
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, slip, normal, &
+    force_control, loads_not_carried
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state

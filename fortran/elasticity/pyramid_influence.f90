@@ -66,8 +66,6 @@ module hc_pyramid_influence
     procedure :: normal_kernel
     !> Is the lattice equilateral?
     procedure :: is_equilateral
-    !> The five kernels at all lattice offsets of a box [m]
-    procedure :: kernel_table
   end type pyramid_t
 
 contains
@@ -125,32 +123,6 @@ contains
     class(pyramid_t), intent(in) :: self
     is_equilateral = self%fold == 6
   end function is_equilateral
-
-  !> Tabulate the kernels at the offsets i*basis(:, 1) + j*basis(:, 2) with |i| <= n(1), |j| <= n(2).
-  !>
-  !> Only half of the offsets is evaluated: the kernels are even or odd.
-  subroutine kernel_table(self, basis, table)
-    class(pyramid_t), intent(in) :: self
-    !> Basis vectors of the lattice as columns [m]
-    real(wp), intent(in) :: basis(2, 2)
-    !> Kernels (5, -n(1):n(1), -n(2):n(2)) [m]
-    real(wp), intent(out) :: table(:, :, :)
-
-    real(wp), parameter :: parity(5) = [1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
-    integer :: n(2), i, j
-
-    n = [size(table, 2)/2, size(table, 3)/2]
-    !$omp parallel do schedule(dynamic, 8) private(i) if (n(2) > 60)
-    do j = 0, n(2)
-      do i = -n(1), n(1)
-        if (j == 0 .and. i < 0) cycle
-        table(:, n(1) + 1 + i, n(2) + 1 + j) = self%kernels(i*basis(1, 1) + j*basis(1, 2), &
-                                                           i*basis(2, 1) + j*basis(2, 2))
-        table(:, n(1) + 1 - i, n(2) + 1 - j) = parity*table(:, n(1) + 1 + i, n(2) + 1 + j)
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine kernel_table
 
   !> Sum line integrals over the nine creases; exact everywhere, loses digits like R^2.
   pure function near_kernels(self, x, y) result(k)

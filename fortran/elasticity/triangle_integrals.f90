@@ -9,8 +9,9 @@
 !> I_100 d^(k+m+1-j), d the distance of the farthest vertex, which bounds I_jkm.
 !>
 !> Up to 1.5 longest edges from the centroid: edge form, in extended precision
-!> for slivers. Beyond: the edges cancel, and a conical product rule of 12 x 12
-!> Gauss points is exact to rounding. A triangle without area gives zero.
+!> for slivers; a compiler that has none (flang) loses there as many digits as
+!> the aspect ratio has. Beyond: the edges cancel, and a conical product rule of
+!> 12 x 12 Gauss points is exact to rounding. A triangle without area gives zero.
 !>
 !> The pure procedures expect valid arguments; evaluate_* check them, work on
 !> many points at a time, and share the points out over threads.

@@ -9,7 +9,10 @@
 !> Cells below the best value by more than this are left out, the others are divided into four until the loss is negligible.
 !> Where more cells are left than can be kept, as on a ridge of equal values, the best of them are divided. On a narrow ridge,
 !> as where a history under pressure has next to no tension, these need not contain the maximum: if the loss is not negligible
-!> in the end, Newton's method leads there from the best plane, and from the first cells that were too many.
+!> in the end, Newton's method leads there from the best plane, from the first cells that were too many, and from the planes of
+!> tension. At each time these are an arc about the axis e_3 of the largest principal stress, towards that of the middle one:
+!>
+!>     n = cos(phi) e_3 + sin(phi) e_2,   sigma_3 cos(phi)^2 + sigma_2 sin(phi)^2 >= 0.
 module hc_critical_plane
   use hc_precision, only: wp, pi
   use hc_plane_criteria, only: plane_criterion_t, stress_extent_t
@@ -32,6 +35,8 @@ module hc_critical_plane
   !> Newton's method: most steps, the largest one, and the distance of points over the half width of a ridge.
   integer, parameter :: n_newton = 20
   real(wp), parameter :: longest = 0.1_wp, share = 0.2_wp
+  !> Planes of an arc on either side of its middle.
+  integer, parameter :: n_arc = 12
 
   !> A search: the best plane so far, and the cells that may contain a better one.
   type :: search_t
@@ -61,7 +66,7 @@ contains
     real(wp), intent(out) :: normal(3)
     type(search_t) :: search, before, crowd
     real(wp) :: path(size(history, 2), 6), half, enough, curvature
-    integer :: i, j, k, face, division
+    integer :: i, j, face, division
 
     path = transpose(history)
     half = 1.0_wp/n_side
@@ -90,16 +95,96 @@ contains
       end do
       if (crowd%number == 0 .and. search%number == search%most) crowd = search
     end do
-    if (search%value > criterion%least() .and. search%loss > negligible*abs(search%value)) then
-      normal = search%normal
-      call climb(search, criterion, path, curvature, normal)
-      do k = 1, crowd%number
-        call climb(search, criterion, path, curvature, normal_at(crowd%face(k), crowd%place(:, k)))
-      end do
+    if (search%number + crowd%number > 0 .and. search%loss > negligible*abs(search%value)) then
+      call search_ridges(search, criterion, path, curvature, crowd)
     end if
     value = max(search%value, criterion%least())
     normal = sign(1.0_wp, search%normal(3))*search%normal
   end subroutine find_critical_plane
+
+  !> Search for narrow ridges: from the best plane, the planes of tension at each time, and a crowd of cells.
+  pure subroutine search_ridges(search, criterion, path, curvature, crowd)
+    type(search_t), intent(inout) :: search
+    class(plane_criterion_t), intent(in) :: criterion
+    !> Stress (times, 6) [Pa]
+    real(wp), intent(in), contiguous :: path(:, :)
+    !> Bound of the curvature
+    real(wp), intent(in) :: curvature
+    !> Cells, the first that were too many
+    type(search_t), intent(in) :: crowd
+    real(wp), allocatable :: normals(:, :, :), values(:, :)
+    real(wp) :: normal(3)
+    integer :: i, k
+
+    allocate (normals(3, -n_arc:n_arc, size(path, 1)))
+    allocate (values(-n_arc - 1:n_arc + 1, size(path, 1)), source=-huge(1.0_wp))
+    do i = 1, size(path, 1)
+      call find_arc(path(i, :), normals(:, :, i))
+      if (norm2(normals(:, 0, i)) <= 0.0_wp) cycle ! no tension
+      do k = -n_arc, n_arc
+        values(k, i) = value_on(criterion, path, normals(:, k, i), -0.5_wp*huge(curvature))
+        if (values(k, i) <= search%value) cycle
+        search%value = values(k, i)
+        search%normal = normals(:, k, i)
+      end do
+    end do
+    if (search%value <= criterion%least()) return
+    normal = search%normal
+    call climb(search, criterion, path, curvature, normal)
+    do i = 1, size(path, 1)
+      do k = -n_arc, n_arc
+        if (values(k, i) <= criterion%least() .or. values(k, i) < max(values(k - 1, i), values(k + 1, i))) cycle
+        call climb(search, criterion, path, curvature, normals(:, k, i))
+      end do
+    end do
+    do k = 1, crowd%number
+      call climb(search, criterion, path, curvature, normal_at(crowd%face(k), crowd%place(:, k)))
+    end do
+  end subroutine search_ridges
+
+  !> Find the arc of the planes of tension at a time; zeros without tension.
+  pure subroutine find_arc(stress, normals)
+    !> xx, yy, zz, xy, yz, xz [Pa]
+    real(wp), intent(in) :: stress(6)
+    real(wp), intent(out) :: normals(3, -n_arc:n_arc)
+    integer, parameter :: n_sweep = 8
+    real(wp) :: a(3, 3), axes(3, 3), rotation(3, 3), angle, most
+    integer :: sweep, i, j, largest, middle
+
+    normals = 0.0_wp
+    a = reshape(stress([1, 4, 6, 4, 2, 5, 6, 5, 3]), [3, 3])
+    axes = identity()
+    do sweep = 1, n_sweep ! of Jacobi
+      do i = 1, 2
+        do j = i + 1, 3
+          angle = 0.5_wp*atan2(2.0_wp*a(i, j), a(j, j) - a(i, i))
+          rotation = identity()
+          rotation([i, j], [i, j]) = reshape([cos(angle), -sin(angle), sin(angle), cos(angle)], [2, 2])
+          a = matmul(transpose(rotation), matmul(a, rotation))
+          axes = matmul(axes, rotation)
+        end do
+      end do
+    end do
+    largest = maxloc([a(1, 1), a(2, 2), a(3, 3)], dim=1)
+    middle = 6 - largest - minloc([a(1, 1), a(2, 2), a(3, 3)], dim=1)
+    if (a(largest, largest) <= 0.0_wp .or. middle < 1 .or. middle > 3) return
+    most = 0.5_wp*pi
+    if (a(middle, middle) < 0.0_wp) most = atan(sqrt(-a(largest, largest)/a(middle, middle)))
+    do i = -n_arc, n_arc
+      angle = most*i/n_arc
+      normals(:, i) = cos(angle)*axes(:, largest) + sin(angle)*axes(:, middle)
+    end do
+  end subroutine find_arc
+
+  !> Unit matrix.
+  pure function identity()
+    real(wp) :: identity(3, 3)
+
+    identity = 0.0_wp
+    identity(1, 1) = 1.0_wp
+    identity(2, 2) = 1.0_wp
+    identity(3, 3) = 1.0_wp
+  end function identity
 
   !> Go from a plane to the maximum beside it by Newton's method, with derivatives from differences.
   pure subroutine climb(search, criterion, path, curvature, start)

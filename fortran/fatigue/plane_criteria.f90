@@ -116,7 +116,7 @@ contains
     real(wp) :: highest, most, least
     integer :: i
 
-    associate (nu => self%poisson_ratio, no_shear => shear, no_floor => floor)
+    associate (nu => self%poisson_ratio)
       highest = -huge(highest)
       most = -huge(most)
       least = huge(least)
@@ -145,10 +145,8 @@ contains
     real(wp), intent(in), contiguous :: normal(:), shear(:, :), trace(:)
     real(wp), intent(in) :: floor
 
-    associate (no_trace => trace)
-      value = self%slope*largest(normal)
-      value = value + shear_amplitude(shear, floor - value)
-    end associate
+    value = self%slope*largest(normal)
+    value = value + shear_amplitude(shear, floor - value)
   end function findley
 
   pure real(wp) function curvature_of_findley(self, extent) result(bound)
@@ -162,10 +160,8 @@ contains
     real(wp), intent(in), contiguous :: normal(:), shear(:, :), trace(:)
     real(wp), intent(in) :: floor
 
-    associate (no_trace => trace)
-      value = (1.0_wp + self%slope*max(largest(normal), 0.0_wp)/self%yield_stress)/self%shear_modulus
-      value = value*shear_amplitude(shear, max(floor, 0.0_wp)/value) ! -huge(floor)/value would overflow
-    end associate
+    value = (1.0_wp + self%slope*max(largest(normal), 0.0_wp)/self%yield_stress)/self%shear_modulus
+    value = value*shear_amplitude(shear, max(floor, 0.0_wp)/value) ! -huge(floor)/value would overflow
   end function fatemi_socie
 
   pure real(wp) function curvature_of_fatemi_socie(self, extent) result(bound)

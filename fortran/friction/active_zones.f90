@@ -3,7 +3,7 @@
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
   use hc_precision, only: wp
-  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, force_control
+  use hc_contact_state, only: separated, stick, slip, n_motion, force_control
   use hc_active_set, only: active_set_t, find_span
   use hc_frame_rows, only: plane_row
   use hc_friction_iterate, only: friction_iterate_t

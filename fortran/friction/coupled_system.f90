@@ -30,7 +30,6 @@ module hc_coupled_system
     real(wp), allocatable, private :: traction(:)
   contains
     procedure :: product => coupled_product
-    procedure :: precondition => coupled_precondition
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
     procedure :: release => release_coupled
@@ -90,7 +89,7 @@ contains
       call self%space%fill(self%traction, 0.0_wp)
     end if
     associate (contact => self%pressed, runs => self%sheared%pairs, n_p => self%pressed%n_active, &
-               n_t => self%sheared%pairs%n_first, direction => self%shear%direction, given => nodes)
+               n_t => self%sheared%pairs%n_first, direction => self%shear%direction)
       call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), self%traction(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, e)
       do k = 1, size(contact%first)
@@ -127,7 +126,8 @@ contains
     call self%operators%tangential%release()
   end subroutine release_coupled
 
-  !> Precondition the values at the active nodes.
+  !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
+  !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.
   subroutine coupled_precondition_packed(self, nodes, n, r, z, error)
     class(coupled_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
@@ -138,7 +138,7 @@ contains
     real(wp), allocatable :: shear(:)
     integer :: k, i, at
 
-    associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators, given => nodes)
+    associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators)
       call operators%normal%apply_packed(contact, n/3, r(:n_p), z(:n_p), operators%preconditioning)
       if (.not. allocated(self%tilt)) then
         call self%shear%precondition_packed(self%sheared, 2*n/3, r(n_p + 1:), z(n_p + 1:), error)
@@ -154,26 +154,5 @@ contains
       call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:), error)
     end associate
   end subroutine coupled_precondition_packed
-
-  !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
-  !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.
-  subroutine coupled_precondition(self, x, y, error)
-    class(coupled_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable, target :: shear(:)
-    integer :: n
-
-    n = size(x)/3
-    call self%operators%normal%apply(x(:n), y(:n), self%operators%preconditioning)
-    if (allocated(self%tilt)) then
-      shear = x(n + 1:)
-      shear(:n) = shear(:n) + self%shear%compliance*self%tilt*y(:n)
-      call self%shear%precondition(shear, y(n + 1:), error)
-    else
-      call self%shear%precondition(x(n + 1:), y(n + 1:), error)
-    end if
-  end subroutine coupled_precondition
 
 end module hc_coupled_system

@@ -9,7 +9,6 @@ module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
-  use hc_lattice, only: lattice_t
   use hc_field_space, only: space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count, build_levels

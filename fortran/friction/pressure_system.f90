@@ -21,7 +21,6 @@ module hc_pressure_system
     !> Add to displacements what the springs give way, or take it off
     procedure :: stretch
     procedure :: product => pressure_product
-    procedure :: precondition => pressure_precondition
     procedure :: precondition_packed => pressure_precondition_packed
     procedure :: release => release_pressure
   end type pressure_system_t
@@ -58,18 +57,6 @@ contains
   end subroutine stretch
 
   !> Apply the preconditioner of the pressure.
-  subroutine pressure_precondition(self, x, y, error)
-    class(pressure_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (operators => self%operators, error => error)
-      call operators%normal%apply(x, y, operators%preconditioning)
-    end associate
-  end subroutine pressure_precondition
-
-  !> Apply it to the values at the nodes in contact.
   subroutine pressure_precondition_packed(self, nodes, n, r, z, error)
     class(pressure_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
@@ -78,7 +65,7 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed

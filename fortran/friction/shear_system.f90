@@ -46,7 +46,6 @@ module hc_shear_system
     real(wp), allocatable, private :: from(:)
   contains
     procedure :: product => shear_product
-    procedure :: precondition => shear_precondition
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
     procedure :: release => release_shear
@@ -351,18 +350,6 @@ contains
   end subroutine add_springs_packed
 
   !> Apply the preconditioner of the shear traction.
-  subroutine shear_precondition(self, x, y, error)
-    class(shear_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (operators => self%operators, error => error)
-      call operators%tangential%apply(x, y, operators%preconditioning)
-    end associate
-  end subroutine shear_precondition
-
-  !> Apply it to the values at the active nodes.
   subroutine shear_precondition_packed(self, nodes, n, r, z, error)
     class(shear_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
@@ -371,7 +358,7 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (operators => self%operators, error => error)
+    associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine shear_precondition_packed

@@ -146,9 +146,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     ! the first guess is that of the coarser lattices: a load gives the same bits whatever came before it
-    associate (start => start, reference => reference)
-      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
-    end associate
+    call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.
@@ -241,7 +239,7 @@ contains
     r = 1.0_wp/coarser%compliance
     allocate (contact, source=coarse%pressure - r*min(coarse%gap, coarser%compliance*p_max))
     call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
-    softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
+    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, p_max)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too

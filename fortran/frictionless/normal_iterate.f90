@@ -3,7 +3,7 @@
 !> Equations: docs/theory/normal_contact.md, (N2) to (N6).
 module hc_normal_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, sp, pi
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t, status, raise
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
@@ -12,7 +12,7 @@ module hc_normal_iterate
   implicit none
   private
 
-  public :: normal_iterate_t, find_span, rescale, find_approach, classify, classification_parameter, set_active, linearize_law, &
+  public :: normal_iterate_t, find_span, rescale, find_approach, classify, set_active, linearize_law, &
             add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
 
   !> Error of a product in single precision, relative to its largest value.
@@ -138,7 +138,8 @@ contains
     integer :: row, n_next, n_changed
     logical :: finite
 
-    r = classification_parameter(level, now)
+    ! r' of (N2)
+    r = level%options%contact%classification_parameter(level%pair%lambda_1, level%lattice%cell_area()*now%n_active)
     stiffness = 1.0_wp/level%compliance
     p_max = 0.0_wp
     worst = 0.0_wp
@@ -175,17 +176,6 @@ contains
     next = now%active
     now%n_next = now%n_active
   end subroutine classify
-
-  !> Compute r' of (N2) [Pa/m].
-  pure real(wp) function classification_parameter(level, now) result(r)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
-    !> Iterate
-    type(normal_iterate_t), intent(in) :: now
-
-    r = level%options%contact%classification_scale/(2.0_wp*pi*level%pair%lambda_1 &
-                                                    *sqrt(level%lattice%cell_area()*now%n_active/pi))
-  end function classification_parameter
 
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
   !> linearised to.
@@ -229,12 +219,11 @@ contains
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
-    real(wp) :: gap(size(now%p, 1)), softest, p_max
+    real(wp) :: gap(size(now%p, 1)), softest
     integer :: row
 
     call add_springs(level, now, -1)
-    p_max = level%space%max(abs(now%p))
-    softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
+    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, level%space%max(abs(now%p)))
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(gap)
     do row = 1, size(now%p, 2)
       gap = level%initial_gap(:, row) + now%w(:, row) - now%approach

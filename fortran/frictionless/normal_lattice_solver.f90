@@ -28,7 +28,7 @@ module hc_normal_lattice_solver
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: complete_state
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, classification_parameter, set_active, &
+  use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, set_active, &
     linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
   use hc_normal_start, only: set_start
   use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, find_step, &
@@ -197,7 +197,7 @@ contains
         settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
         anew = anew .or. settled
         if (changed .or. settled .or. sweeps <= options%most_linearized) then
-          r = classification_parameter(level, now)
+          r = level%options%contact%classification_parameter(level%pair%lambda_1, level%lattice%cell_area()*now%n_active)
           ! what is left close to the solution are errors of a few nodes along the edge
           if (now%residual < options%close_residual) r = max(r, options%local_share/level%compliance)
           call linearize_law(level, now, r)

@@ -33,10 +33,10 @@ module hc_linear_system
   contains
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product
-    !> z = M r for an r that vanishes off the active nodes; z is used on them only
-    procedure :: precondition => no_precondition
-    !> The same for the values at the active nodes alone, x, r and z
-    procedure :: product_packed, precondition_packed
+    !> The same for the values at the active nodes alone, x
+    procedure :: product_packed
+    !> z = M r at the active nodes
+    procedure :: precondition_packed
     !> Free what products keep for the next one
     procedure :: release
   end type linear_system_t
@@ -60,18 +60,6 @@ module hc_linear_system
 
 contains
 
-  !> Apply the identity as a preconditioner.
-  subroutine no_precondition(self, x, y, error)
-    class(linear_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (error => error)
-      call self%space%copy(x, y)
-    end associate
-  end subroutine no_precondition
-
   !> Compute y = A x of the values at the active nodes.
   subroutine product_packed(self, nodes, x, y, error)
     class(linear_system_t), intent(inout) :: self
@@ -91,7 +79,7 @@ contains
     call self%product(from, y, error)
   end subroutine product_packed
 
-  !> Compute z = M r at the active nodes.
+  !> Compute z = M r at the active nodes: by default M is the identity.
   subroutine precondition_packed(self, nodes, n, r, z, error)
     class(linear_system_t), intent(inout) :: self
     !> Active nodes, and number of all nodes
@@ -102,22 +90,14 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable, target :: from(:), onto(:)
 
-    allocate (from(n), onto(n))
-    call self%space%fill(from, 0.0_wp)
-    call nodes%unpack(r, from)
-    call self%precondition(from, onto, error)
-    if (allocated(error)) return
-    call nodes%pack(onto, z)
+    call self%space%copy(r, z)
   end subroutine precondition_packed
 
   !> Free what products keep: by default nothing is kept.
   subroutine release(self)
     class(linear_system_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine release
 
   !> Compute M B, the constraint vectors after the preconditioner.

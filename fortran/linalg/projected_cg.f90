@@ -82,8 +82,10 @@ contains
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n))
     end associate
-    call find_difference(nodes, rhs, ax, r, space)
+    call nodes%pack(rhs, r)
     deallocate (rhs)
+    call nodes%pack(ax, z)
+    r = r - z
     allocate (onto(size(x)))
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
@@ -129,28 +131,6 @@ contains
     if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
     if (present(drift)) drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
-
-  !> Compute the difference of two fields at the active nodes.
-  subroutine find_difference(nodes, minuend, subtrahend, packed, space)
-    !> Active nodes
-    type(active_set_t), intent(in) :: nodes
-    !> Fields over all nodes
-    real(wp), intent(in), contiguous :: minuend(:), subtrahend(:)
-    !> Their difference at the active nodes
-    real(wp), intent(inout), contiguous :: packed(:)
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    integer :: i, k, shift
-
-    !$omp parallel do schedule(static) num_threads(space%threads) private(i, shift)
-    do k = 1, size(nodes%first)
-      shift = nodes%place(k) - nodes%first(k)
-      do i = nodes%first(k), nodes%last(k)
-        packed(i + shift) = minuend(i) - subtrahend(i)
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine find_difference
 
   !> Compute r <- r + step A d + B change, and C^T r.
   subroutine advance_residual(step, ad, change, b, c, r, along, space)

@@ -222,7 +222,7 @@ contains
     real(wp), pointer, contiguous :: from(:, :), onto(:, :)
     integer :: i, j
 
-    associate (n => self%extent, error => error)
+    associate (n => self%extent)
       from(1:n(1), 1:n(2)) => x
       onto(1:n(1), 1:n(2)) => y
       y = 0.0_wp

@@ -45,8 +45,6 @@ module hc_inverse_symbol
     logical, private :: tangential = .false.
     !> Columns, rows and components of the fields
     integer, private :: shape(3) = 0
-    !> Fields in single precision
-    real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
     !> On springs along the normal: the inverse symbol; the share of a displacement that each node passes on to it, and the
@@ -61,9 +59,7 @@ module hc_inverse_symbol
     procedure :: set_springs
     !> Return whether springs count as loose
     procedure :: is_loose
-    !> Traction that causes a given displacement, approximately
-    procedure :: apply
-    !> The same in single precision, displacements and tractions in any units of ratio `unit`
+    !> Traction that causes a given displacement, approximately, in any units of ratio `unit`
     procedure :: apply_single
   end type inverse_symbol_t
 
@@ -164,47 +160,7 @@ contains
     if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory
 
-  !> Estimate the traction that causes a given displacement.
-  subroutine apply(self, displacement, traction, edge)
-    class(inverse_symbol_t), intent(inout) :: self
-    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
-    real(wp), intent(in) :: displacement(self%shape(1), self%shape(2), self%shape(3))
-    !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
-    real(wp), intent(out) :: traction(self%shape(1), self%shape(2), self%shape(3))
-    !> Continuation beyond the nodes where displacements are given
-    type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
-    integer :: row, m
-
-    ! out of `self`, which the product changes
-    call move_alloc(self%given, given)
-    call move_alloc(self%wanted, wanted)
-    if (.not. allocated(given)) then
-      allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
-      allocate (wanted, mold=given)
-    end if
-    associate (space => self%convolution%space)
-      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
-      do m = 1, size(given, 3)
-        do row = 1, size(given, 2)
-          given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
-        end do
-      end do
-      !$omp end parallel do
-      call self%apply_single(given, wanted, edge)
-      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
-      do m = 1, size(wanted, 3)
-        do row = 1, size(wanted, 2)
-          traction(:, row, m) = wanted(:, row, m)
-        end do
-      end do
-      !$omp end parallel do
-    end associate
-    call move_alloc(given, self%given)
-    call move_alloc(wanted, self%wanted)
-  end subroutine apply
-
-  !> Estimate it in single precision, displacements and tractions in any units of ratio `unit`.
+  !> Estimate the traction that causes a given displacement, in any units of ratio `unit`.
   subroutine apply_single(self, displacement, traction, edge)
     class(inverse_symbol_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`

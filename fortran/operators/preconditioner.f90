@@ -8,7 +8,8 @@
 !> Equations: docs/theory/preconditioner.md.
 module hc_preconditioner
   use hc_precision, only: wp, sp
-  use hc_active_set, only: active_set_t
+  use hc_field_space, only: field_space_t
+  use hc_active_set, only: active_set_t, new_active_set
   implicit none
   private
 
@@ -21,10 +22,10 @@ module hc_preconditioner
   contains
     !> Set the active nodes
     procedure(set_active), deferred :: set_active
-    !> Estimate the traction that causes a displacement
-    procedure(apply), deferred :: apply
-    !> The same in single precision, and for the values at the active nodes alone
-    procedure :: apply_single, apply_packed
+    !> Estimate the traction at the active nodes that causes a displacement
+    procedure(apply_packed), deferred :: apply_packed
+    !> The same over all nodes, in single precision
+    procedure :: apply_single
     !> Free what applications keep for the next one
     procedure :: release
     !> Forget the active nodes, and free what was stored for them
@@ -45,72 +46,52 @@ module hc_preconditioner
       real(wp), intent(in), optional, target, contiguous :: direction(:, :)
     end subroutine set_active
 
-    !> Compute z = M r for an r that vanishes off the active nodes; z is used on them only.
-    subroutine apply(self, displacement, traction, work)
-      import :: preconditioner_t, wp
+    !> Compute z = M r at the active nodes.
+    subroutine apply_packed(self, nodes, n, displacement, traction, work)
+      import :: preconditioner_t, active_set_t, wp
       class(preconditioner_t), intent(inout) :: self
-      !> Displacement, one component after the other, shear in the frames (n or 2 n) [m]
-      real(wp), intent(in), contiguous, target :: displacement(:)
-      !> Traction that causes it (n or 2 n) [Pa]
-      real(wp), intent(out), contiguous, target :: traction(:)
+      !> Active nodes of a vector, and its length; a vector has one component after the other, shear in the frames
+      type(active_set_t), intent(in) :: nodes
+      integer, intent(in) :: n
+      !> Displacement [m], and the traction that causes it [Pa], at the active nodes
+      real(wp), intent(in), contiguous :: displacement(:)
+      real(wp), intent(inout), contiguous :: traction(:)
       !> Work so far, in applications of the full flexibility operator; this one is added
       real(wp), intent(inout) :: work
-    end subroutine apply
+    end subroutine apply_packed
   end interface
 
 contains
 
-  !> Compute z = M r in single precision, in units of displacement and traction of the ratio `unit`.
+  !> Compute z = M r in single precision, in units of displacement and traction of the ratio `unit`; z is used on the active
+  !> nodes only.
   subroutine apply_single(self, displacement, traction, work)
     class(preconditioner_t), intent(inout) :: self
-    !> Displacement; values off the active nodes may change (n or 2 n)
+    !> Displacement, zero off the active nodes, where values may change (n or 2 n)
     real(sp), intent(inout), contiguous, target :: displacement(:)
     !> Traction that causes it (n or 2 n)
     real(sp), intent(out), contiguous, target :: traction(:)
     !> Work so far, in applications of the full flexibility operator; this one is added
     real(wp), intent(inout) :: work
-    real(wp), allocatable :: given(:), wanted(:)
+    real(wp), allocatable :: wanted(:)
+    type(active_set_t) :: nodes
 
-    allocate (given(size(displacement)), wanted(size(traction)))
-    given = self%unit*displacement
-    call self%apply(given, wanted, work)
+    call new_active_set(nodes, spread(.true., 1, size(displacement)), field_space_t())
+    allocate (wanted(size(traction)))
+    call self%apply_packed(nodes, size(displacement), self%unit*displacement, wanted, work)
     traction = real(wanted, sp)
   end subroutine apply_single
-
-  !> Compute z = M r at the active nodes.
-  subroutine apply_packed(self, nodes, n, displacement, traction, work)
-    class(preconditioner_t), intent(inout) :: self
-    !> Active nodes of a vector, and its length
-    type(active_set_t), intent(in) :: nodes
-    integer, intent(in) :: n
-    !> Displacement and the traction that causes it, at the active nodes
-    real(wp), intent(in), contiguous :: displacement(:)
-    real(wp), intent(inout), contiguous :: traction(:)
-    !> Work so far, in applications of the full flexibility operator; this one is added
-    real(wp), intent(inout) :: work
-    real(wp), allocatable :: given(:), wanted(:)
-
-    allocate (given(n), wanted(n))
-    given = 0.0_wp
-    call nodes%unpack(displacement, given)
-    call self%apply(given, wanted, work)
-    call nodes%pack(wanted, traction)
-  end subroutine apply_packed
 
   !> Free what applications keep: by default nothing is kept.
   subroutine release(self)
     class(preconditioner_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine release
 
   !> Forget the active nodes: by default nothing is stored for them.
   subroutine clear(self)
     class(preconditioner_t), intent(inout) :: self
 
-    associate (nothing_of => self)
-    end associate
   end subroutine clear
 
 end module hc_preconditioner

@@ -53,7 +53,6 @@ module hc_shear_preconditioner
     real(sp), allocatable :: field(:, :), mean(:, :)
   contains
     procedure :: set_active => set_sheared
-    procedure :: apply => apply_to_shear
     procedure :: apply_packed => apply_to_shear_packed
     procedure :: release => release_fields
     procedure :: clear => clear_sheared
@@ -187,24 +186,8 @@ contains
     call new_active_set(self%apart, active .and. .not. near, self%space)
   end subroutine find_near
 
-  !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there.
-  subroutine apply_to_shear(self, displacement, traction, work)
-    class(shear_preconditioner_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: displacement(:)
-    real(wp), intent(out), contiguous, target :: traction(:)
-    real(wp), intent(inout) :: work
-    type(active_set_t) :: both
-    real(wp), allocatable :: given(:), wanted(:)
-
-    both = self%nodes%repeated(size(displacement)/2, 2)
-    call both%pair(size(displacement))
-    allocate (given(both%n_active), wanted(both%n_active))
-    call both%pack(displacement, given)
-    call self%apply_packed(both, size(displacement), given, wanted, work)
-    call both%unpack(wanted, traction)
-  end subroutine apply_to_shear
-
-  !> Estimate it at the active nodes: the component along t of all nodes in contact, that along e of some.
+  !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there: the component along t at all
+  !> nodes in contact, that along e at some.
   subroutine apply_to_shear_packed(self, nodes, n, displacement, traction, work)
     class(shear_preconditioner_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
@@ -401,13 +384,14 @@ contains
   !> Forget the active nodes, and free what was stored for them.
   subroutine clear_sheared(self)
     class(shear_preconditioner_t), intent(inout) :: self
+    type(active_set_t) :: none
 
     self%direction => null()
     call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
     if (allocated(self%front)) deallocate (self%front)
     if (allocated(self%own)) deallocate (self%own, self%far)
-    self%slipping = active_set_t()
+    self%slipping = none
   end subroutine clear_sheared
 
 end module hc_shear_preconditioner

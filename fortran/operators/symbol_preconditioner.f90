@@ -47,7 +47,6 @@ module hc_symbol_preconditioner
   type, extends(symbol_preconditioner_t) :: pressure_preconditioner_t
   contains
     procedure :: set_active => set_contact
-    procedure :: apply => apply_to_pressure
     procedure :: apply_single => apply_to_pressure_single
     procedure :: apply_packed => apply_to_pressure_packed
     procedure :: clear => clear_contact
@@ -87,15 +86,13 @@ contains
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
-    associate (direction => direction)
-      if (present(compliance)) then
-        call self%inverse%set_springs(self%options, compliance, active)
-        ! displacements go on beyond the nodes on stiff springs
-        call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
-      else
-        call self%continue_beyond(self%extent, active)
-      end if
-    end associate
+    if (present(compliance)) then
+      call self%inverse%set_springs(self%options, compliance, active)
+      ! displacements go on beyond the nodes on stiff springs
+      call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
+    else
+      call self%continue_beyond(self%extent, active)
+    end if
   end subroutine set_contact
 
   !> Set up the continuation beyond some nodes, which are handed on without a copy.
@@ -134,18 +131,7 @@ contains
     if (allocated(self%given)) deallocate (self%given, self%wanted)
   end subroutine free_memory
 
-  !> Estimate the pressure that causes a closing of the gap.
-  subroutine apply_to_pressure(self, displacement, traction, work)
-    class(pressure_preconditioner_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: displacement(:)
-    real(wp), intent(out), contiguous, target :: traction(:)
-    real(wp), intent(inout) :: work
-
-    call self%inverse%apply(displacement, traction, self%edge)
-    work = work + self%inverse%cost
-  end subroutine apply_to_pressure
-
-  !> Estimate it at the nodes in contact alone.
+  !> Estimate the pressure at the nodes in contact that causes a closing of the gap.
   subroutine apply_to_pressure_packed(self, nodes, n, displacement, traction, work)
     class(pressure_preconditioner_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes

@@ -188,12 +188,11 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
 
     type(carried_t), allocatable :: carried(:, :)
-    type(carried_t) :: sum_of
     real(wp), allocatable :: gap(:, :), edge_pressure(:, :)
     !> Nodes that entered, that are outside all the time, that have a value to carry on, that are tied to the old contact
     logical, allocatable :: entered(:, :), outside(:, :), known(:, :), attached(:, :)
     integer, allocatable :: node(:, :)
-    real(wp) :: weight, total, share(2)
+    real(wp) :: share(2)
     integer :: i, k, col, row, c, r
 
     allocate (displacement, mold=after%relative_displacement)
@@ -228,23 +227,8 @@ contains
     do i = 1, size(node, 2)
       col = node(1, i)
       row = node(2, i)
-      sum_of = carried_t()
-      total = 0.0_wp
-      do k = 1, n_neighbor
-        c = col + neighbor(1, k)
-        r = row + neighbor(2, k)
-        if (.not. inside(gap, c, r)) cycle
-        weight = gap(c, r) - gap(col, row)
-        if (weight <= 0.0_wp .or. .not. known(c, r)) cycle
-        total = total + weight
-        sum_of%moved = sum_of%moved + weight*carried(c, r)%moved
-        sum_of%closed = sum_of%closed + weight*carried(c, r)%closed
-        sum_of%lattice_gap = sum_of%lattice_gap + weight*carried(c, r)%lattice_gap
-        sum_of%curved = sum_of%curved + weight*carried(c, r)%curved
-      end do
-      if (total <= 0.0_wp) cycle
-      known(col, row) = .true.
-      carried(col, row) = carried_t(sum_of%moved/total, sum_of%curved/total, sum_of%closed/total, sum_of%lattice_gap/total)
+      call carry_inwards(col, row)
+      if (.not. known(col, row)) cycle
       share = merge(1.0_wp, 0.0_wp, gap(col, row) > 0.0_wp)
       associate (here => carried(col, row))
         where (measures(gap(col, row), here%lattice_gap) < here%closed)
@@ -259,6 +243,31 @@ contains
     end do
 
   contains
+
+    !> Carry the mean of the neighbors with a larger gap to a node.
+    subroutine carry_inwards(col, row)
+      integer, intent(in) :: col, row
+      type(carried_t) :: sum_of
+      real(wp) :: weight, total
+      integer :: k, c, r
+
+      total = 0.0_wp
+      do k = 1, n_neighbor
+        c = col + neighbor(1, k)
+        r = row + neighbor(2, k)
+        if (.not. inside(gap, c, r)) cycle
+        weight = gap(c, r) - gap(col, row)
+        if (weight <= 0.0_wp .or. .not. known(c, r)) cycle
+        total = total + weight
+        sum_of%moved = sum_of%moved + weight*carried(c, r)%moved
+        sum_of%closed = sum_of%closed + weight*carried(c, r)%closed
+        sum_of%lattice_gap = sum_of%lattice_gap + weight*carried(c, r)%lattice_gap
+        sum_of%curved = sum_of%curved + weight*carried(c, r)%curved
+      end do
+      if (total <= 0.0_wp) return
+      known(col, row) = .true.
+      carried(col, row) = carried_t(sum_of%moved/total, sum_of%curved/total, sum_of%closed/total, sum_of%lattice_gap/total)
+    end subroutine carry_inwards
 
     !> Return the motion of a node outside, and how far its gap closed.
     type(carried_t) function seen_from(col, row, lattice_gap)
@@ -387,19 +396,20 @@ contains
       end do
     end do
     do n = size(node, 2)/2, 1, -1
-      call sink(n, size(node, 2))
+      call sink(node, n, size(node, 2))
     end do
     do last = size(node, 2), 2, -1
       swapped = node(:, 1)
       node(:, 1) = node(:, last)
       node(:, last) = swapped
-      call sink(1, last - 1)
+      call sink(node, 1, last - 1)
     end do
 
   contains
 
     !> Put a node of the heap, whose top is the smallest gap, into its place.
-    pure subroutine sink(first, n)
+    pure subroutine sink(node, first, n)
+      integer, intent(inout) :: node(:, :)
       integer, intent(in) :: first, n
       integer :: i, child, moved(2)
 

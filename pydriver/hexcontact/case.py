@@ -1,4 +1,4 @@
-"""A contact problem from a deck or from Python, and its solution in one call."""
+"""A contact problem with its solution in one call."""
 
 from __future__ import annotations
 
@@ -238,15 +238,17 @@ class Case(Problem):
         overwrite : bool
             Replace an output that is there already.
         on_step : callable, optional
-            Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`,
-            the run ends there.
+            Called with each finished `Step`, after it was written; with a target accuracy, of every lattice.
+            If it returns a true value, or raises `hexcontact.StopRun`, the run ends there; any other
+            exception ends it, too, and is raised.
         progress : Listener or bool, optional
             True: a bar on a terminal, lines otherwise.
 
         Returns
         -------
         Result
-            All load steps, or those up to where `on_step` ended the run.
+            All load steps, or those up to where `on_step` ended the run. With an output, the run can be
+            resumed from there (`hexcontact.resume`).
 
         Warns
         -----
@@ -259,8 +261,12 @@ class Case(Problem):
 
         Raises
         ------
-        DeckError, ConvergenceError, ResourceError
-            As `hexcontact.solve.run`.
+        DeckError
+            If the output cannot be written, or the contact outgrows a fixed window.
+        ConvergenceError
+            If a load step misses its tolerance; with an output, the steps before it are recorded.
+        ResourceError
+            If there is not enough memory or disk.
         """
         from .solve.run import run
 
@@ -299,7 +305,7 @@ class Case(Problem):
 
     def _repr_html_(self) -> str:
         from .problem.preview import case_rows
-        from .solve.frictionless import peak_memory
+        from .solve.memory_needed import peak_memory
         from .text import html_table
 
         return html_table(

@@ -28,6 +28,8 @@ class Fault(NamedTuple):
         File of the key; empty for an override, or a case that was built in Python.
     line, column : int or None
         Place in the file, from 1.
+    sentence : str
+        The message without place, key and value.
     """
 
     message: str
@@ -36,6 +38,7 @@ class Fault(NamedTuple):
     file: str = ""
     line: int | None = None
     column: int | None = None
+    sentence: str = ""
 
 
 class HexcontactError(Exception):

@@ -26,8 +26,6 @@ _UNSEEN = re.compile(
     "|\r(?!\n)"
 )
 
-_DOUBTFUL = re.compile("[^ -~\u00a1-\u00ac\u00ae-\u02ff]")  # not one column wide for sure
-
 
 def visible(text: str) -> str:
     r"""Replace control characters, which XML forbids: an escape character becomes ``\u001b``."""
@@ -197,33 +195,6 @@ class TextTable(NamedTuple):
     headers: Sequence[str]  # headers of its columns; none if all are empty
     rows: Sequence[Row]  # its cells
     tight: bool = False  # whether its columns stand closer
-
-    def plain(self, width: int) -> str | None:
-        """Return the table as `__rich__` looks without colors, in a hundredth of the time.
-
-        None if it is wider than `width`, or if the width of some of its characters is in doubt.
-        """
-        rows = [[visible(cell) for cell in row] for row in self.rows]
-        widths = [max(map(len, column)) for column in zip(self.headers, *rows, strict=True)]
-        between = " " * (2 if self.tight else 3)
-        whole = sum(widths) + len(between) * (len(widths) - 1)
-        title = visible(self.title)
-        doubtful = any(_DOUBTFUL.search(cell) for row in ([title], self.headers, *rows) for cell in row)
-        # rich drops blanks at the end, then justifies
-        padded = title != title.rstrip() or any(
-            cell != cell.rstrip() and not _wraps(header)
-            for row in rows
-            for header, cell in zip(self.headers, row, strict=True)
-        )
-        if doubtful or padded or not rows or max(whole, len(title)) + 2 > width or len(title) > whole + 2:
-            return None
-
-        def line(row: Sequence[str]) -> str:
-            cells = zip(row, self.headers, widths, strict=True)
-            return " " + between.join(c.ljust(w) if _wraps(h) else c.rjust(w) for c, h, w in cells).rstrip()
-
-        head = [line(self.headers), " " + "─" * whole] if any(self.headers) else []
-        return "\n".join([*([title] if title else []), "", *head, *(line(row).rstrip() for row in rows), ""])
 
     def __rich__(self) -> Table:
         """Return the table of `rich`."""

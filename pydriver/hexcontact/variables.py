@@ -53,9 +53,8 @@ class Variable(NamedTuple):
     # whether it depends on the width of the slip zone, so that its error decreases slowly while that is
     # narrower than the lattice resolves
     slip_zone: bool = False
-    # array of fortran/python/f2py_friction.f90 or f2py_states.f90 that holds it: ``"fields"``, ``"zone"``,
-    # ``"numbers"``, ``"residuals"``; the order there is that of the rows here. ``"wear"``: a field of cycles
-    # that wear
+    # what holds it in the core, by its name: ``"fields"`` and ``"zone"`` of a state, ``"numbers"`` from which
+    # the next step starts, ``"residuals"``, ``"measures"``. ``"wear"``: a field of cycles that wear
     core: str = ""
 
     @property
@@ -382,7 +381,7 @@ RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.co
 """Residuals by the symbol of the theory."""
 
 CORE = grouped(lambda name, v: v.core)
-"""Names of the entries of each array of the interface with friction, in its order."""
+"""Names of what each part of a state in the core holds."""
 
 VECTORS = grouped(lambda name, v: name[:-2] if v.is_field and name[-2:] in ("_x", "_y", "_z") else "")
 """Components of each vector field, by their name without the axis."""

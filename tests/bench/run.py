@@ -11,7 +11,7 @@
 Load histories are compared with CONTACT if CONTACT_PROGRAM names its executable (some minutes more).
 
 Each section replaces what stands between the comments <!-- begin SECTION --> and <!-- end SECTION -->, most
-of them of docs/performance.md: its tables, and below them when and with what they were measured. All else
+of them of docs/measurements.md: its tables, and below them when and with what they were measured. All else
 stays.
 """
 

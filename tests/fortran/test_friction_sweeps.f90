@@ -241,7 +241,7 @@ contains
     type(frictional_contact_t), target :: contact
     type(operators_t), target :: operators
     type(contact_state_t) :: start
-    type(friction_iterate_t), target :: now
+    type(friction_iterate_t), target :: fresh, now
     real(wp), allocatable :: change(:, :)
     real(wp), allocatable, target :: reference(:, :, :)
     integer, parameter :: beside_rim(2, 4) = reshape([2, 7, 12, 7, 7, 2, 7, 12], [2, 4])
@@ -260,7 +260,7 @@ contains
       start%traction(at(1), at(2), 1) = 0.6_wp
       reference = start%relative_displacement
       reference(at(1), at(2), 1) = contact%problem%tangential_compliance
-      now = friction_iterate_t()
+      now = fresh
       call now%set_start(contact%problem, operators, start, reference, &
                          load_target_t([f, d, d, d], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
       if (allocated(error)) return

@@ -15,6 +15,7 @@ module test_interior
   use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_edge_tractions, only: correct_at_edges
+  use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments, n_beside
   use hc_stress_invariants, only: principal_stresses, von_mises
   use testing, only: test_t, new_test, check, check_raised, check_true, open_table
   implicit none
@@ -40,7 +41,8 @@ contains
       new_test('second body', test_second_body), &
       new_test('principal stresses', test_principal), &
       new_test('bad arguments', test_arguments), &
-      new_test('correction at edges', test_correction) &
+      new_test('correction at edges', test_correction), &
+      new_test('roots at edges', test_roots) &
     ]
   end subroutine collect_interior
 
@@ -362,5 +364,30 @@ contains
       call check_true(error, all(abs(corrected) <= 0.0_wp), 'no contact, no correction')
     end associate
   end subroutine test_correction
+
+  !> A traction that rises like a root has one. A plateau that ends at the edge has none: the polynomial through its squares is 0
+  !> ten spacings away, where nothing is to be fitted, and errors are small beside its slope.
+  subroutine test_roots(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 16
+    type(lattice_t) :: lattice
+    type(edge_root_t) :: root
+    real(wp) :: hats(-n_beside:n_beside, -n_beside:n_beside)
+    real(wp), dimension(2*n + 1, 2*n + 1) :: x, y, squares
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    hats = hat_moments(lattice)
+    squares = max(y, 0.0_wp)
+    call fit_edge_root(root, lattice, hats, sqrt(squares), squares, y, [0.1_wp, 0.0_wp], [0.0_wp, 1.0_wp])
+    call check_true(error, root%found, 'a root is found')
+    if (allocated(error)) return
+    call check(error, root%c(3), 1.0_wp, 0.2_wp, 'slope of its square')
+    if (allocated(error)) return
+    squares = merge(10.0_wp + y, 0.0_wp, y > 0.0_wp)
+    call fit_edge_root(root, lattice, hats, sqrt(squares), squares, y, [0.1_wp, 0.0_wp], [0.0_wp, 1.0_wp])
+    call check_true(error, .not. root%found, 'a plateau has no root at its edge')
+  end subroutine test_roots
 
 end module test_interior

@@ -22,7 +22,7 @@ module test_linear_solvers
     integer :: kind = wp
   contains
     procedure :: product => dense_product
-    procedure :: precondition => dense_precondition
+    procedure :: precondition_packed => dense_precondition
   end type dense_system_t
 
 contains
@@ -488,14 +488,17 @@ contains
     y = matmul(self%matrix, x)
   end subroutine dense_product
 
-  subroutine dense_precondition(self, x, y, error)
+  subroutine dense_precondition(self, nodes, n, r, z, error)
     class(dense_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
     integer :: i
-    y = [(x(i)/self%matrix(i, i), i=1, size(x))]
-    if (self%kind == sp) y = real(y, sp)
+    call nodes%pack([(self%matrix(i, i), i=1, n)], z)
+    z = r/z
+    if (self%kind == sp) z = real(z, sp)
   end subroutine dense_precondition
 
 end module test_linear_solvers

@@ -21,6 +21,7 @@ module test_normal_contact
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
   use hc_normal_rows, only: classify_row, residual_row, sum_row, projected_row, direction_row
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use test_flexibility, only: undone
   use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
@@ -308,9 +309,9 @@ contains
     do n_iteration = 0, 60
       if (maxval(abs(r)) < 1.0e-5_wp) exit
       if (continued) then
-        call preconditioner%apply(r, z, edge)
+        z = undone(preconditioner, r, edge)
       else
-        call preconditioner%apply(r, z)
+        z = undone(preconditioner, r)
       end if
       z(:, :, 1) = merge(z(:, :, 1), 0.0_wp, active)
       rz = sum(r*z)

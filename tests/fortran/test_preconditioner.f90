@@ -3,6 +3,7 @@ module test_preconditioner
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
@@ -22,7 +23,7 @@ module test_preconditioner
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_pressure_kernel, only: normal_kernel_t
-  use test_friction, only: new_sphere
+  use test_friction, only: new_sphere, precondition_shear
   use testing, only: test_t, new_test, check, check_true
   implicit none
   private
@@ -38,7 +39,7 @@ module test_preconditioner
     integer :: applications = 0
   contains
     procedure :: set_active
-    procedure :: apply
+    procedure :: apply_packed
   end type diagonal_preconditioner_t
 
 contains
@@ -67,7 +68,8 @@ contains
     type(fft_flexibility_t) :: flexibility
     type(pressure_preconditioner_t) :: preconditioner
     real(wp), dimension(n, n, 1) :: x, y, w
-    real(wp), dimension(n*n) :: compliance, mx, mw
+    real(wp), dimension(n*n) :: compliance, mx, mw, packed
+    type(active_set_t) :: nodes
     logical :: active(n, n)
     real(wp) :: work, layer, inside
     integer :: col, row, softness
@@ -97,10 +99,11 @@ contains
       if (allocated(error)) return
       x(:, :, 1) = merge(x(:, :, 1) + reshape(compliance, [n, n])*y(:, :, 1), 0.0_wp, active)
       work = 0.0_wp
-      call preconditioner%apply(reshape(x, [n*n]), mx, work)
-      call preconditioner%apply(reshape(w, [n*n]), mw, work)
-      mx = merge(mx, 0.0_wp, reshape(active, [n*n]))
-      mw = merge(mw, 0.0_wp, reshape(active, [n*n]))
+      call new_active_set(nodes, reshape(active, [n*n]), field_space_t())
+      call preconditioner%apply_packed(nodes, n*n, pack(x(:, :, 1), active), packed(:nodes%n_active), work)
+      mx = unpack(packed, reshape(active, [n*n]), 0.0_wp)
+      call preconditioner%apply_packed(nodes, n*n, pack(w(:, :, 1), active), packed(:nodes%n_active), work)
+      mw = unpack(packed, reshape(active, [n*n]), 0.0_wp)
       ! single precision
       call check(error, dot_product(reshape(w, [n*n]), mx), dot_product(reshape(x, [n*n]), mw), &
                  1.0e-5_wp*abs(dot_product(reshape(x, [n*n]), mw)), 'w^T M x')
@@ -177,8 +180,7 @@ contains
       call system%product(y, x, error)
       if (allocated(error)) return
       x = merge(x, 0.0_wp, unknown)
-      call system%precondition(x, m_x, error)
-      m_x = merge(m_x, 0.0_wp, unknown)
+      call precondition_shear(system, unknown, x, m_x, error)
     end subroutine estimate
 
   end subroutine test_slip
@@ -218,9 +220,8 @@ contains
         call system%product(v, image, error)
         if (allocated(error)) return
         image = merge(image, 0.0_wp, unknown)
-        call system%precondition(image, back, error)
+        call precondition_shear(system, unknown, image, back, error)
         if (allocated(error)) return
-        back = merge(back, 0.0_wp, unknown)
         eigenvalue = dot_product(back, image)/dot_product(v, image)
         v = back/sqrt(sum(back**2))
       end do
@@ -238,16 +239,19 @@ contains
     if (present(direction)) self%spring = [compliance, self%spring]
   end subroutine set_active
 
-  subroutine apply(self, displacement, traction, work)
+  subroutine apply_packed(self, nodes, n, displacement, traction, work)
     class(diagonal_preconditioner_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: displacement(:)
-    real(wp), intent(out), contiguous, target :: traction(:)
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
     real(wp), intent(inout) :: work
+    real(wp) :: spring(size(displacement))
 
-    traction = displacement/(self%own + self%spring)
-    work = work + 0.0_wp
+    call nodes%pack(self%spring, spring)
+    traction = displacement/(self%own + spring)
     self%applications = self%applications + 1
-  end subroutine apply
+  end subroutine apply_packed
 
   subroutine test_diagonal(error)
     type(error_t), allocatable, intent(out) :: error

@@ -30,7 +30,6 @@ contains
       new_test('sum of six triangles', test_triangles), &
       new_test('oblique lattices', test_oblique), &
       new_test('displacements', test_displacements), &
-      new_test('table of offsets', test_table), &
       new_test('finite everywhere', test_finite) &
     ]
   end subroutine collect_pyramid_influence
@@ -179,31 +178,6 @@ contains
       end do
     end do
   end subroutine test_displacements
-
-  !> The table holds what single evaluations give, with exact parity.
-  subroutine test_table(error)
-    type(error_t), allocatable, intent(out) :: error
-
-    integer, parameter :: n(2) = [7, 5]
-    real(wp), parameter :: spacing = 0.2_wp
-    type(pyramid_t) :: pyramid
-    real(wp) :: table(5, -n(1):n(1), -n(2):n(2)), basis(2, 2), point(2), expected(5)
-    integer :: i, j
-
-    basis = equilateral_basis(spacing)
-    call new_pyramid(pyramid, basis)
-    call pyramid%kernel_table(basis, table)
-    do j = -n(2), n(2)
-      do i = -n(1), n(1)
-        point = matmul(basis, real([i, j], wp))
-        expected = pyramid%kernels(point(1), point(2))
-        call check(error, table(:, i, j), expected, thr*expected(k_1), 'table of offsets')
-        if (allocated(error)) return
-        call check(error, table(:, -i, -j), [table(:k_xy, i, j), -table(k_x:, i, j)], 0.0_wp, 'parity of the table')
-        if (allocated(error)) return
-      end do
-    end do
-  end subroutine test_table
 
   !> On spokes, rims, their prolongations, and as close to them as numbers go.
   subroutine test_finite(error)

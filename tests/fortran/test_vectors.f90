@@ -6,7 +6,7 @@ module test_vectors
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_coulomb, only: coulomb_t
-  use hc_disc_law, only: cone_row, linearize, on_cone, residual_row, zone_row
+  use hc_disc_law, only: cone_row, residual_row, zone_row
   use hc_frame_rows, only: slip_compliance_row, turn_row, plane_row, add_springs_row, take_off_row
   use hc_contact_residuals, only: normal_residual
   use hc_contact_state, only: separated, stick, slip
@@ -367,7 +367,7 @@ contains
     real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp, compliance = 3.0e-13_wp
     real(wp), dimension(n) :: p, qx, qy, dsx, dsy, cut_x, cut_y
     integer :: zone(n), expected, i
-    real(wp) :: unit, largest, worst, q(2), ds(2), cut(2), direction(2), d, lack
+    real(wp) :: unit, largest, worst, q(2), ds(2), cut(2), lack
 
     p = 1.0e9_wp*sample(n)
     qx = 0.3_wp*p*cos(sample(n))
@@ -387,7 +387,7 @@ contains
       expected = separated
       cut = 0.0_wp
       if (p(i) > 0.0_wp) then
-        call linearize(q, ds, mu*p(i), mu/unit, r, expected, direction, d)
+        expected = merge(slip, stick, norm2(q - r*ds) > mu*p(i))
         cut = on_cone(q, mu*p(i))
         lack = max(lack, norm2(q - on_cone(q - ds/compliance, mu*p(i))))
       end if
@@ -405,6 +405,17 @@ contains
     ! without slip nothing is cut off
     call cone_row(n, unit, no_slip%slope(), p, qx, qy, cut_x, cut_y)
     call check(error, maxval(hypot(cut_x - qx, cut_y - qy), mask=p > 0.0_wp), 0.0_wp, 0.0_wp, 'no slip')
+
+  contains
+
+    !> Project a traction on the disc of a radius.
+    pure function on_cone(traction, bound)
+      real(wp), intent(in) :: traction(2), bound
+      real(wp) :: on_cone(2)
+
+      on_cone = traction*min(bound/norm2(traction), 1.0_wp)
+    end function on_cone
+
   end subroutine test_rows
 
   !> A spring as soft as the node leaves half of the traction, and none leaves all; nothing becomes of nothing.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from hexcontact.core.lattice import Lattice
-from hexcontact.result.journal import described, read_step
+from hexcontact.result import journal
 from hexcontact.result.layout import Metadata
 from hexcontact.result.step import Step
 from hexcontact.result.store import Store
@@ -40,5 +40,5 @@ def written(path: Path, count: int = 3, planned: int = 3, **metadata: object) ->
 
 
 def read_record(path: Path) -> tuple[Metadata, Step]:
-    """Read a record of a journal, and the metadata that it may refer to."""
-    return described(path).metadata, read_step(path)[1]
+    """Read a record of a journal, and the metadata of its run."""
+    return journal.Journal(path.parent).metadata, journal.read_record(path)[1]

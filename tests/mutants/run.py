@@ -4,7 +4,7 @@
     python tests/mutants/run.py --until check       not the whole suite
     python tests/mutants/run.py --only python       the mutants of pydriver/ alone
     python tests/mutants/run.py --again             survivors once more, after tests were added
-    python tests/mutants/run.py --write             put the table into docs/developer.md
+    python tests/mutants/run.py --write             put the tables into docs/measurements.md
 
 A seed draws mutants of fortran/ and pydriver/: an operator, a constant or a whole line is changed in a copy
 of the checkout below build/mutants. Each meets the tests of its own file, then those of `make check`;
@@ -77,10 +77,14 @@ def tests_of(path: str) -> tuple[list[str], list[str]]:
         modules = {f"hc_{other.stem}" for other in file.parent.glob("*.f90")}
         texts = {suite: (ROOT / f"tests/fortran/test_{suite}.f90").read_text() for suite in suites()}
         uses = {suite: re.findall(r"^ *use (\w+)", text, re.MULTILINE) for suite, text in texts.items()}
-        core = (ROOT / "pydriver/hexcontact/core").glob("*.py")
-        callers = [
-            f"hexcontact.core.{other.stem}" for other in core if f"hc_{file.stem}" in other.read_text()
+        table = tomllib.loads((ROOT / "fortran/python/procedures.toml").read_text())
+        known = set(re.findall(r"\w+", table["use"].get(f"hc_{file.stem}", "")))
+        rows = [
+            name for name, row in table["procedures"].items() if known & {*re.findall(r"\w+", row["calls"])}
         ]
+        calls = re.compile(rf"\bflat\.({'|'.join(rows) or '-'})\b")
+        core = (ROOT / "pydriver/hexcontact/core").glob("*.py")
+        callers = [f"hexcontact.core.{other.stem}" for other in core if calls.search(other.read_text())]
         return [suite for suite in suites() if modules & set(uses[suite])], importing(callers)
     module = ".".join(Path(path).relative_to("pydriver").with_suffix("").parts)
     return [], importing([module]) or importing([module.rpartition(".")[0]])

@@ -55,7 +55,7 @@ class Tree:
                 shutil.copyfile(source, copy)
         for name in ("fortran", "pydriver", "tests"):
             for copy in (self.root / name).rglob("*"):
-                kept = copy.is_dir() or copy.suffix in {".so", ".pyc"}
+                kept = copy.is_dir() or copy.suffix in {".so", ".pyc"} or copy.name == "flat.py"
                 if not kept and copy.relative_to(self.root).as_posix() not in listed:
                     copy.unlink()
         if not self.extension and not (self.build / "build.ninja").exists():
@@ -67,8 +67,9 @@ class Tree:
         """Build; return whether that worked."""
         if not self.extension and self._run(["ninja", "-C", str(self.build)], check=check).returncode:
             return False
-        for library in ((self.extension or self.build) / "pydriver").glob("_core*.so"):
-            shutil.copy2(library, self.root / "pydriver/hexcontact/core")
+        built = (self.extension or self.build) / "pydriver"
+        for made in (*built.glob("_core*.so"), built / "flat.py"):
+            shutil.copy2(made, self.root / "pydriver/hexcontact/core")
         return True
 
     @contextmanager

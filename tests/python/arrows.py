@@ -26,7 +26,9 @@ def fortran_arrows() -> tuple[dict[str, str], Arrows]:
             used = re.sub(r"_(extended|single)$", "", used.lower())
             if used != names[path]:
                 arrows.add((names[path], used))
-    return rooms, arrows
+    generated = tomllib.loads((FORTRAN / "python/procedures.toml").read_text())["use"]
+    rooms["flat"] = "python"
+    return rooms, arrows | {("flat", module.removeprefix("hc_")) for module in generated}
 
 
 def imports_of(path: Path, package: str) -> set[str]:
@@ -50,7 +52,7 @@ def python_arrows() -> tuple[dict[str, str], Arrows]:
     """Room of each module, and who imports whom."""
     files = {
         ".".join(path.relative_to(PYTHON.parent).with_suffix("").parts).removesuffix(".__init__"): path
-        for path in sorted([*PYTHON.rglob("*.py"), PYTHON / "core/_core.pyi"])
+        for path in sorted([*PYTHON.rglob("*.py"), *PYTHON.rglob("core/*.pyi")])
     }
     rooms = {}
     for name, path in files.items():

@@ -6,7 +6,6 @@ Each try is a process of its own, so that none finds memory that another one has
 import os
 import resource
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError
 from hexcontact.core import kernel_cache
 from hexcontact.core.contact import UNILATERAL, ElasticPair
 from hexcontact.core.friction import FrictionLaw
+from hexcontact.core.handles import HeldState
 from hexcontact.core.steps import energy_of_jump
 
 PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
@@ -34,11 +34,11 @@ def attempt(kind: str) -> None:
     if kind == "wear":
         pressure = np.maximum(1e8 - 1e18 * gap**2, 0.0)
         slip = np.where(gap > 0.0, 1e-9, 0.0)
-        state = SimpleNamespace(pressure=pressure, gap=np.maximum(gap - approach, 0.0))
+        end = HeldState.copied({"pressure": pressure, "gap": np.maximum(gap - approach, 0.0)}, {})
         mask = np.full(lattice.shape, True)
         friction = FrictionLaw(0.5)
         cycle = 0.5 * slip * pressure, slip
-        energy_of_jump(lattice, PAIR, UNILATERAL, mask, friction, 1e-14, cycle, state, True, 100.0, 1e-4)
+        energy_of_jump(lattice, PAIR, UNILATERAL, mask, friction, 1e-14, cycle, end, True, 100.0, 1e-4)
         return
     if kind == "normal":
         contact = NormalContact(lattice, PAIR, gap)

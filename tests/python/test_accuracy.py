@@ -299,7 +299,7 @@ def test_interrupted_refinement_goes_on_to_the_same_bits(
     case, path = made(**SHEARED, accuracy=0.05), tmp_path / "out.nc"
     with pytest.raises(Stop):
         case.run(path, on_step=stopping(after))
-    lattices = len(TrialFolder(tmp_path / "out.nc.d").read()[1])
+    lattices = len(TrialFolder(tmp_path / "out.nc.d").solutions)
     assert lattices == (after - 1) // 3  # of three steps each
     begun = hexcontact.open_result(path)
     assert not begun.complete
@@ -346,9 +346,9 @@ def test_other_deck_or_damage_is_refused(tmp_path: Path) -> None:
         made().run(path, on_step=stopping(2))
     with pytest.raises(DeckError, match="decks differ"):
         hexcontact.resume(path, case=made(nodes_in_radius=6))
-    ledger = tmp_path / "out.nc.d/lattices/trials.json"
+    ledger = tmp_path / "out.nc.d/lattices/header.json"
     about = json.loads(ledger.read_text())
-    ledger.write_text(json.dumps({**about, "trials_version": 99}))
+    ledger.write_text(json.dumps({**about, "journal_version": 99}))
     with pytest.raises(DeckError, match="layout 99"):
         hexcontact.resume(path)
     ledger.write_text("{")

@@ -12,12 +12,12 @@ from rich.console import Console
 from validation.hard_problems import errors_over_bounds
 
 from hexcontact import Case, ConvergenceError, DeckError
-from hexcontact.cli import tables
+from hexcontact.cli import printed
 from hexcontact.core.steps import LEAST
 from hexcontact.deck.json_schema import deck_schema
 from hexcontact.problem import preview
-from hexcontact.result import history
-from hexcontact.result.history import describe
+from hexcontact.result import history_words as history
+from hexcontact.result.history_words import describe
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
@@ -309,7 +309,7 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.solve.frictional import FrictionWindow
+    from hexcontact.solve.window import FrictionWindow
 
     advance, asked = FrictionWindow.advance, []
 
@@ -349,7 +349,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     rows = dict(history.step_rows(result.history.iloc[-1].to_dict()))
     assert rows["load steps"].startswith("stick area within ")
     console = Console(file=io.StringIO(), width=150)
-    console.print(tables.pairs("", preview.case_rows(case)))
+    console.print(printed.pairs("", preview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "chosen on the way in 2 segments (step_tolerance 0.1)" in text
     assert "uncertain by a factor of 3" in preview.work(case)
@@ -371,7 +371,7 @@ def test_an_unfinished_run_does_not_name_a_number(tmp_path: Path) -> None:
     part = open_result(out)
     assert not part.complete
     assert repr(part).splitlines()[1].startswith("  1 load step (unfinished run), ")
-    assert ("load steps", "1 (unfinished, their number was open)") in tables.file_rows(part)
+    assert ("load steps", "1 (unfinished, their number was open)") in printed.file_rows(part)
     journal = Journal(journal_of(out), companions=True)
     assert not journal.complete
     (step,) = journal

@@ -1,9 +1,6 @@
 """The command, run as users run it: exit codes, messages, files; never a traceback."""
 
 import contextlib
-import functools
-import inspect
-import io
 import re
 import signal
 import subprocess
@@ -21,14 +18,10 @@ from typer.testing import CliRunner
 
 import hexcontact
 from hexcontact import plotting
-from hexcontact.cli import guard, tables
 from hexcontact.cli.app import MODULES, app
-from hexcontact.cli.options import plain
-from hexcontact.cli.parser import parser
 from hexcontact.core import contact
 from hexcontact.result.journal import journal_of
 from hexcontact.result.store import open_result
-from hexcontact.text import TextTable
 
 ENVIRONMENT = commands.ENVIRONMENT | {"NO_COLOR": "1"}
 
@@ -348,7 +341,6 @@ def test_plot_draws_what_is_asked(solved: Path) -> None:
         2,
         "cannot draw overview of sphere.nc: .*xyz",
     )
-    refused(inside(solved, "plot", "-w", "pyramid", "-o", "cut.xyz"), 2, "cannot draw pyramid: .*xyz")
     refused(
         inside(solved, "plot", "sphere.nc", "-o", "no/cut.png"),
         2,
@@ -461,17 +453,14 @@ def test_table_of_modules_names_every_command() -> None:
 
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_a_command_imports_only_what_it_needs(deck: Path, command: str) -> None:
-    """A run without tables below the surface, wear and refinement reads none of their modules.
-
-    Plain words need no typer, and short tables in a pipe no rich.
-    """
+    """A run without tables below the surface, wear and refinement reads none of their modules."""
     own = {"check": "deck", "run": "run"}[command]
     spared = {f"hexcontact.cli.{module}" for module in MODULES if module != own}
     spared |= {f"hexcontact.{room}" for room in ("study", "plotting", "interior")}
     spared |= {f"hexcontact.solve.{name}" for name in ("lattices", "accuracy", "wear")}
     spared |= {"hexcontact.result.result", "hexcontact.result.export"}
     spared |= {"jinja2", "yaml", "xarray", "pandas", "scipy", "pint", "matplotlib", "psutil"}
-    spared |= {"typer", "click", "rich", "html", "hexcontact.solve.nonconvergence"}
+    spared |= {"hexcontact.solve.nonconvergence"}
     if command == "check":
         spared |= {"hexcontact.solve.run", "hexcontact.analytic", "netCDF4", "numpy.ma"}
     program = (
@@ -485,87 +474,6 @@ def test_a_command_imports_only_what_it_needs(deck: Path, command: str) -> None:
         [sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True, cwd=folder
     )
     assert done.stdout.splitlines()[-2:] == ["0", "[]"], done.stderr
-
-
-PLAIN = [
-    ["run", "a.toml"],
-    ["run", "--overwrite", "a b.toml", "-o", "out.nc", "-q", "--json", "--log-level=debug"],
-    ["run", "a.toml", "--set", "load.1.normal_load=20 N", "--set=grid.spacing='1 um'", "--output=o=1.nc"],
-    ["check", "a.toml", "--json", "--json"],
-    ["study", "s.toml", "--jobs", "4", "--plan", "-o", "a.nc", "-o", "b.nc"],
-    ["plot", "a.nc", "b.nc", "-w", "zones", "--through", "1um,0", "--arrows", "slip", "-f", "pdf"],
-    ["plot", "--what", "shapes"],
-    ["verify", "hertz", "punch", "--list"],
-    ["new"],
-    ["schema", "--study", "--output", "x.json"],
-]
-NOT_PLAIN = [
-    ["run"],
-    ["run", "a.toml", "b.toml"],
-    ["run", "a.toml", "--help"],
-    ["run", "a.toml", "--outputs", "x"],
-    ["run", "a.toml", "--output"],
-    ["run", "a.toml", "-ox.nc"],
-    ["run", "a.toml", "-q", "--log-level", "loud"],
-    ["run", "a.toml", "--quiet=1"],
-    ["run", "--", "a.toml"],
-    ["run", ""],
-    ["run", "a\x1b.toml"],
-    ["study", "s.toml", "--jobs", "-1"],
-    ["study", "s.toml", "--jobs", "1.5"],
-    ["info", "a.nc", "--step", "-1"],
-    ["schema", "-o", "-"],
-]
-
-
-@pytest.mark.parametrize("words", PLAIN, ids=" ".join)
-def test_plain_words_mean_what_typer_reads_in_them(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    name, *rest = words
-    function = guard.COMMANDS[name].function
-    seen: list[dict[str, Any]] = []
-
-    @functools.wraps(function)
-    def note(**given: Any) -> None:
-        seen.append(given)
-
-    monkeypatch.setitem(guard.COMMANDS, name, guard.COMMANDS[name]._replace(function=note))
-    done = CliRunner().invoke(parser(), words)
-    assert done.exit_code == 0, done.output
-    given = plain(function, rest)
-    assert given is not None
-    known = {one.name: one.default for one in inspect.signature(function).parameters.values()}
-    assert seen == [known | given]
-    assert [type(value) for value in (known | given).values()] == [type(value) for value in seen[0].values()]
-
-
-@pytest.mark.parametrize("words", NOT_PLAIN, ids=" ".join)
-def test_other_words_are_left_to_typer(words: list[str]) -> None:
-    assert plain(guard.COMMANDS[words[0]].function, words[1:]) is None
-
-
-TABLES = [
-    (
-        TextTable("Steps", ("step", "label", "P"), [("1", "in", "1 N"), ("10", "", "2.000 kN")], True),
-        True,
-    ),
-    (TextTable("Energy", ("", "label", "steps"), [("segment 1", "", "1 to 1")]), True),
-    (TextTable("", ("", ""), [("shift x", "7.5 µm ± 1"), ("a\x1b", "x ")]), True),
-    (TextTable("", ("", ""), [("title", "Δ")]), False),
-    (TextTable("A title longer than the rows", ("", ""), [("a", "b")]), False),
-    (TextTable("Wide", ("label", "P"), [(100 * "ab ", "1 N")]), False),
-]
-
-
-@pytest.mark.parametrize(("table", "quick"), TABLES)
-def test_plain_tables_look_like_those_of_rich(table: TextTable, quick: bool) -> None:
-    assert (table.plain(130) is not None) == quick
-    rich, ours = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(rich):
-        tables.rich_console().print(table)
-    with contextlib.redirect_stdout(ours):
-        tables.Pipe().print(table)
-    # the standard output of the command drops blanks at the ends of lines
-    assert len({re.sub(r" +(?=\n)", "", shown.getvalue()) for shown in (ours, rich)}) == 1
 
 
 def test_names_of_the_package_are_there() -> None:

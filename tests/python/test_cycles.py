@@ -11,9 +11,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from hexcontact import Case, Result, open_result, plotting
-from hexcontact.cli import tables
+from hexcontact.cli import printed
 from hexcontact.cli.app import app
-from hexcontact.result.history import contact_size, energy_table, some_steps
+from hexcontact.result.history_words import contact_size, energy_table, some_steps
 from hexcontact.variables import VARIABLES
 
 DECK = """\
@@ -79,7 +79,7 @@ def test_area_of_a_loop_is_no_energy_where_other_loads_do_work() -> None:
         result = Case.from_text(deck, overrides={"load": [pressed, *path], **bulk}).run()
         [other] = result.cycles["other_work"]
         assert other == words
-        [row] = [row for row in energy_table(tables.histories_of(result), 24)[1] if row[0] == "cycle 1"]
+        [row] = [row for row in energy_table(printed.histories_of(result), 24)[1] if row[0] == "cycle 1"]
         assert row[-1].endswith(f", without {words}")
     [other] = (
         Case.from_text(deck, overrides={"load": [pressed, *(load for _, load in legs)]})
@@ -97,7 +97,7 @@ def test_nothing_is_worn_without_wear(result: Result) -> None:
 def test_tables_and_json_have_the_energies(folder: Path, result: Result) -> None:
     printed = CliRunner().invoke(app, ["info", str(folder / "loop.nc")]).stdout
     assert "Dissipated energy" in printed and "segment 6" in printed and "cycle 2" in printed
-    content = tables.file_content(result)
+    content = printed.file_content(result)
     assert [cycle["dissipated_energy"] for cycle in content["cycles"]] == result.cycles[
         "dissipated_energy"
     ].to_list()
@@ -107,18 +107,18 @@ def test_tables_and_json_have_the_energies(folder: Path, result: Result) -> None
 
 
 def test_a_short_history_keeps_ends_and_peaks(result: Result) -> None:
-    histories = tables.histories_of(result)
+    histories = printed.histories_of(result)
     places = some_steps(histories, 24)
     assert len(places) == 24 and {0, 6, 18, 30, 37, 45} <= set(places)
     assert len(some_steps(histories, 4)) == 4 and some_steps(histories, 4)[-1] == 45
     shown = Console(width=200, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
-    shown.print(tables.history_table(histories, shown))
+    shown.print(printed.history_table(histories, shown))
     text = shown.export_text()
     assert text.count("-30.00 N") == 2 and text.count("30.00 N") == 5  # each end of a segment
 
 
 def test_an_ellipse_has_half_axes(result: Result) -> None:
-    last = tables.histories_of(result)[-1]
+    last = printed.histories_of(result)[-1]
     name, words = contact_size(last)
     assert name == "contact half-axes" and " by " in words
     assert result.contact_semi_major[-1] * result.contact_semi_minor[-1] * np.pi == pytest.approx(
@@ -126,7 +126,7 @@ def test_an_ellipse_has_half_axes(result: Result) -> None:
     )
     assert VARIABLES["contact_semi_major"].units == "m"
     pressed = Case.from_text(DECK.replace("[friction]\ncoefficient = 0.5\n", "")).run()
-    rows = tables.Summary.of_result(pressed).hertz
+    rows = printed.Summary.of_result(pressed).hertz
     assert [row[0] for row in rows] == [
         "max_pressure",
         "approach",

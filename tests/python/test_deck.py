@@ -782,7 +782,7 @@ def reference() -> dict[str, Any]:
     return names
 
 
-@pytest.mark.parametrize("name", ["deck.md", "studies.md", "theory/expected_errors.md"])
+@pytest.mark.parametrize("name", ["keys.md", "variables.md", "theory/expected_errors.md"])
 def test_the_deck_reference_is_up_to_date(name: str) -> None:
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     assert reference()["filled"](page) == page, "run: python docs/deck_tables.py"

@@ -27,7 +27,7 @@ DECK = commands.DECK.replace("steps = 2", "steps = 4")
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact.cli import app as cli, json_output, messages
+from hexcontact.cli import app as cli, frame, solving
 from hexcontact.result import journal, store
 
 number, sent = int(sys.argv.pop(1)), []
@@ -44,9 +44,9 @@ def signaled(module, name):
 signaled(store, "write")  # the output is assembled
 signaled(journal.Journal, "remove")
 signaled(store.Store, "close")
-signaled(messages, "overview")
-signaled(messages.Messages, "conclude")
-signaled(json_output, "write")
+signaled(solving, "overview")
+signaled(solving.Messages, "conclude")
+signaled(frame, "write_json")
 atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join(sent))))
 cli.main()
 """
@@ -84,7 +84,7 @@ def test_a_complete_run_exits_with_0_whatever_comes(
     )
     assert done.returncode == 0, done.stderr
     overview = ["overview"] if drawn else []
-    assert done.stderr.split() == ["write", "remove", "close", "close", *overview, "conclude", "write"]
+    assert done.stderr.split() == ["write", "remove", "close", "close", *overview, "conclude", "write_json"]
     assert open_result(out).complete
     picture = ["sphere.png"] if drawn else []
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.nc", *picture, "sphere.toml"]

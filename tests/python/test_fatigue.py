@@ -11,6 +11,7 @@ import tomllib
 from pathlib import Path
 
 import drawn
+import netCDF4
 import numpy as np
 import pandas
 import pytest
@@ -25,6 +26,7 @@ from hexcontact.deck.below import cycle_of, steps_fault
 from hexcontact.interior import stress as stress_below
 from hexcontact.interior.files import read_table
 from hexcontact.plotting import trailing_edge
+from hexcontact.plotting.registry import entries
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 41)
 E, NU = 200e9, 0.3
@@ -114,6 +116,26 @@ def test_next_to_no_tension_has_its_plane_about_any_axes(seed: int, numbers: tup
         ).value
         best = critical_planes.searched(critical_planes.smith_watson_topper, stress[number])
         assert value.min() > (1.0 - 1e-5) * max(best, value.max()), number
+
+
+@pytest.mark.parametrize("across", [0.0, 0.2, 0.7])
+@pytest.mark.parametrize("shear", [1e-3, 1e-4])
+def test_pressure_with_next_to_no_shear_has_its_plane(across: float, shear: float) -> None:
+    """Pressures p across x and z, shear t in the planes y: tension t^2/p in a narrow range of planes.
+
+    Cells found no tension at all, or 9 % less.
+    """
+    pressure, young, nu = np.array([100e6, 160e6, 130e6]), 72e9, 0.33
+    stress = np.zeros((3, 3, 3))
+    stress[:, 0, 0], stress[:, 2, 2] = -across * pressure, -pressure
+    side = 0 if across else 2
+    stress[:, 1, side] = stress[:, side, 1] = shear * 100e6
+    tension = shear**2 * 100e6 / (across or 1.0)
+    exact = tension * nu * (1.0 + across) * 60e6 / (2.0 * young)
+    turns = Rotation.random(20, random_state=2).as_matrix()
+    turned = turns[:, None] @ stress @ np.swapaxes(turns, 1, 2)[:, None]
+    found = fatigue.smith_watson_topper(critical_planes._listed(turned), young, nu).value
+    np.testing.assert_allclose(found, exact, rtol=1e-4)
 
 
 def test_tension_and_shear_out_of_phase_have_the_plane_across_the_tension() -> None:
@@ -464,9 +486,39 @@ def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:
     code, text = command(finished, "info", "deck_line.nc")
     assert code == 0
     assert "fatigue parameters of body 1, steps 6 to 9, 3 points" in text
-    code, text = command(finished, "plot", "deck_line.nc")
+    code, text = command(finished, "plot", "deck_line.nc", "--what", "loop")
+    assert code == 2
+    assert "deck_line.nc is a table [[stress]] or [[fatigue]]; expected --what table" in text
+    code, text = command(finished, "report", "deck_line.nc")
     assert code == 2
     assert "holds fatigue parameters, not load steps" in text
+
+
+def test_files_of_tables_are_drawn(finished: Path, tmp_path: Path) -> None:
+    for name, panels in (("line", 2), ("fatigue_1", 10)):  # curves; five maps with their scales
+        code, text = command(finished, "plot", f"deck_{name}.nc", "-o", str(tmp_path / f"{name}.png"))
+        assert code == 0, text
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+        found = read_table(finished / f"deck_{name}.nc")
+        assert found is not None
+        canvas = entries()["table"].draw(found)
+        assert len([axes for axes in canvas.axes if axes.get_visible()]) == panels
+        drawn.assert_painted(canvas)
+
+
+def test_a_table_with_a_dimension_twice_is_damaged(finished: Path, tmp_path: Path) -> None:
+    with (
+        netCDF4.Dataset(tmp_path / "bad.nc", "w") as file,
+        netCDF4.Dataset(finished / "deck_line.nc") as good,
+    ):
+        file.setncatts({name: good.getncattr(name) for name in good.ncattrs()})
+        file.createDimension("distance", 3)
+        file.createVariable("life", "f8", ("distance", "distance"))
+    for words in (("info",), ("plot",), ("export", "--csv")):
+        code, text = command(tmp_path, words[0], "bad.nc", *words[1:])
+        assert code == 2
+        assert "bad.nc is damaged or not a netCDF file (life has a dimension twice)" in text
+        assert "Warning" not in text
 
 
 def test_files_and_pages_say_where_the_largest_value_is(finished: Path) -> None:

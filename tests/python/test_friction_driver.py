@@ -19,13 +19,13 @@ from typer.testing import CliRunner
 
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
-from hexcontact.cli import report, tables
+from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
-from hexcontact.core import _core, calls, contact, friction, influence, memory
-from hexcontact.core.calls import HeldState
+from hexcontact.core import contact, flat, friction, handles, influence, memory
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.handles import HeldState
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
@@ -38,16 +38,16 @@ from hexcontact.errors import (
 )
 from hexcontact.problem import preview
 from hexcontact.problem.loads import LoadStep, Target
-from hexcontact.result import history
-from hexcontact.result.history import describe
+from hexcontact.result import history_words as history
+from hexcontact.result.history_words import describe
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve import steps as solve
-from hexcontact.solve.frictional import FrictionWindow, state_of
-from hexcontact.solve.frictionless import memory_needed
+from hexcontact.solve.memory_needed import memory_needed
 from hexcontact.solve.progress import Lines
+from hexcontact.solve.window import FrictionWindow, state_of
 from hexcontact.variables import FIELDS, WORN
 
 STIFF = {"young_modulus": 432e9, "poisson_ratio": 0.32}
@@ -406,22 +406,21 @@ def test_a_state_behind_a_stale_handle_is_an_error(monkeypatch: pytest.MonkeyPat
     pair, gap = ElasticPair(1.0, 0.0, 1.0), 0.5 * (lattice.x**2 + lattice.y**2)
     problem = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
     for handle in (0, 1, 7, -5, 2**24, 2**24 + 3_000_000, 2**62):
-        with pytest.raises(DeckError, match="the handle is stale: its state has been freed"):
-            HeldState(handle, lattice.shape)
+        with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
+            HeldState(handle, lattice.shape).view("pressure")
     states = [problem._held(problem.virgin()) for _ in range(200)]
     assert len({state.handle for state in states}) == 200
     loads = ["force"] * 3 + ["displacement"], (0.003, 0.0, 0.0, 0.0)
     monkeypatch.setattr(problem, "_held", lambda state: states[0])
     assert problem.advance(problem.virgin(), *loads).converged
     for _ in range(2):  # a stale handle is ignored
-        _core.hc_f2py_states.free_state(states[0].handle)
-    assert not any(_core.hc_f2py_states.take_zones(states[0].handle, lattice.size))
+        flat.free_object(states[0].handle)
     other = FrictionalContact(lattice, pair, gap, friction_coefficient=0.3)
     assert other.advance(other.virgin(), *loads).converged  # in the slot that is free again
     with pytest.raises(HexcontactError, match="the handle is stale: its state has been freed"):
         problem.advance(problem.virgin(), *loads)
     small = Lattice(0.1, -1, -1, 3, 3)
-    held = HeldState.copied(small.shape, [np.zeros(small.size)] * 8, [0.0] * 13)
+    held = HeldState.copied({"pressure": np.zeros(small.shape)}, {})
     monkeypatch.setattr(problem, "_held", lambda state: held)
     with pytest.raises(HexcontactError, match="stale"):
         problem.advance(problem.virgin(), *loads)
@@ -645,7 +644,7 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     assert all(sentence in html.unescape(page) for sentence in told)
     shown = CliRunner().invoke(app, ["info", str(file)]).output
     assert all(f"note: {sentence}" in shown for sentence in told)
-    assert [said for said in tables.file_content(result)["warnings"] if said in told] == told
+    assert [said for said in printed.file_content(result)["warnings"] if said in told] == told
 
 
 def sphere_of(pair: ElasticPair, friction_coefficient: float) -> tuple[FrictionalContact, float]:
@@ -674,16 +673,17 @@ def test_a_warning_that_is_an_error_does_not_leave_a_state_behind(monkeypatch: p
     def fault() -> None:
         raise KernelFolderWarning("the folder is full")
 
-    held: list[weakref.ref[calls.HeldState]] = []
+    held: list[weakref.ref[HeldState]] = []
 
-    class Counted(calls.HeldState):
+    class Counted(HeldState):
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)
             held.append(weakref.ref(self))
 
     problem, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.3)
     monkeypatch.setattr(friction, "HeldState", Counted)
-    monkeypatch.setattr(calls.kernel_cache, "warn_of_faults", fault)
+    monkeypatch.setattr(contact, "HeldState", Counted)
+    monkeypatch.setattr(handles.kernel_cache, "warn_of_faults", fault)
     with pytest.raises(KernelFolderWarning):
         problem.advance(problem.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0])
     gc.collect()
@@ -764,7 +764,7 @@ def test_all_that_moves_is_shown() -> None:
 )
 def test_the_table_fits_the_terminal(sheared: Result, width: int, dropped: set[str]) -> None:
     console = Console(width=width, file=io.StringIO())
-    console.print(tables.history_table(sheared.history.to_dict("records"), console))
+    console.print(printed.history_table(sheared.history.to_dict("records"), console))
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     assert max(map(len, lines)) <= width
     assert "…" not in "".join(lines)
@@ -838,6 +838,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
 def test_hertz_is_left_alone(sheared: Result) -> None:
     history = sheared.history.to_dict("records")[-1]
-    assert tables.against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
+    assert printed.against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
     exact = hertz_sphere(sphere().pair.effective_modulus, 1e-3, normal_load=31.5)
     assert float(sheared.max_pressure[1]) == pytest.approx(1.034 * exact.max_pressure, rel=0.01)

@@ -12,7 +12,7 @@ import pytest
 from fuzz import harness
 from fuzz.deck_mutations import garbled, mutated
 
-from hexcontact.cli import guard as cli_guard
+from hexcontact.cli import frame as cli_frame
 from hexcontact.cli import run as cli_solve
 from hexcontact.cli.deck import check
 from hexcontact.result.store import open_result
@@ -118,8 +118,8 @@ components = ["von_mises_stress"]
 )
 
 
-@cli_guard.guarded
-def planned(file: Path, as_json: bool) -> cli_guard.Content:
+@cli_frame.guarded
+def planned(file: Path, as_json: bool) -> cli_frame.Content:
     """Check a study as ``hexcontact study`` does before it runs anything."""
     return {"cases": len(Study.from_toml(file))}
 
@@ -246,19 +246,19 @@ def endless(as_json: bool) -> None:
         pass
 
 
-@cli_guard.guarded
-def unforeseen(as_json: bool) -> cli_guard.Content:
+@cli_frame.guarded
+def unforeseen(as_json: bool) -> cli_frame.Content:
     raise ZeroDivisionError("a mistake of the program")
 
 
-@cli_guard.guarded
-def not_a_number(as_json: bool) -> cli_guard.Content:
+@cli_frame.guarded
+def not_a_number(as_json: bool) -> cli_frame.Content:
     print("a word")
     return {"value": float("nan")}
 
 
-@cli_guard.guarded
-def scribble(as_json: bool, file: Path) -> cli_guard.Content:
+@cli_frame.guarded
+def scribble(as_json: bool, file: Path) -> cli_frame.Content:
     file.write_text("x")
     return {}
 

@@ -415,7 +415,7 @@ def test_series_are_bounded(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("device", ["pipe", "/dev/zero"])
-@pytest.mark.parametrize("name", ["000001.npz", "lattices/trials.json"])
+@pytest.mark.parametrize("name", ["000001.npz", "lattices/header.json"])
 def test_a_journal_holds_no_devices(name: str, device: str, folder: Path) -> None:
     Path("deck.toml").write_text(toml(BODIES) + PRESS)
     os.mkfifo("pipe")

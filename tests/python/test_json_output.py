@@ -1,6 +1,6 @@
 """``--json``: standard output is one object, whatever happens, that says what files and messages say."""
 
-import dataclasses
+import copy
 import json
 import math
 import signal
@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import hexcontact
 from hexcontact import Case, ConvergenceError
-from hexcontact.cli import json_output, verify
+from hexcontact.cli import frame, verify
 from hexcontact.cli.app import app
 from hexcontact.cli.deck import check
 from hexcontact.errors import Fault
@@ -151,7 +151,7 @@ def test_infinity_and_what_is_not_there_are_json_too(folder: Path) -> None:
         "d": Path("x"),
         5: (True, None),
     }
-    assert json_output.jsonable(odd) == {
+    assert frame.jsonable(odd) == {
         "a": None,
         "b": ["-inf", 1.5],
         "c": [0, 1],
@@ -205,29 +205,29 @@ def test_study_says_how_many_are_done_and_what_failed(folder: Path) -> None:
 
 
 def test_verify_says_each_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
-    def comparison(computed: float) -> verify.Comparison:
-        approach = verify.Row("sphere", "approach", "um", computed, analytic=2e-6, judge="analytic")
-        rows = [dataclasses.replace(approach, tolerance=1e-3), verify.Row("sphere", "time", "s", 1.0)]
-        return verify.Comparison(rows, ["a note"])
-
-    def checks(computed: float) -> dict[str, verify.Check]:
-        return {"it": verify.Check("it", "A check", "", lambda: comparison(computed))}
-
-    monkeypatch.setattr(verify, "self_test", lambda: checks(2.001e-6))
+    check = copy.deepcopy(verify.self_test()["spheres"])
+    monkeypatch.setattr(verify, "self_test", lambda: {"it": {**check, "name": "it", "title": "A check"}})
     code, told, _ = command("verify")
-    [row, time_] = told["checks"][0]["rows"]
-    assert (code, told["passed"], row["passed"], time_["passed"]) == (0, True, True, None)
-    assert (row["computed"], row["analytic"], row["reference"], row["judge"]) == (
-        2.001e-6,
-        2e-6,
+    [pressure, approach] = told["checks"][0]["rows"]
+    assert (code, told["passed"], pressure["passed"], approach["passed"]) == (0, True, True, True)
+    assert (approach["reference"], approach["analytic"], approach["judge"]) == (
+        9.302996e-6,
         None,
-        "analytic",
+        "reference",
     )
-    assert row["difference"] == pytest.approx(5e-4)
-    monkeypatch.setattr(verify, "self_test", lambda: checks(2.1e-6))
+    assert approach["difference"] == pytest.approx(approach["computed"] / 9.302996e-6 - 1.0)
+    check["values"][1]["value"] = 9.4e-6
+    monkeypatch.setattr(verify, "self_test", lambda: {"it": check})
     code, told, _ = command("verify", "it")
     assert (code, told["passed"]) == (1, False)
-    assert command("verify", "--list")[1]["checks"] == [{"name": "it", "title": "A check"}]
+    assert [row["passed"] for row in told["checks"][0]["rows"]] == [True, False]
+    assert command("verify", "--list")[1]["checks"] == [{"name": "spheres", "title": check["title"]}]
+    done = CliRunner().invoke(app, ["verify", "it"])
+    assert (done.exit_code, done.stderr) == (1, "hexcontact: verify failed: spheres\n")
+    assert "spheres: 1 of 2 comparisons passed" in done.stdout
+    [line] = [line for line in done.stdout.splitlines() if "approach" in line]
+    assert line.split()[2:5] == ["approach", "reference", "9.400000"]
+    assert line.split()[-3:] == ["-1.0e-02", "1e-07", "FAIL"]
 
 
 # --- errors -----------------------------------------------------------------------------------------------
@@ -326,5 +326,5 @@ def test_every_name_is_in_the_documentation(folder: Path) -> None:
     objects = [command("check", "deck.toml")[1], command("run", "deck.toml", "-q")[1]]
     objects += [command("run", "no.toml")[1], command("study", "study.toml", "--jobs", "1", "-q")[1]]
     objects.append(objects[2]["error"])
-    objects.append({name: None for name in Fault._fields})
+    objects.append({name: None for name in Fault._fields if name != "sentence"})
     assert {name for one in objects for name in one if f"`{name}`" not in page} == set()

@@ -115,14 +115,13 @@ def test_files_on_their_way_go_through_no_link(tmp_path: Path, put: Callable[[Pa
     journal, trials = journal_of(out), TrialFolder(journal_of(out))
     with Store(out, Metadata(planned_steps=3)) as store:
         trials.folder.mkdir(exist_ok=True)
-        for name in ("000001.npz.tmp", "stopped.txt"):
+        for name in ("header.json.tmp", "000001.npz.tmp", "stopped.txt", "lattices/header.json.tmp"):
             put(journal / name, victim)
-        put(trials.ledger.with_name(f"{trials.ledger.name}.tmp"), victim)
         store.append(made_step(0))
-        trials.write(Metadata(), [])
+        trials.begin(Metadata())
         store.close("by hand")
     assert (journal / "stopped.txt").read_text() == "by hand"
-    assert len(Journal(journal)) == 1 and trials.read()[1] == []
+    assert len(Journal(journal)) == 1 and trials.solutions == []
     put(tmp_path / "own.tmp", victim)
     with replacing(out, tmp_path / "own.tmp") as path:
         path.write_text("new")

@@ -14,8 +14,8 @@ import pytest
 from hexcontact import Case, ConvergenceError
 from hexcontact.core import influence
 from hexcontact.solve import nonconvergence
-from hexcontact.solve.frictional import state_of
 from hexcontact.solve.steps import steps, window_type
+from hexcontact.solve.window import state_of
 
 SPHERE = {"young_modulus": 210e9, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": 10e-3}}
 PLANE = {"young_modulus": 70e9, "poisson_ratio": 0.33}

@@ -14,9 +14,8 @@ import pytest
 from bench import counts, problems
 
 from hexcontact import Case
-from hexcontact.core import memory
-from hexcontact.core.calls import called
-from hexcontact.core.friction import MOTION, _api
+from hexcontact.core import flat, memory
+from hexcontact.core.friction import MOTION
 from hexcontact.surfaces import Sphere
 
 BOUNDS = counts.bounds()
@@ -45,12 +44,13 @@ def test_loose_tolerance_records_the_displacements_of_its_tractions(name: str) -
         load = press * problems.LOAD
         target = (load, shear * problem.material.friction * load, 0.0, 0.0)
         state = contact.advance(state, problems.FORCE, target, tolerance=tolerance)
-    columns = contact._columns(state)  # pressure and traction, gap, relative displacement
     motion = [getattr(state, name) for name in MOTION]
-    moved = called(_api.relative_displacement, contact._handle, columns[:, :3], motion)
-    moved[:, 0] += problems.parabola(lattice).ravel()
+    tractions = state.pressure, state.traction_x, state.traction_y
+    moved = flat.relative_displacement(contact, tractions, motion)
+    moved[0] += problems.parabola(lattice)
+    recorded = state.gap, state.relative_displacement_x, state.relative_displacement_y
     node = 1.5 * lattice.spacing * state.pressure.max()
-    assert np.abs(moved - columns[:, 3:6]).max() < 0.05 * tolerance * node
+    assert np.abs(moved - recorded).max() < 0.05 * tolerance * node
 
 
 def small(steps: int = 1) -> Case:

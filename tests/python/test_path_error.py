@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexcontact import Case
-from hexcontact.cli.tables import Summary
+from hexcontact.cli.printed import Summary
 from hexcontact.problem import plausibility
 
 P, MU, RADIUS = 20.0, 0.3, 10e-3
@@ -117,6 +117,14 @@ def test_uncertain_energy_is_stated() -> None:
     assert not [
         each for each in Summary.of_result(sphere(circle(8, 12)).run()).remarks if "uncertain" in each
     ]
+
+
+def test_energy_that_adaptive_steps_leave_uncertain_is_stated() -> None:
+    result = sphere(
+        [{"normal_load": P, "steps": "auto"}], soft=30e9, poisson=0.3, friction_coefficient=0.1
+    ).run()
+    [remark] = [each for each in Summary.of_result(result).remarks if "uncertain" in each]
+    assert remark.endswith("give numbers of steps, of which twice as many leave half of it")
 
 
 def test_static_steps_have_no_bound() -> None:

@@ -1,5 +1,6 @@
 """Pictures: what they show is what the result says. The results here are made from closed solutions."""
 
+import inspect
 import re
 import subprocess
 import sys
@@ -492,3 +493,13 @@ def test_energy_that_friction_dissipates_vanishes_at_the_edge_of_the_contact() -
     rim = np.unique([triangles.triangles[outer], np.roll(triangles.triangles, -1, axis=1)[outer]])
     assert rim.size > 20
     assert np.all(np.asarray(corners.get_array())[rim] == 0.0)
+
+
+@pytest.mark.parametrize("name", [name for name in plotting.__all__ if name != "FIGURES"])
+def test_every_figure_documents_its_parameters_and_errors(name: str) -> None:
+    draw = getattr(plotting, name)
+    text = draw.__doc__
+    documented = re.findall(r"^(\w+) : ", text.split("\nReturns\n")[0], re.MULTILINE)
+    assert documented == [*inspect.signature(draw).parameters]
+    assert "\nReturns\n-------\nmatplotlib.figure.Figure\n" in text
+    assert re.search(r"\nRaises\n------\n\w+Error\n    If ", text)

@@ -28,8 +28,7 @@ from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
 from hexcontact.core.edges import ContactEdges
 from hexcontact.core.lattice import Lattice
-from hexcontact.plotting.compliance import initial_compliance
-from hexcontact.plotting.history import panels_of
+from hexcontact.plotting.history import initial_compliance, panels_of
 from hexcontact.plotting.registry import entries
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.raster import SLIP, STICK

@@ -1,19 +1,23 @@
 """Pictures of the influence functions, and the load shapes that they compare."""
 
+import runpy
+from pathlib import Path
+
 import drawn
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from hexcontact.core.influence import displacement_errors, load_potential, pressure_errors, pyramid_functions
-from hexcontact.plotting import influence as plotting_influence
 
 HEIGHT = np.sqrt(0.75)
+INFLUENCE = runpy.run_path(str(Path(__file__).parents[2] / "docs/images/influence.py"))
+LOOKS = INFLUENCE["LOOKS"]
 
 
 def test_load_shapes_hold_the_same_volume() -> None:
     x, y = np.array([300.0, 0.0, -40.0]), np.array([0.0, 200.0, 70.0])
-    for shape in plotting_influence.LOOKS:
+    for shape in LOOKS:
         # the far field is volume/distance, with a relative error of the order of 1/distance^2
         np.testing.assert_allclose(load_potential(shape, x, y) * np.hypot(x, y), HEIGHT, rtol=1e-4)
     # of the hexagon with the inner radius 1/2 about its middle: 6 * 1/2 * 2 ln(sqrt 3)
@@ -34,17 +38,14 @@ def test_order_of_the_load_shapes() -> None:
 
 def test_displacement_error_of_the_load_shapes() -> None:
     x = np.linspace(0.0, 8.0, 33)
-    error = {
-        name: np.abs(displacement_errors(name, 10.0, x + 0.1, 0 * x)).max()
-        for name in plotting_influence.LOOKS
-    }
+    error = {name: np.abs(displacement_errors(name, 10.0, x + 0.1, 0 * x)).max() for name in LOOKS}
     assert error["pyramid"] < 2e-3
     assert error["constant on the cell"] < 2e-3
     assert error["point force"] > 2e-2
 
 
 def test_figure_of_the_pyramid_shows_the_nine_functions() -> None:
-    figure = plotting_influence.pyramid_displacements(0.2)
+    figure = INFLUENCE["pyramid_displacements"](0.2)
     drawn.assert_painted(figure)
     panels = drawn.visible(figure)
     fine = np.linspace(-2.2, 2.2, 221)
@@ -69,11 +70,11 @@ def test_figure_of_the_pyramid_shows_the_nine_functions() -> None:
 
 
 def test_figure_of_the_load_shapes_shows_loads_pressures_and_errors() -> None:
-    figure = plotting_influence.load_shapes(8)
+    figure = INFLUENCE["load_shapes"](8)
     drawn.assert_painted(figure)
     one, pressure, error, convergence = drawn.visible(figure)
     assert [axes.get_title()[:3] for axes in figure.axes] == ["(a)", "(b)", "(c)", "(d)"]
-    shapes = plotting_influence.LOOKS
+    shapes = LOOKS
     for line, (shape, look) in zip(one.lines, shapes.items(), strict=True):
         x, value = line.get_data()
         assert (len(x), line.get_color()) == (501, look["color"])
@@ -99,7 +100,7 @@ def test_figure_of_the_load_shapes_shows_loads_pressures_and_errors() -> None:
 
 
 def test_figure_of_the_elements_shows_solids_and_displacements() -> None:
-    figure = plotting_influence.load_elements(0.2)
+    figure = INFLUENCE["load_elements"](0.2)
     drawn.assert_painted(figure)
     panels = [axes for axes in figure.axes if axes.get_title().startswith("(")]
     assert [axes.get_title()[1] for axes in panels] == list("abcdefgh")
@@ -115,7 +116,7 @@ def test_figure_of_the_elements_shows_solids_and_displacements() -> None:
 
 
 def test_figure_of_load_models_adds_triangles() -> None:
-    panels = plotting_influence.load_models(5).axes
+    panels = INFLUENCE["load_models"](5).axes
     *triangles, total = panels[3].lines[1:]
     assert len(triangles) == 5
     place, height = total.get_data()

@@ -28,7 +28,7 @@ from hexcontact import Case, analytic, open_result
 from hexcontact.cli.app import app
 from hexcontact.cli.report import report, write_report
 from hexcontact.errors import DeckError
-from hexcontact.plotting.report_data import MOST_STEPS, kept_steps
+from hexcontact.plotting.report_data import MOST_STEPS, mapped_steps
 from hexcontact.result.raster import Plane
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
@@ -398,10 +398,10 @@ def test_a_history_that_ends_unloaded_shows_its_contacts(tmp_path: Path) -> None
 def test_long_histories_show_some_steps_as_maps(folder: Path) -> None:
     dataset = open_result(folder / "sheared.nc").dataset
     long = dataset.isel(step=np.arange(1000) % 6).assign_coords(step=np.arange(1, 1001))
-    kept = kept_steps(Result(long))
+    kept = mapped_steps(Result(long))
     assert len(kept) <= MOST_STEPS and kept[-1] == 1000 and len(set(np.diff(kept))) == 1
     long.attrs = dataset.attrs | {"output_every": 300}
-    assert kept_steps(Result(long)) == [300, 600, 900, 1000]
+    assert mapped_steps(Result(long)) == [300, 600, 900, 1000]
 
 
 def test_result_without_fields_has_a_page(folder: Path) -> None:

@@ -185,7 +185,8 @@ class TestResult:
 
 
 def test_the_reference_page_names_every_quantity() -> None:
-    page = (Path(__file__).parents[2] / "docs/netcdf.md").read_text()
+    docs = Path(__file__).parents[2] / "docs"
+    page = "".join((docs / name).read_text() for name in ("netcdf.md", "variables.md"))
     of_each = {f"{name}_error" for name in ESTIMATED} | {f"trial_{name}" for name in ESTIMATED}
     assert {"`NAME_error`", "`trial_NAME`"} <= set(page.split())
     for name, variable in VARIABLES.items():

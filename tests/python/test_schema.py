@@ -135,5 +135,5 @@ def test_the_schema_replaces_an_older_one_but_nothing_else(tmp_path: Path) -> No
     assert CliRunner().invoke(app, ["schema", "-o", str(old)]).exit_code == 0
     assert len(old.read_text()) > 1000
     refused = CliRunner().invoke(app, ["schema", "-o", str(deck)])
-    assert (refused.exit_code, "is there and no schema" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "exists and is not a hexcontact schema" in refused.stderr) == (2, True)
     assert deck.read_text() == "# a deck\n"

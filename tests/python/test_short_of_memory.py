@@ -15,7 +15,7 @@ from commands import ENVIRONMENT
 from numpy.testing import assert_array_equal
 
 from hexcontact import Case, ResourceError, open_result
-from hexcontact.cli import guard
+from hexcontact.cli import frame
 from hexcontact.core import memory
 from hexcontact.lock import _is_running
 
@@ -61,7 +61,7 @@ except ResourceError as error:
 # Says how much address space the command and the buffers of numpy take before it begins to work.
 BEGUN = """
 import numpy
-import hexcontact.core._core, hexcontact.cli.messages
+import hexcontact.core._core, hexcontact.cli.solving
 numpy.linalg.lstsq(numpy.eye(9), numpy.ones(9))
 print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
 """
@@ -194,8 +194,8 @@ def test_a_library_that_finds_no_descriptor(monkeypatch: pytest.MonkeyPatch, tmp
         raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
 
     sentence = "_core.so: cannot open shared object file: Error 24"
-    report = guard._report_of(ImportError(sentence, path="_core.so"))
-    assert report == guard.Report("_core.so: Too many open files", 4)
+    report = frame._report_of(ImportError(sentence, path="_core.so"))
+    assert report == frame.Report("_core.so: Too many open files", 4)
     (tmp_path / "deck.toml").write_text(DECK)
     monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(ResourceError, match=r"deck\.toml: cannot be read \(Too many open files\)"):

@@ -246,6 +246,7 @@ def test_no_convergence_is_told_with_residuals_and_keeps_the_steps_before(
     assert sorted(p.name for p in journal_of(tmp_path / "out.nc").iterdir()) == [
         "000001.npz",
         "000002.npz",
+        "header.json",
         "stopped.txt",
     ]
 

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import types
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -41,7 +42,7 @@ from hexcontact.study.backend import BACKENDS, KEYS, Backend
 from hexcontact.study.backends.processes import LocalPool
 from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
-from hexcontact.study.tables import StudyFile
+from hexcontact.study.study_file import StudyFile
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -105,12 +106,12 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Solve cases in this process, which is quicker; return the list of those that were solved."""
     solved: list[str] = []
 
-    def outcomes(self: Any, jobs: Any, cancel: Any) -> Any:
+    def outcomes(pool: Any, jobs: Any, cancel: Any) -> Any:
         for job in jobs:
             solved.append(job.hash)
             yield solve_case(job)
 
-    monkeypatch.setattr(LocalPool, "outcomes", outcomes)
+    monkeypatch.setattr(study_module, "outcomes", outcomes)
     return solved
 
 
@@ -460,7 +461,9 @@ time = 01:30:00
 nice = 10
 exclusive = true
 requeue = false
-nodelist = "n[1-3]"
+nodelist = "n[1-3],n7"
+mail-type = "END,FAIL"
+export = "NONE"
 """
     (folder / "study.toml").write_text(told + options)
     (folder / "study.toml").rename("my study; touch PWN.toml")
@@ -479,7 +482,9 @@ nodelist = "n[1-3]"
         "time=01:30:00",
         "nice=10",
         "exclusive",
-        "nodelist=n[1-3]",
+        "nodelist=n[1-3],n7",
+        "mail-type=END,FAIL",
+        "export=NONE",
     }
     words = lines[-1].replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
     environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "3"}
@@ -500,7 +505,8 @@ nodelist = "n[1-3]"
         ('array = "1-9"', "slurm.array = "),
         ("time = [1, 2]", "slurm.time = [1, 2]: expected text, a number, or true or false"),
         ('comment = ""', "slurm.comment = "),
-        ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected one value, without commas"),
+        ('export = "ALL,LD_PRELOAD=/tmp/x.so"', "expected ALL, NIL or NONE"),
+        ('export = "LD_PRELOAD=/tmp/x.so"', "expected ALL, NIL or NONE"),
         ("cases_per_task = 0", "slurm.cases_per_task = 0: expected a whole number of at least 1"),
     ],
 )
@@ -713,12 +719,11 @@ def test_a_new_backend_has_its_key_and_runs_the_cases(folder: Path, monkeypatch:
         def __init__(self, settings: int, cases: int) -> None:
             self.said = settings, cases
 
-        def outcomes(self, jobs: Any, cancel: Any) -> Any:
-            assert self.said == (3, len(jobs))
-            yield from map(solve_case, jobs)
-
-        def stop(self) -> None:
-            pass
+        def submit(self, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
+            assert self.said == (3, 2)
+            future: Future[Any] = Future()
+            future.set_result(work(*args, **options))
+            return future
 
     file = extended(StudyFile, {"here": backend_registry.KEYS["here"]})
     monkeypatch.setattr(study_module, "StudyFile", file)

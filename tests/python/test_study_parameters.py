@@ -15,7 +15,7 @@ from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck.formula import Formula
 from hexcontact.problem import window
-from hexcontact.study.backends.processes import LocalPool
+from hexcontact.study import study as study_module
 from hexcontact.study.job import solve_case
 from hexcontact.study.study import Study
 
@@ -40,7 +40,7 @@ NU = ("body.1.poisson_ratio", "body.2.poisson_ratio")
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in a folder of its own, and solve cases in this process."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(LocalPool, "outcomes", lambda self, jobs, cancel: map(solve_case, jobs))
+    monkeypatch.setattr(study_module, "outcomes", lambda pool, jobs, cancel: map(solve_case, jobs))
     return tmp_path
 
 

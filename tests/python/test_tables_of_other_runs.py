@@ -91,6 +91,15 @@ def test_tables_are_the_same_however_the_run_went(name: str, tmp_path: Path) -> 
         assert len(whole.attrs["steps"]) >= 4
 
 
+def test_work_of_errors_of_tables() -> None:
+    """Five lattices of a quarter of the nodes count in operator applications of the lattice of the run."""
+    deck = BODIES.replace("= 6", "= 20") + PRESS + '[[load]]\ntangential_load_x = "9 N"\nsteps = 40\n'
+    table = "[[stress]]\ndepths = [0]\nestimate_error = true\n"
+    words = [preview.work(Case.from_text(text)) for text in (deck, deck + table)]
+    without, with_errors = (float(text.split()[1].replace(",", "")) for text in words)
+    assert 2.0 < with_errors / without < 2.6, words
+
+
 def test_what_is_said_of_a_run_with_wear() -> None:
     """Before it the work of the cycles, on the way cycles and depth."""
     given = BODIES + WEAR.replace("cycles = 20_000", "cycles = 20_000\njump = 2_000")

@@ -5,6 +5,7 @@ from dataclasses import fields
 import pytest
 
 from hexcontact import ContactState
+from hexcontact.core import flat
 from hexcontact.variables import (
     CORE,
     ESTIMATED,
@@ -40,6 +41,9 @@ def test_the_arrays_of_the_core_hold_a_contact_state_and_its_measures() -> None:
         *("converged", "sliding", "touches_rim", "sweeps", "cuts", "operator_applications", "stopped"),
     }
     assert set(STATE[True]) == {*CORE["fields"], *CORE["zone"]}
+    assert set(flat.History._fields) == set(CORE["numbers"]) < set(flat.Solution._fields) < set(known)
+    assert set(CORE["residuals"]) < set(flat.Solution._fields)
+    assert set(flat.Measures._fields) == set(CORE["measures"])
     assert STATE[False] == ("pressure", "gap", "zone")
 
 

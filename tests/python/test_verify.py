@@ -4,17 +4,17 @@ import csv
 import math
 import tomllib
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
-from validation import checks, fatigue, normal, runs
+from validation import checks, fatigue, frame, normal, page, runs
 from validation import reference as table_of_references
+from validation.frame import Check
 from validation.reference import TABLE, Comparison, reference
-from validation.run import markdown
 
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.cli import verify
-from hexcontact.cli.verify import Check
 from hexcontact.core.contact import ElasticPair
 from hexcontact.errors import DeckError
 
@@ -34,7 +34,7 @@ def test_every_row_of_the_table_can_be_read() -> None:
     assert len(rows) > 700
     assert all(None not in row and None not in row.values() for row in rows)  # as many fields as headers
     for row in rows:
-        if row["unit"] in verify.UNITS:
+        if row["unit"] in frame.UNITS:
             assert not math.isnan(reference(row["case"], row["quantity"]).reference)
 
 
@@ -105,37 +105,53 @@ def made_up(computed: float) -> dict[str, Check]:
 
 @pytest.mark.parametrize(("computed", "code"), [(2.001, 0), (2.1, 1)])
 def test_exit_code(capsys, computed: float, code: int) -> None:
-    assert verify.main([], checks=made_up(computed)) == code
+    assert frame.main([], checks=made_up(computed)) == code
     printed = capsys.readouterr()
     assert ("FAIL" in printed.out) == bool(code)
     assert ("verify failed: made-up" in printed.err) == bool(code)
     assert f"made-up: {1 if code else 2} of 2 comparisons passed" in printed.out
 
 
-def test_markdown() -> None:
-    check = made_up(2.1)["made-up"]
-    lines = markdown(check, check.run()).splitlines()
-    assert lines[0] == "## Made up"
-    assert "| one | length (µm) |  |  | **2** | 2.1 | +1.0e-01 µm | 1e-02 µm | FAIL |" in lines
-    assert "| one | time (s) |  |  |  | 0.5 |  |  |  |" in lines
-    assert "| one | max \\|p - q\\| |  |  | **0** | 1.000000e-09 | +1.0e-09 | 1e-08 | ok |" in lines
-    widths = {line.replace("\\|", "").count("|") for line in lines if line.startswith("|")}
-    assert len(widths) == 1
+def test_page_has_the_worst_row_of_each_check_and_the_file_all_rows(tmp_path: Path) -> None:
+    target = tmp_path / "validation.md"
+    known = made_up(2.1) | {"other": Check("other", "Other (Table 1)", "", lambda: Comparison())}
+    other = Comparison()
+    other.add("two", "angle", "-", 1.01, analytic=1.0, relative=0.1)
+    page.write(known["other"], other, known, target)
+    assert "compares 1 numbers" in target.read_text()
+    page.write(known["made-up"], known["made-up"].run(), known, target)
+    text = target.read_text()
+    assert "compares 3 numbers with independent values; 2 are within" in text
+    assert text.splitlines()[-2:] == [
+        "|`made-up`|Made up|one, length (µm)|analytic|+1.0e-01 µm|1e-02 µm|",
+        "|`other`|Other|two, angle|analytic|+1.0e-02|1e-01|",
+    ]
+    rows = page.read(target.with_suffix(".csv"))
+    assert [row["quantity"] for row in rows["made-up"]] == ["length (µm)", "max |p - q|"]  # no times
+    assert [(row["computed"], row["result"]) for row in rows["other"]] == [("1.01", "ok")]
+    page.write(known["made-up"], made_up(2.001)["made-up"].run(), known, target)
+    assert [len(found) for found in page.read(target.with_suffix(".csv")).values()] == [2, 1]
+    assert "3 are within" in target.read_text()
+
+
+def test_page_and_file_have_the_same_rows_of_every_check(tmp_path: Path) -> None:
+    rows = page.read(page.PAGE.with_suffix(".csv"))
+    assert list(rows) == list(checks.CHECKS)
+    lines = [page.line(checks.CHECKS[name], found) for name, found in rows.items()]
+    assert page.PAGE.read_text(encoding="utf-8").endswith("".join(lines))
 
 
 def test_list_and_unknown_names(capsys) -> None:
-    assert verify.main([], checks=checks.CHECKS, listing=True) == 0
+    assert frame.main([], checks=checks.CHECKS, listing=True) == 0
     listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     assert listed == list(checks.CHECKS)
-    with pytest.raises(DeckError, match=r"no check 'table-9\.1'; expected one of spheres, "):
-        verify.main(["table-9.1"])
+    with pytest.raises(DeckError, match=r"no check 'table-9\.1'; expected one of kernels, "):
+        frame.main(["table-9.1"], checks=checks.CHECKS)
 
 
 def test_an_installation_is_tested_by_known_solutions() -> None:
     for check in verify.self_test().values():
-        comparison = check.run()
-        assert failures(comparison) == []
-        assert all(row.passed for row in comparison.rows)
+        assert [row for row in verify.compared(check) if not row["passed"]] == []
     assert list(verify.self_test()) == ["spheres", "spheres-direct", "shear", "fretting", "interface"]
 
 
@@ -143,7 +159,7 @@ def test_values_of_the_self_test_are_those_of_the_references() -> None:
     text = (resources.files("hexcontact") / "data/self_test.toml").read_text()
     values = [value for entry in tomllib.loads(text)["check"] for value in entry["values"]]
     with TABLE.open(newline="", encoding="utf-8") as stream:
-        rows = [row for row in csv.DictReader(stream) if row["unit"] in verify.UNITS]
+        rows = [row for row in csv.DictReader(stream) if row["unit"] in frame.UNITS]
     known = [reference(row["case"], row["quantity"]).reference for row in rows] + [1000.0]  # N, given
     layers = np.loadtxt(TABLE.with_name("interface.csv"), delimiter=",", skiprows=2, usecols=(2, 3))
     known += [number for approach, peak in layers for number in (approach, peak * 2 / math.pi)]

@@ -9,9 +9,9 @@ from matplotlib.collections import TriMesh
 
 import hexcontact
 from hexcontact import Case, DeckError, ElasticPair, NormalContact, PathWarning, plotting
-from hexcontact.cli.tables import Summary
+from hexcontact.cli.printed import Summary
 from hexcontact.deck.write import starter
-from hexcontact.result.history import energy_table, step_rows
+from hexcontact.result.history_words import energy_table, step_rows
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.solve import wear as solving
 from hexcontact.text import cycle_count
@@ -183,7 +183,7 @@ def test_run_with_a_damaged_last_record_has_the_same_bits(tmp_path: Path) -> Non
     case.run(out, overwrite=True, on_step=lambda step: step.number == 17)
     for lost in Journal(journal_of(out)).records[-2:]:
         lost.unlink()
-    with pytest.warns(UserWarning, match="step 15 has lost what the next cycle of wear starts from"):
+    with pytest.warns(UserWarning, match="the restart data of step 15 are missing"):
         again = hexcontact.resume(out)
     for name in ("wear_cycles", "max_worn_depth"):
         assert again[name].values == pytest.approx(whole[name].values, rel=0.05, nan_ok=True)

@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hexcontact.cli.verify import Check
-
+from .frame import Check
 from .reference import Comparison, reference
 
 
@@ -100,7 +99,7 @@ _ALL = (
     ),
     Check(
         "hard-error-bars",
-        "Estimated discretization errors of problems without a closed-form solution",
+        "Estimated errors of problems without closed-form solution",
         "How many errors of every load step lie within the estimated ones, against one fine lattice.",
         _of("hard_problems", "hard_error_bars"),
     ),

@@ -1,6 +1,6 @@
 """Critical planes of random histories against a search of its own: a spread of normals, refined locally.
 
-`cd tests; python -m validation.critical_planes [number of histories]` prints the table.
+`cd tests; python -m validation.critical_planes [number of histories [seed]]` prints the table.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def shortfalls(number: int, seed: int = 1) -> dict[str, dict[str, Array]]:
         plane, turned = found_by(_listed(stress)), found_by(_listed(other))
         here = np.array([parameter(s, n[None])[0] for s, n in zip(stress, plane.normal, strict=True)])
         best = np.array([searched(parameter, s) for s in stress])
-        scale = np.maximum(abs(best), 1e-30)
+        scale = np.maximum(np.maximum(abs(best), abs(plane.value)), 1e-30)
         table[name] = {
             "kind": np.array(kinds),
             "missing": (best - plane.value) / scale,
@@ -151,10 +151,10 @@ def shortfalls(number: int, seed: int = 1) -> dict[str, dict[str, Array]]:
     return table
 
 
-def main(number: int = 10_000) -> None:
+def main(number: int = 10_000, seed: int = 1) -> None:
     """Print the largest shares that are missing."""
     print("| parameter | histories | missing | about other axes |\n|---|---|---|---|")
-    for name, found in shortfalls(number).items():
+    for name, found in shortfalls(number, seed).items():
         for kind in dict.fromkeys(found["kind"].tolist()):
             some = found["kind"] == kind
             missing, turned = found["missing"][some], found["turned"][some]
@@ -162,4 +162,4 @@ def main(number: int = 10_000) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:2]))
+    main(*(int(word) for word in sys.argv[1:3]))

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexcontact.cli import verify
-from hexcontact.cli.verify import UNITS, Row
+from . import frame
+from .frame import UNITS, Row
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Known:
     analytic: float = math.nan
 
 
-class Comparison(verify.Comparison):
+class Comparison(frame.Comparison):
     """The rows of a check, added one by one."""
 
     def add(

@@ -2,7 +2,7 @@
 
 python tests/validation/run.py                      all checks (minutes)
 python tests/validation/run.py table-9.2 fretting   these; --list lists them
-python tests/validation/run.py --table              Markdown, as in docs/validation.md
+python tests/validation/run.py --write              also updates docs/validation.csv and docs/validation.md
 """
 
 from __future__ import annotations
@@ -14,34 +14,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hexcontact import DeckError
-from hexcontact.cli import verify
-from hexcontact.cli.verify import HEADERS, Check, Comparison, cells_of, judge_column
+from validation import frame, page
 from validation.checks import CHECKS
-
-
-def markdown(check: Check, comparison: Comparison) -> str:
-    """Return a check as a Markdown section; the value that judges a row is in bold."""
-    lines = [f"## {check.title}", "", check.text, "", f"`make verify CHECKS={check.name}`", ""]
-    lines += ["| " + " | ".join(HEADERS) + " |", "|" + "---|" * 2 + "---:|" * (len(HEADERS) - 3) + "---|"]
-    for row in comparison.rows:
-        cells, judge = [cell.replace("|", "\\|") for cell in cells_of(row)], judge_column(row)
-        if judge >= 0:
-            cells[judge] = f"**{cells[judge]}**"
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", *(f"{note}  ".replace("|", "\\|") for note in comparison.notes)]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-PREAMBLE = """# Validation
-
-Made by `python tests/validation/run.py --table > docs/validation.md`; do not edit.
-
-*published*: as printed in the dissertation. *reference*: the exact solution of the same discrete problem, or
-a converged solution, from an independent program (`tests/reference/benchmarks.csv`). *analytic*: closed
-solution. The value in bold judges the row; *difference* and *tolerance* are relative to it, or have its unit.
-Rows without a tolerance are reported only. Seconds are those of the machine that made this table, one run
-each, preparing the case included.
-"""
+from validation.frame import Check, Comparison
 
 
 def main() -> int:
@@ -51,13 +26,16 @@ def main() -> int:
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="which checks; default: all")
     parser.add_argument("--list", action="store_true", help="list the checks")
-    parser.add_argument("--table", action="store_true", help="print Markdown tables")
+    parser.add_argument("--write", action="store_true", help="update the page and its file of rows")
     words = parser.parse_args()
-    if words.table:
-        print(PREAMBLE)
-    output = (lambda check, found: print(markdown(check, found))) if words.table else verify.show
+
+    def output(check: Check, found: Comparison) -> None:
+        frame.show(check, found)
+        if words.write:
+            page.write(check, found, CHECKS)
+
     try:
-        return verify.main(words.names, checks=CHECKS, output=output, listing=words.list)
+        return frame.main(words.names, checks=CHECKS, output=output, listing=words.list)
     except DeckError as error:
         parser.error(str(error))
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, reals
-from ..core.analytic import at_points, flat
+from ..core import flat
 from ..errors import DeckError
 from .frictionless import Given, driven_by, require_positive
 
@@ -46,12 +46,12 @@ class EllipticContact:
 
     def local(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """Return points (m) relative to the ellipse: coordinates along its axes, as shares of them."""
-        along, across = at_points(flat.ellipse_local, astuple(self), (reals(x, "x"), reals(y, "y")))
-        return along, across
+        found: tuple[Array, Array] = flat.ellipse_local(self, reals(x, "x"), reals(y, "y"))
+        return found
 
     def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the contact pressure (Pa) at points (x, y) (m, broadcast); 0 outside the contact."""
-        return at_points(flat.ellipse_pressure, astuple(self), (reals(x, "x"), reals(y, "y")))
+        return np.asarray(flat.ellipse_pressure(self, reals(x, "x"), reals(y, "y")))
 
 
 def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[Given]) -> EllipticContact:
@@ -77,10 +77,8 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
     ):
         raise DeckError("hessian is not a symmetric 2x2 tensor")
     name, value = driven_by(given, with_radius=False)
-    contact, code, message = flat.hertz(effective_modulus, tensor, name == "normal_load", value)
-    if code:
-        raise DeckError(message.decode().strip())
-    return EllipticContact(effective_modulus, *contact[1:].tolist())
+    found = flat.hertz(effective_modulus, tensor, name == "normal_load", value)
+    return EllipticContact(**found._asdict())
 
 
 def crossed_cylinders(

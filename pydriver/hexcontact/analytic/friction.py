@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, reals
-from ..core.analytic import at_points, flat
+from ..core import flat
 from ..errors import DeckError
 from .frictionless import AxisymmetricContact
 
@@ -46,12 +46,12 @@ class MindlinContact:
     @property
     def sliding_load(self) -> float:
         """Tangential load mu P at which the spheres slide, N."""
-        return float(flat.mindlin_sliding(astuple(self))[0])
+        return float(flat.mindlin_sliding(self)[0])
 
     @property
     def sliding_shift(self) -> float:
         """Rigid shift at which the spheres begin to slide, Delta_s = 3 mu P S/(16 a), m."""
-        return float(flat.mindlin_sliding(astuple(self))[1])
+        return float(flat.mindlin_sliding(self)[1])
 
     def _bounded(self, load: ArrayLike) -> Array:
         """Return loads (N) up to the sliding load; ValueError for others."""
@@ -62,19 +62,19 @@ class MindlinContact:
 
     def stick_radius(self, load: ArrayLike) -> Array:
         """Return the stick radius (m) under the first loading to Q (N): c = a (1 - Q/mu P)^(1/3)."""
-        return at_points(flat.mindlin_stick_radius, astuple(self), [self._bounded(load)])
+        return np.asarray(flat.mindlin_stick_radius(self, self._bounded(load)))
 
     def shift(self, load: ArrayLike) -> Array:
         """Return the rigid shift (m) under the first loading to Q (N): Delta_s [1 - (1 - Q/mu P)^(2/3)]."""
-        return at_points(flat.mindlin_shift, astuple(self), [self._bounded(load)])
+        return np.asarray(flat.mindlin_shift(self, self._bounded(load)))
 
     def load(self, shift: ArrayLike) -> Array:
         """Return the tangential load (N) under a first shift (m): mu P [1 - (1 - Delta/Delta_s)^(3/2)]."""
-        return at_points(flat.mindlin_load, astuple(self), [reals(shift, "shift")])
+        return np.asarray(flat.mindlin_load(self, reals(shift, "shift")))
 
     def traction(self, r: ArrayLike, load: float) -> Array:
         """Shear traction (Pa) at distance r (m) from the axis under the first loading to Q (N)."""
-        return at_points(flat.mindlin_traction, astuple(self), [reals(r, "r")], float(self._bounded(load)))
+        return np.asarray(flat.mindlin_traction(self, reals(r, "r"), float(self._bounded(load))))
 
     def shift_unloading(self, load: ArrayLike, peak: float) -> Array:
         """Return the rigid shift (m) at Q (N) on the way back from ``peak`` = Q* > 0 towards -Q*, P constant.
@@ -82,16 +82,16 @@ class MindlinContact:
         The way from -Q* back up is the point reflection: -shift_unloading(-Q, peak).
         """
         top = float(self._bounded(peak))
-        return at_points(flat.mindlin_shift_unloading, astuple(self), [self._bounded(load)], top)
+        return np.asarray(flat.mindlin_shift_unloading(self, self._bounded(load), top))
 
     def traction_unloading(self, r: ArrayLike, load: float, peak: float) -> Array:
         """Return the shear traction (Pa) at Q (N) on the way back from ``peak`` = Q* > 0."""
         loads = float(self._bounded(load)), float(self._bounded(peak))
-        return at_points(flat.mindlin_traction_unloading, astuple(self), [reals(r, "r")], *loads)
+        return np.asarray(flat.mindlin_traction_unloading(self, reals(r, "r"), *loads))
 
     def energy_per_cycle(self, peak: float) -> float:
         """Return the energy (J) of one cycle between +Q* and -Q* at constant P (Q* = ``peak``, N)."""
-        return float(flat.mindlin_energy(astuple(self), float(self._bounded(peak))))
+        return float(flat.mindlin_energy(self, float(self._bounded(peak))))
 
 
 @dataclass(frozen=True)
@@ -180,21 +180,21 @@ class LubkinTorsion:
     @property
     def sliding_torque(self) -> float:
         """Torque of full slip, 3 pi mu P a/16, N m."""
-        return float(flat.lubkin_sliding_torque(astuple(self)))
+        return float(flat.lubkin_sliding_torque(self))
 
     def twist(self, stick_radius: float) -> float:
         """Return the twist (rad) at a stick radius c (m): (S_t mu p0/2) [K - E](k), k^2 = 1 - c^2/a^2."""
-        return float(flat.lubkin_twist(astuple(self), stick_radius))
+        return float(flat.lubkin_twist(self, stick_radius))
 
     def torque(self, stick_radius: float) -> float:
         """Return the torque (N m) at which the stick radius is c (m)."""
-        return float(flat.lubkin_torque(astuple(self), stick_radius))
+        return float(flat.lubkin_torque(self, stick_radius))
 
     def stick_radius(self, torque: float) -> float:
         """Return the stick radius (m) under a first torque (N m) below the sliding torque."""
         if not 0.0 <= torque < self.sliding_torque:
             raise DeckError("the torque is not between 0 and the sliding torque 3 pi mu P a/16")
-        return float(flat.lubkin_stick_radius(astuple(self), torque))
+        return float(flat.lubkin_stick_radius(self, torque))
 
 
 def no_slip_constants(beta: float) -> tuple[float, float]:
@@ -267,12 +267,12 @@ class PlaneCattaneo:
         """Return half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
         if abs(load) / (self.friction_coefficient * self.normal_load) > 1.0:
             raise DeckError("the tangential load is larger than mu P'")
-        return float(flat.plane_stick_half_width(astuple(self), load))
+        return float(flat.plane_stick_half_width(self, load))
 
     def traction(self, x: ArrayLike, load: float) -> Array:
         """Return the shear traction (Pa) at x (m) from the middle under a first loading to Q' (N/m)."""
         self.stick_half_width(load)  # refuses a load above mu P'
-        return at_points(flat.plane_traction, astuple(self), [reals(x, "x")], load)
+        return np.asarray(flat.plane_traction(self, reals(x, "x"), load))
 
 
 def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float:

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, number, reals
-from ..core.analytic import at_points
-from ..core.analytic import axisymmetric as flat
+from ..core import flat
 from ..errors import DeckError
 
 Profile = Callable[[Array], Array]
@@ -129,14 +128,10 @@ def power_law(
 
 def _contact(kind: int, body: tuple[float, ...], name: str, value: float) -> AxisymmetricContact:
     """Solve the contact with a body of the Fortran library."""
-    radius, approach, load, peak = flat.contact_of_body(kind, body, _GIVEN.index(name), value).tolist()
+    indenter = kind, body
+    radius, approach, load, peak = flat.contact_of_body(indenter, _GIVEN.index(name), value)
     return AxisymmetricContact(
-        body[0],
-        radius,
-        approach,
-        load,
-        peak,
-        lambda r: at_points(flat.pressure_of_body, body, [r], radius, kind),
+        *(body[0], radius, approach, load, peak), lambda r: flat.pressure_of_body(indenter, r, radius)
     )
 
 
@@ -201,10 +196,10 @@ def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) 
     require_positive(effective_modulus=effective_modulus, radius=radius)
     name, value = driven_by(given, with_radius=False)
     body = effective_modulus, radius
-    stiffness = float(flat.flat_punch_stiffness(body))
+    stiffness = float(flat.flat_punch_stiffness(*body))
     load = value if name == "normal_load" else stiffness * value
     return AxisymmetricContact(
-        *body, load / stiffness, load, np.inf, lambda r: at_points(flat.flat_punch_pressure, body, [r], load)
+        *body, load / stiffness, load, np.inf, lambda r: flat.flat_punch_pressure(*body, r, load)
     )
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array
-from ..core.analytic import flat
+from ..core import flat
 from ..core.measures import line_of
 from ..deck.recorded import recorded
 from ..deck.surfaces import Surface

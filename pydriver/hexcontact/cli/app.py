@@ -10,15 +10,10 @@ import gc
 import importlib
 import os
 import sys
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..solve import interruption
-from .guard import COMMANDS, Content, guarded, standard_streams, warn_plainly
-from .options import plain
-
-if TYPE_CHECKING:
-    from typer import Typer
+from . import frame
 
 MODULES = {
     "run": ("run", "resume"),
@@ -43,27 +38,20 @@ def main() -> None:
     # threshold of 700 a sixth of the time of `check` goes into looking for garbage among them.
     gc.set_threshold(100_000)
     interruption.ends_process = True
-    warn_plainly()
+    frame.warn_plainly()
     try:
-        with standard_streams():
-            guarded(_called)(sys.argv[1:])
-            raise SystemExit(0)
+        with frame.standard_streams():
+            frame.guarded(_called)()
     finally:
         # The process ends, and its memory with it: the interpreter need not look for garbage once more.
         gc.disable()
         gc.freeze()
 
 
-def _called(words: Sequence[str]) -> Content:
-    """Call the sub-command that the words of a command line name."""
-    _import_commands(next((word for word in words if not word.startswith("-")), ""))
-    command = COMMANDS.get(words[0]) if words else None
-    given = plain(command.function, words[1:]) if command else None
-    if command and given is not None:
-        command.function(**given)
-    else:
-        _whole()()
-    return None
+def _called() -> None:
+    """Call the sub-command that the words of the command line name."""
+    _import_commands(next((word for word in sys.argv[1:] if not word.startswith("-")), ""))
+    frame.app()
 
 
 def _import_commands(name: str = "") -> None:
@@ -73,16 +61,9 @@ def _import_commands(name: str = "") -> None:
         importlib.import_module(f".{module}", __package__)
 
 
-def _whole() -> Typer:
-    """Return the parser that knows everything about the sub-commands that are imported."""
-    from .parser import parser
-
-    return parser()
-
-
 def __getattr__(name: str) -> Any:
     """Return the whole command as `app`."""
     if name == "app":
         _import_commands()
-        return _whole()
+        return frame.app
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

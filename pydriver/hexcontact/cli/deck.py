@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..files import beginning, replacing
 from ..text import did_you_mean, listed, visible
-from .guard import Content, command, print_error, print_output
+from .frame import Content, command, print_error, print_output
 from .options import AsJson, DeckFile, Settings, argument, case_of, flag, output_to, target_of
 
 if TYPE_CHECKING:
@@ -22,12 +22,12 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
     from ..problem import plausibility
     from ..problem.preview import case_rows
     from ..problem.refinement import least_and_most
-    from ..solve.frictionless import peak_memory, require_memory
-    from . import tables
+    from ..solve.memory_needed import peak_memory, require_memory
+    from . import printed
 
     case = case_of(deck, settings)
     if not as_json:
-        tables.console().print(tables.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
+        printed.console().print(printed.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first possible result
     require_memory(first, first.lattice)
     target = target_of(case, deck)
@@ -35,14 +35,14 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
         return case_content(case, target)
     for sentence in plausibility.warnings(case):
         print_error(f"warning: {sentence}")
-    tables.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
+    printed.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
     return None
 
 
 def case_content(case: Problem, output: Path) -> dict[str, Any]:
     """Return a case as the object that ``check --json`` prints."""
     from ..problem import plausibility, preview
-    from ..solve.frictionless import peak_memory
+    from ..solve.memory_needed import peak_memory
 
     lattice = case.lattice
     return {
@@ -74,16 +74,14 @@ def schema(
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
-    from ..study.tables import study_schema
+    from ..study.study_file import study_schema
 
     text = json.dumps(study_schema() if study else deck_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None or str(output) == "-":
         print(text, end="")
         return
     if (start := beginning(output, 1000)) and b'"title": "hexcontact ' not in start:
-        raise DeckError(
-            f"{output} is there and no schema of hexcontact, so it is not overwritten; choose another output"
-        )
+        raise DeckError(f"{output} exists and is not a hexcontact schema; choose another output")
     with replacing(output) as path:
         path.write_text(text, encoding="utf-8")
     print_output(

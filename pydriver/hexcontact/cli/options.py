@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import enum
-import inspect
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from types import UnionType
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from ..errors import DeckError
 from ..text import listed
@@ -21,127 +21,38 @@ if TYPE_CHECKING:
 _OTHER_FILES = (".png", ".pdf", ".svg", ".csv", ".html", ".json", ".vtk", ".vtu")
 
 
-class Declared(NamedTuple):
-    """What an argument of a function is on the command line: an option if it has names.
-
-    Parsers are made of it: `plain` below, and that of `typer`, which takes longer to import than a deck to
-    check.
-    """
-
-    names: tuple[str, ...]
-    help: str
-    metavar: str | None = None
+def argument(metavar: str, help: str) -> Any:
+    """Declare an argument of a command; the command itself tests whether it can read a file."""
+    return typer.Argument(metavar=metavar, help=_escaped(help), show_default=False, readable=False)
 
 
-def argument(metavar: str, help: str) -> Declared:
-    """Declare an argument of a command."""
-    return Declared((), help, metavar)
-
-
-def option(*names: str, help: str, metavar: str | None = None) -> Declared:
+def option(*names: str, help: str, metavar: str | None = None) -> Any:
     """Declare an option, with a value unless its argument is a bool."""
-    return Declared(names, help, metavar)
+    return typer.Option(*names, metavar=metavar, help=_escaped(help), readable=False)
 
 
-def output_to(help: str) -> Declared:
+def output_to(help: str) -> Any:
     """Declare the option for the file or folder to write."""
     return option("--output", "-o", help=help)
 
 
-def steps_option(help: str) -> Declared:
+def steps_option(help: str) -> Any:
     """Declare the option that selects load steps."""
     return option("--step", "-s", metavar="N,...", help=help)
 
 
-def settings_option(help: str) -> Declared:
+def settings_option(help: str) -> Any:
     """Declare the option that replaces keys."""
     return option("--set", metavar="KEY=VALUE", help=f"{help}. Repeatable.")
 
 
-def flag(name: str, help: str) -> Declared:
+def flag(name: str, help: str) -> Any:
     """Declare an option without a value."""
     return option(f"--{name}", help=help)
 
 
-class Parameter(NamedTuple):
-    """An argument of the function of a command.
-
-    Attributes
-    ----------
-    name : str
-        Its name.
-    declared : Declared
-        What it is on the command line.
-    hint : type
-        Its type.
-    kind : type
-        Type of one value.
-    many : bool
-        Whether it takes several.
-    required : bool
-        Whether it has no default.
-    """
-
-    name: str
-    declared: Declared
-    hint: Any
-    kind: type
-    many: bool
-    required: bool
-
-
-def parameters(function: Callable[..., Any]) -> Iterator[Parameter]:
-    """Yield the arguments of the function of a command."""
-    hints = get_type_hints(function, include_extras=True)
-    for name, parameter in inspect.signature(function).parameters.items():
-        hint, declared = get_args(hints[name])
-        kind = get_args(hint)[0] if isinstance(hint, UnionType) else hint  # the other one is None
-        many = get_origin(kind) is list
-        kind = get_args(kind)[0] if many else kind
-        yield Parameter(name, declared, hint, kind, many, parameter.default is parameter.empty)
-
-
-def plain(function: Callable[..., Any], words: Sequence[str]) -> dict[str, Any] | None:
-    """Return the values of a command's arguments from plain words of a command line.
-
-    None if they are not plain, as a request for help, a mistake, or a value that begins with a dash: what
-    they mean is then up to the whole parser.
-    """
-    of_names: dict[str, Parameter] = {}
-    places: list[Parameter] = []
-    missing = set()
-    for parameter in parameters(function):
-        of_names |= dict.fromkeys(parameter.declared.names, parameter)
-        places += [] if parameter.declared.names else [parameter]
-        missing |= {parameter.name} if parameter.required else set()
-    found: dict[str, Any] = {}
-    rest = iter(words)
-    for word in rest:
-        name, equals, text = word.partition("=") if word.startswith("--") else (word, "", word)
-        if name in of_names:
-            parameter = of_names[name]
-            if parameter.kind is not bool and not equals:
-                text = next(rest, "")
-        elif places:
-            parameter = places[0] if places[0].many else places.pop(0)
-        else:
-            return None
-        value = True if parameter.kind is bool and not equals else _value(parameter.kind, text)
-        if value is None:
-            return None
-        found[parameter.name] = [*found.get(parameter.name, ()), value] if parameter.many else value
-    return None if missing - found.keys() else found
-
-
-def _value(kind: Any, text: str) -> Any:
-    """Return the value of a word; None if it is not plain."""
-    if not text or text.startswith("-") or not text.isprintable():
-        return None
-    if issubclass(kind, enum.Enum):
-        return next((value for value in kind if value.value == text), None)
-    if issubclass(kind, int):
-        return int(text) if kind is int and re.fullmatch(r"[0-9]{1,9}", text) else None
-    return kind(text)
+def _escaped(help: str) -> str:
+    return help.replace("[", r"\[")  # typer reads markup in it
 
 
 DeckFile = Annotated[Path, argument("DECK", "The deck, a TOML file.")]
@@ -193,16 +104,7 @@ def setting(text: str) -> tuple[str, Any]:
 def steps_of(text: str, labels: Sequence[str], option: str = "step") -> list[int]:
     """Return numbers of load steps from "20", "10,20,30", "109-135", "all", or a label.
 
-    A label selects the last step of its segments.
-
-    Parameters
-    ----------
-    text : str
-        Value of the option.
-    labels : sequence of str
-        Label of each load step; empty texts for cycles.
-    option : str
-        Name of the option.
+    A label selects the last step of its segments; cycles have empty labels.
     """
     words = [text.strip()] if text.strip() in labels else [word.strip() for word in text.split(",")]
     numbers: list[int] = []

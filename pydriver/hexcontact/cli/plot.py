@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from typer.core import TyperCommand
+
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
-from .guard import command, print_output
+from .frame import command, print_output
 from .options import Shown, argument, beside, labels_of, option, output_to, steps_of, steps_option
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..plotting.registry import Entry
     from ..result.result import Result
 
-_DRAWS = "Draw a result, or the influence functions and load shapes."
+_DRAWS = "Draw a result, or the cases of a study."
 _ALL = "all"
 
 
@@ -39,32 +41,40 @@ def _help() -> str:
     choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
     choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
-    of_a_result, of_a_study, of_none = (
+    of_a_result, of_a_study, of_a_table = (
         "\n".join(f"{name:<{width}}{words}" for kind, name, words in choices if kind == wanted)
-        for wanted in ("result", "study", "")
+        for wanted in ("result", "study", "table")
     )
     return (
         f"{_DRAWS}\n\n"
         "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
         f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
-        f"\b\nOf a study:\n{of_a_study}\n\n\b\nWithout FILE:\n{of_none}"
+        f"\b\nOf a study:\n{of_a_study}\n\n\b\nOf a table:\n{of_a_table}"
     )
 
 
 def _kind(entry: Entry) -> str:
-    """Return what the FILE of a figure is: a result, a study, or nothing."""
-    return "result" if entry.of_a_result else "study" if entry.of_a_study else ""
+    """Return what the FILE of a figure is: a result, a study or a table."""
+    return "study" if entry.of_a_study else "table" if entry.of_a_table else "result"
+
+
+class _WithFigures(TyperCommand):
+    """The command whose help is written when it is read."""
+
+    help = property(lambda _: _help(), lambda _, __: None)
 
 
 @command(
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
-    help=_help,
+    cls=_WithFigures,
 )
 def plot(
     files: Annotated[
         list[Path] | None,
-        argument("FILE", "The result, a netCDF file; several for zones, outlines and compliance."),
+        argument(
+            "FILE", "The result or a table of it, a netCDF file; several for zones, outlines and compliance."
+        ),
     ] = None,
     what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
@@ -105,26 +115,28 @@ def plot(
         Format | None, option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
-    """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
+    """Draw a result, a study or a table; `_help` makes the help from the figures."""
+    from ..interior.files import read_table
     from ..plotting.registry import entries
     from ..result.store import open_result
-    from ..study.shown import read_study, study_of
+    from ..study.dataset import read_study, study_of
 
-    files = files or []
     figures = entries()
     if what not in (known := [*figures, _ALL]):
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
+    if not files:
+        raise DeckError(f"--what {what}: expected the FILE of a result")
     study = study_of(files[0]) if len(files) == 1 else None
-    if study is not None and what == "overview":
-        what = "study"
+    table = read_table(files[0]) if len(files) == 1 and study is None else None
+    holds = "study" if study is not None else "table" if table is not None else "result"
+    if holds != "result" and what == "overview":
+        what = holds
     shows = "result" if what == _ALL else _kind(figures[what])
-    if files and shows and (study is not None) != (shows == "study"):
-        kind = "the result of a study; expected --what study" if study else "not the result of a study"
+    if holds != shows:
+        words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
+        kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
-    if bool(files) != bool(shows):
-        expected = "expected no FILE" if files else "expected the FILE of a result"
-        raise DeckError(f"--what {what}: {expected}")
-    results: list[Any] = [open_result(file) for file in files] if study is None else []
+    results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
         "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
@@ -147,8 +159,10 @@ def plot(
         return
     if study is not None:
         files, results = [study], [read_study(study)]
-    default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
-    print_output(f"written: {picture_of(results, what, output or default, chosen)}")
+    elif table is not None:
+        results = [table]
+    picture = output or beside(files[0], f"_{what}{suffix}")
+    print_output(f"written: {picture_of(results, what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------
@@ -207,24 +221,7 @@ def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str,
 
 
 def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapping[str, Any]) -> Path:
-    """Draw a picture of one result, of several, or of none.
-
-    Parameters
-    ----------
-    results : sequence of Result
-        The results.
-    what : str
-        Name of the figure.
-    picture : Path
-        File to write.
-    chosen : mapping
-        Values of the given options by name: step (a list), angle, through, over, arrows.
-
-    Raises
-    ------
-    DeckError
-        If the figure has no such option, the result lacks data for it, or the file cannot be written.
-    """
+    """Draw a picture of one result, or of several, with the given options; return its file."""
     from ..plotting.registry import entries
 
     entry = entries()[what]
@@ -241,21 +238,9 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:
-    """Draw every figure for which the result has data; return a line about each.
+    """Draw every figure for which the result has data, each with the options that it has.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-    first : Path
-        File to whose name the name of each figure is appended.
-    chosen : mapping
-        Values of the given options; each figure takes those that it has.
-
-    Raises
-    ------
-    DeckError
-        If no figure can be drawn, or a file cannot be written.
+    Return a line about each; the name of a figure is appended to that of the file `first`.
     """
     from ..plotting.registry import SEVERAL_RUNS, entries
 

@@ -26,44 +26,24 @@ from ..deck.recorded import recorded
 from ..errors import DeckError, HexcontactError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
 from ..interior.extremes import place_of
-from ..interior.files import read_table, tables_of
-from ..plotting.report_data import drawn_data, kept_steps
+from ..interior.files import readable_table, tables_of
+from ..plotting.report_data import drawn_data, mapped_steps
 from ..problem.preview import case_rows
 from ..problem.problem import Problem
-from ..result.history import energy_table, load_or_motion, worth_showing
+from ..result.history_words import load_or_motion, worth_showing
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
-from . import tables
+from . import printed
 
 if TYPE_CHECKING:
     from ..result.result import Result
-
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
 
 _MOST_PARTS = 200  # segments, and cycles, in the table of energies
 _DATA = resources.files("hexcontact").joinpath("data")
 
 
 def write_report(result: Result, target: Path) -> Path:
-    """Write the page of a result.
-
-    Parameters
-    ----------
-    result : Result
-        The result, of a finished run or not.
-    target : Path
-        File to write, ``.html``; an earlier page is replaced.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If the name has another ending, or the file is no page of hexcontact.
-    """
+    """Write the page of a result, finished or not, in place of an earlier page."""
     if target.suffix.lower() not in (".html", ".htm"):
         raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
     require_replaceable(target)
@@ -73,16 +53,10 @@ def write_report(result: Result, target: Path) -> Path:
 
 
 def report(result: Result) -> str:
-    """Return the page of a result as HTML.
-
-    Parameters
-    ----------
-    result : Result
-        The result, of a finished run or not.
-    """
-    summary = tables.Summary.of_result(result)
-    histories = summary.steps()
-    numbers = kept_steps(result)
+    """Return the page of a result, finished or not, as HTML."""
+    summary = printed.Summary.of_result(result)
+    histories, tables = summary.steps(), summary.tables(_MOST_PARTS)
+    numbers = mapped_steps(result)
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     environment = jinja2.Environment(
@@ -100,12 +74,12 @@ def report(result: Result) -> str:
         kept=_kept(len(numbers), len(histories)),
         inputs=_inputs(result, _problem_of(result.deck)),
         loads=_loads(histories),
-        energies=energy_table(histories, _MOST_PARTS),
+        energies=tables["Dissipated energy"],
         below=_below(result),
         pictures=list(_pictures(result)) if numbers else [],
         deck=result.deck,
-        hertz=(tables.HERTZ_HEADERS, tables.hertz_rows(summary.hertz, histories[-1])),
-        accuracy=(tables.TRIAL_HEADERS, tables.trial_rows(result)),
+        hertz=tables["Against Hertz"],
+        accuracy=tables["Accuracy"],
         residuals=_residuals(histories),
         provenance=_provenance(result, histories),
         data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -155,13 +129,13 @@ def _inputs(result: Result, case: Problem | None) -> list[tuple[str, ...]]:
         modulus = quantity(float(attributes["effective_modulus"]), "Pa")
         beta, gamma = (float(attributes[n]) for n in ("dundurs_beta", "tangential_compliance_ratio"))
         pair = f"E* = {modulus}, beta = {beta:.4g}, gamma = {gamma:.4g}"
-        rows = [("pair", pair), ("algorithm", tables.algorithm(attributes)), spacing]
+        rows = [("pair", pair), ("algorithm", printed.algorithm(attributes)), spacing]
     planned = int(attributes["planned_steps"])
     steps = f"{len(result)}" + (f" of {planned}" if planned else "")
     return [*rows, ("window", f"{sizes['row']} x {sizes['col']} nodes at the end"), ("load steps", steps)]
 
 
-def _provenance(result: Result, histories: Sequence[tables.History]) -> list[tuple[str, ...]]:
+def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tuple[str, ...]]:
     attributes, deck = result.dataset.attrs, result.deck
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     return [
@@ -177,7 +151,7 @@ def _provenance(result: Result, histories: Sequence[tables.History]) -> list[tup
     ]
 
 
-def _loads(histories: Sequence[tables.History]) -> Table:
+def _loads(histories: Sequence[printed.History]) -> printed.Table:
     """Return the loads at the end of each segment as a table."""
     ends = {int(history.get("segment", 1)): history for history in histories}
     names = worth_showing(histories)
@@ -192,7 +166,7 @@ def _loads(histories: Sequence[tables.History]) -> Table:
     return ("segment", "label", "steps", *symbols), rows
 
 
-def _below(result: Result) -> Table:
+def _below(result: Result) -> printed.Table:
     """Return the tables [[stress]] and [[fatigue]] of the deck, with their files, as a table."""
     rows = []
     for name, table in tables_of(result.deck).items():
@@ -201,7 +175,7 @@ def _below(result: Result) -> Table:
         steps = labels or ("last",) if table.steps is None else np.atleast_1d(table.steps)
         output = Path(result.path or "output")
         file = output.with_name(f"{output.stem}_{name}.nc")
-        found = read_table(file)
+        found = readable_table(file)
         fields = {} if found is None else found.data_vars
         places = [f"{key}: {place}" for key, field in fields.items() if (place := place_of(field))]
         shown = ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))
@@ -211,8 +185,7 @@ def _below(result: Result) -> Table:
 
 def _pictures(result: Result) -> Iterator[tuple[str, str]]:
     """Yield title and data (PNG, base64) of a picture of each kind of what `_below` lists."""
-    from ..plotting.fatigue import fatigue
-    from ..plotting.stress import stress
+    from ..plotting.below import fatigue, stress
 
     kinds = {type(table) for table in tables_of(result.deck).values()}
     for kind, draw, title in (
@@ -228,7 +201,7 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
             yield title, base64.b64encode(data.getvalue()).decode()
 
 
-def _residuals(histories: Sequence[tables.History]) -> Table:
+def _residuals(histories: Sequence[printed.History]) -> printed.Table:
     signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
     rows = [
         (

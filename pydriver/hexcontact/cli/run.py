@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..solve.interruption import signal_pipe
-from .guard import Content, command, print_error
+from .frame import Content, command, print_error
 from .options import (
     AsJson,
     DeckFile,
@@ -44,7 +44,7 @@ def run(
     from ..result.store import Store
     from ..solve import log
     from ..solve.run import metadata_of
-    from .messages import Messages, overview, picture_beside, solved
+    from .solving import Messages, overview, picture_beside, solved
 
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with messages.logging(deck, *([output] if output else [])):
@@ -76,7 +76,7 @@ def resume(
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
     from ..solve import restart
-    from .messages import Messages, overview, picture_beside, solved, with_tables
+    from .solving import Messages, overview, picture_beside, solved, with_tables
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ..errors import DeckError
-from .guard import Content, command, print_output
+from .frame import Content, command, print_output
 from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_to, steps_of, steps_option
 
 
@@ -15,8 +15,8 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
     from ..interior.files import content_of, description
     from ..result.store import open_result
-    from ..study import shown
-    from . import tables
+    from ..study import dataset as shown
+    from . import printed
 
     if (path := shown.study_of(file)) is not None:
         study = shown.read_study(path)
@@ -31,8 +31,8 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
         return None
     result = open_result(file)
     if as_json:
-        return tables.file_content(result)
-    tables.Summary.of_result(result).print(whole_file=True)
+        return printed.file_content(result)
+    printed.Summary.of_result(result).print(whole_file=True)
     return None
 
 
@@ -76,7 +76,7 @@ def export(
     from ..interior.files import read_table
     from ..result import export as write
     from ..result.store import open_result
-    from ..study import shown
+    from ..study import dataset as shown
 
     more = vtk or ugrid or histories or step is not None or source is not None
     stem = beside(file, "").name

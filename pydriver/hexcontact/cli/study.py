@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
-from .guard import Content, Failure, command, print_error, print_output
+from .frame import Content, Failure, command, print_error, print_output
 from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to, steps_of
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
     from ..study.study import Outcome, PlannedCase, Study
-    from .messages import Messages
+    from .solving import Messages
 
 _SOME_FAILED = 3  # exit code of a study with failed or missing cases
 _MOST_NAMED = 20  # failures listed at the end
@@ -56,7 +56,7 @@ def study(
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
     from ..study.progress import study_reporter
     from ..study.study import Study
-    from .messages import Messages
+    from .solving import Messages
 
     if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")

@@ -9,15 +9,21 @@ from __future__ import annotations
 import functools
 import importlib.resources
 import math
-import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from ..errors import DeckError
-from .guard import Content, command
+from ..errors import DeckError, PlausibilityWarning
+from ..text import TextTable, quantity
+from ..variables import VARIABLES
+from .frame import Content, command, print_error
 from .options import AsJson, argument, flag
+
+Check = Mapping[str, Any]
+"""An entry of the self-test: name, title, note, deck, values."""
+
+_WIDE = 150  # a narrow terminal wraps lines, it does not lose digits
 
 
 @command("hexcontact verify")
@@ -30,245 +36,86 @@ def verify(
 
     Exit code 1 if a comparison fails.
     """
-    if not as_json:
-        raise SystemExit(main(names or [], listing=listing))
-    chosen = _chosen(names or [], self_test())
-    if listing:
-        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
-    found = [check.run().content(check) for check in chosen]
-    passed = all(check["passed"] for check in found)
-    return {"exit_code": int(not passed), "passed": passed, "checks": found}
-
-
-UNITS = dict.fromkeys(("-", "s", "N", "m", "Pa", "rad"), 1.0)
-UNITS |= {"mm": 1e-3, "um": 1e-6, "MPa": 1e6, "GPa": 1e9, "deg": math.pi / 180.0}
-"""SI values of the units of tables."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """A compared quantity in SI; absent values are NaN; without a tolerance it is reported, not judged."""
-
-    case: str
-    quantity: str
-    unit: str
-    computed: float
-    published: float = math.nan
-    reference: float = math.nan
-    analytic: float = math.nan
-    judge: str = "reference"
-    tolerance: float = math.nan
-    absolute: bool = False
-
-    @property
-    def difference(self) -> float:
-        """Difference from the value of the judge, relative unless ``absolute``; NaN without one."""
-        against = {"reference": self.reference, "analytic": self.analytic}[self.judge]
-        if self.absolute:
-            return self.computed - against
-        return math.nan if against == 0.0 else self.computed / against - 1.0
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether the difference is within the tolerance; None if the row is not judged."""
-        if math.isnan(self.tolerance):
-            return None
-        return bool(abs(self.difference) <= self.tolerance)  # NaN fails
-
-
-@dataclass
-class Comparison:
-    """The rows of a check, and sentences below its table."""
-
-    rows: list[Row] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def passed(self) -> bool:
-        """Whether no row fails."""
-        return all(row.passed is not False for row in self.rows)
-
-    def content(self, check: Check) -> dict[str, Any]:
-        """Return the comparison of a check as an object: in SI, relative differences unless absolute."""
-        values = ("computed", "published", "reference", "analytic", "judge", "difference", "tolerance")
-        shown = ("case", "quantity", *values, "absolute", "passed")
-        return {
-            "name": check.name,
-            "title": check.title,
-            "passed": self.passed,
-            "rows": [{name: getattr(row, name) for name in shown} for row in self.rows],
-            "notes": self.notes,
-        }
-
-
-@dataclass(frozen=True)
-class Check:
-    """A named check, with title, text and the function that makes its comparison."""
-
-    name: str
-    title: str
-    text: str
-    run: Callable[[], Comparison]
-
-
-# --- tables ---------------------------------------------------------------------------------------
-
-_VALUES = ("published", "reference", "analytic", "computed")
-HEADERS = ("case", "quantity", *_VALUES, "difference", "tolerance", "")
-
-
-def cells_of(row: Row) -> list[str]:
-    """Return the cells of a row in the order of `HEADERS`."""
-    factor = UNITS[row.unit]
-    unit = "" if row.unit == "-" else row.unit.replace("um", "µm")
-    known = [value for value in (row.computed, row.reference, row.analytic) if not math.isnan(value)]
-    power = any(0.0 < abs(value) < 1e-3 * factor for value in known)
-
-    def number(value: float) -> str:
-        if math.isnan(value):
-            return ""
-        digits = ".2g" if row.unit == "s" else ".6e" if power and value else ".7g"
-        return f"{value / factor:{digits}}"
-
-    def deviation(value: float, form: str) -> str:
-        if math.isnan(value):
-            return ""
-        return f"{value / factor:{form}} {unit}".rstrip() if row.absolute else f"{value:{form}}"
-
-    return [
-        row.case,
-        row.quantity + (f" ({unit})" if unit else ""),
-        *(number(getattr(row, name)) for name in _VALUES),
-        deviation(row.difference, "+.1e"),
-        deviation(row.tolerance, ".0e"),
-        {True: "ok", False: "FAIL", None: ""}[row.passed],
-    ]
-
-
-def judge_column(row: Row) -> int:
-    """Return the column of the value that judges a row; -1 if it is not judged."""
-    return HEADERS.index(row.judge) if row.passed is not None else -1
-
-
-def show(check: Check, comparison: Comparison) -> None:
-    """Print a check as a table for terminals."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from .tables import rich_console
-
-    screen = rich_console()
-    screen.width = max(screen.width, 150)  # a narrow terminal wraps lines, it does not lose digits
-    shown = Table(
-        title=Text(check.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
-    )
-    for position, header in enumerate(HEADERS):
-        shown.add_column(header, justify="right" if 2 <= position < 8 else "left", no_wrap=True)
-    style = {True: "green", False: "bold red", None: ""}
-    before = ""
-    for row in comparison.rows:
-        cells, judge = cells_of(row), judge_column(row)
-        first, before = cells[0] if cells[0] != before else "", cells[0]
-        texts = [
-            Text(cell, style="bold" if at == judge else "") for at, cell in enumerate([first, *cells[1:-1]])
-        ]
-        shown.add_row(*texts, Text(cells[-1], style=style[row.passed]))
-    screen.print(shown)
-    for note in comparison.notes:
-        screen.print(note, soft_wrap=True)
-    judged = [row.passed for row in comparison.rows if row.passed is not None]
-    screen.print(f"{check.name}: {sum(judged)} of {len(judged)} comparisons passed\n", soft_wrap=True)
-
-
-def main(
-    names: Sequence[str] = (),
-    *,
-    checks: Mapping[str, Check] | None = None,
-    output: Callable[[Check, Comparison], None] = show,
-    listing: bool = False,
-) -> int:
-    """Run checks and print their comparisons.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the checks; all of them if empty.
-    checks : mapping of str to Check, optional
-        The checks to choose from; default: those of an installation.
-    output : callable
-        Prints a check with its comparison.
-    listing : bool
-        List the checks without running them.
-
-    Returns
-    -------
-    int
-        Exit code: 0 if everything passed, 1 otherwise.
-
-    Raises
-    ------
-    DeckError
-        If there is no check of a name.
-    """
-    chosen = _chosen(names, self_test() if checks is None else checks)
-    if listing:
-        width = max(len(check.name) for check in chosen)
-        for check in chosen:
-            print(f"{check.name:<{width}}  {check.title}")
-        return 0
-    failed = []
-    for check in chosen:
-        comparison = check.run()
-        output(check, comparison)
-        if not comparison.passed:
-            failed.append(check.name)
-    if failed:
-        print(f"hexcontact: verify failed: {', '.join(failed)}", file=sys.stderr)
-    return 1 if failed else 0
-
-
-def _chosen(names: Sequence[str], known: Mapping[str, Check]) -> list[Check]:
-    """Return the checks of some names, all checks without names."""
-    if unknown := [name for name in names if name not in known]:
+    known = self_test()
+    if unknown := [name for name in names or [] if name not in known]:
         raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
-    return [known[name] for name in names] if names else list(known.values())
-
-
-# --- the self-test --------------------------------------------------------------------------------
+    chosen = [known[name] for name in names or known]
+    if listing:
+        width = max(len(check["name"]) for check in chosen)
+        if not as_json:
+            print("\n".join(f"{check['name']:<{width}}  {check['title']}" for check in chosen))
+        return {"checks": [{"name": check["name"], "title": check["title"]} for check in chosen]}
+    found = []
+    for check in chosen:
+        rows = compared(check)
+        if not as_json:
+            _print(check, rows)
+        passed = all(row["passed"] for row in rows)
+        about = {"name": check["name"], "title": check["title"], "passed": passed}
+        found.append({**about, "rows": rows, "notes": [check["note"]]})
+    failed = [entry["name"] for entry in found if not entry["passed"]]
+    if failed and not as_json:
+        print_error(f"verify failed: {', '.join(failed)}")
+    return {"exit_code": int(bool(failed)), "passed": not failed, "checks": found}
 
 
 @functools.cache
 def self_test() -> dict[str, Check]:
     """Return the checks of an installation by name, from data/self_test.toml."""
     text = importlib.resources.files("hexcontact").joinpath("data/self_test.toml").read_text(encoding="utf-8")
-    return {
-        entry["name"]: Check(entry["name"], entry["title"], "", functools.partial(_solve, entry))
-        for entry in tomllib.loads(text)["check"]
-    }
+    return {check["name"]: check for check in tomllib.loads(text)["check"]}
 
 
-def _solve(entry: Mapping[str, Any]) -> Comparison:
-    """Run a deck and compare the history of its result with the values of its entry."""
+def compared(check: Check) -> list[dict[str, Any]]:
+    """Run the deck of a check and compare the history of its result with the known values, in SI."""
     from ..case import Case
 
-    history = Case.from_text(entry["deck"]).run().dataset
-    found = Comparison()
-    for value in entry["values"]:
-        step = history.isel(step=value["step"] - 1)
-        computed = float(step[value["quantity"]])
-        if over := value.get("over"):
-            computed /= float(step[over])
-        about = f"{value['quantity']}/{over}" if over else value["quantity"]
-        row = Row(
-            f"step {value['step']}",
-            about,
-            value.get("unit", "-"),
-            computed,
-            judge=value["source"],
-            tolerance=value["relative"],
-            **{value["source"]: value["value"]},
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)  # of numbers without units
+        history = Case.from_text(check["deck"]).run().dataset
+    rows = []
+    for value in check["values"]:
+        step, name, over = history.isel(step=value["step"] - 1), value["quantity"], value.get("over")
+        computed = float(step[name]) / (float(step[over]) if over else 1.0)
+        difference = computed / value["value"] - 1.0
+        rows.append(
+            {
+                "case": f"step {value['step']}",
+                "quantity": f"{name}/{over}" if over else name,
+                "computed": computed,
+                **dict.fromkeys(("published", "reference", "analytic"), math.nan),
+                value["source"]: value["value"],
+                "judge": value["source"],
+                "difference": difference,
+                "tolerance": value["relative"],
+                "absolute": False,
+                "passed": abs(difference) <= value["relative"],  # NaN fails
+            }
         )
-        found.rows.append(row)
-    found.notes.append(entry["note"])
-    return found
+    return rows
+
+
+def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Print a check as a table."""
+    from .printed import console
+
+    def number(row: Mapping[str, Any], of: str) -> str:
+        units = VARIABLES[row["quantity"]].units if row["quantity"] in VARIABLES else ""
+        return quantity(row[of], units, 7)
+
+    headers = ("", "", "", "known", "computed", "difference", "tolerance", "")
+    cells = [
+        (
+            *(row["case"], row["quantity"], row["judge"]),
+            *(number(row, row["judge"]), number(row, "computed")),
+            *(f"{row['difference']:+.1e}", f"{row['tolerance']:.0e}"),
+            "ok" if row["passed"] else "FAIL",
+        )
+        for row in rows
+    ]
+    screen = console()
+    screen.width = max(screen.width, _WIDE)
+    screen.print(TextTable(check["title"], headers, cells))
+    screen.print(check["note"], soft_wrap=True)
+    passed = sum(row["passed"] for row in rows)
+    screen.print(f"{check['name']}: {passed} of {len(rows)} comparisons passed\n", soft_wrap=True)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, integer, number, reals, word
 from ..errors import DeckError, RimWarning, warn
-from . import _core
-from .calls import Handle, called
+from . import flat, kernel_cache
+from .handles import Handle, HeldState, Solved
 from .lattice import Lattice
-
-_api = _core.hc_f2py_normal
 
 Method = Literal["direct", "fft"]
 Iteration = Literal["newton", "dissertation"]
@@ -38,11 +37,11 @@ _STOPPED = (  # in the order of fortran/contact_state.f90
 
 
 def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> Array:
-    """Return finite values over the window as one contiguous vector."""
+    """Return finite values over the window, contiguous."""
     array = np.ascontiguousarray(shaped(values, lattice, name))
     if not np.isfinite(array).all():
         raise DeckError(f"{name}: {np.count_nonzero(~np.isfinite(array))} values are not finite numbers")
-    return array.ravel()
+    return array
 
 
 def checked_interface(interface: Interface) -> Array:
@@ -90,11 +89,6 @@ def method_code(name: str, iteration: Iteration = "newton") -> int:
 def thread_count(threads: int) -> int:
     """Return a number of threads; the core checks its bounds."""
     return integer(threads, "threads", "an integer of at least 0")
-
-
-def why_stopped(code: int) -> str:
-    """Return the reason why a solver stopped above the tolerance; empty if it converged."""
-    return _STOPPED[code]
 
 
 @dataclass(frozen=True)
@@ -146,13 +140,12 @@ class ElasticPair:
             A number out of its range, or two rigid bodies.
         """
         bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
-        constants = called(
-            _api.elastic_constants,
+        constants = flat.elastic_constants(
             [0.0 if young is None else number(young, "young_modulus") for young, _ in bodies],
             [0.0 if poisson is None else number(poisson, "poisson_ratio") for _, poisson in bodies],
             [young is None for young, _ in bodies],
         )
-        return cls(*constants.tolist())
+        return cls(*constants)
 
     @property
     def effective_modulus(self) -> float:
@@ -191,8 +184,7 @@ class FlexibilityOperator(Handle):
 
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
         self.lattice = lattice
-        where = method_code(method), lattice.basis.T, lattice.extent
-        self._create(_api.create_operator, *where, pair.as_array(), thread_count(threads))
+        self._create(flat.create_operator, method_code(method), lattice, pair, thread_count(threads))
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
@@ -211,40 +203,17 @@ class FlexibilityOperator(Handle):
         """
         zero = np.zeros(self.lattice.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
-        columns = [
+        tractions = [
             checked_field(zero if value is None else value, self.lattice, name)
             for name, value in named.items()
         ]
-        displacement = called(_api.apply_operator, self._handle, np.array(columns).T)
-        w, s_x, s_y = (column.reshape(self.lattice.shape) for column in displacement.T)
+        w, s_x, s_y = flat.apply_operator(self, tractions)
         return w, s_x, s_y
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NormalSolution:
-    """Solution of a frictionless contact problem, with its residuals.
-
-    Attributes
-    ----------
-    pressure, gap
-        Shape ``(n_row, n_col)`` [Pa], [m].
-    zone
-        0 separated, 2 slip (contact without friction), shape ``(n_row, n_col)``.
-    normal_load, approach
-        Carried load [N] and approach of the remote parts [m].
-    residual_normal, residual_force
-        Residuals of the contact conditions and of the prescribed load.
-    converged
-        Both residuals are within the tolerance.
-    touches_rim
-        There is contact at the rim of the window; a larger window may have another solution.
-    stopped
-        Reason why the solver stopped; empty if it converged.
-    sweeps
-        Active sets on the finest lattice.
-    operator_applications
-        All work, coarse lattices and preconditioner included, in applications of the full 3x3 operator.
-    """
+class NormalSolution(Solved):
+    """Solution of a frictionless contact problem; attributes as of `ContactState`, zone 2: contact."""
 
     pressure: Array
     gap: Array
@@ -258,6 +227,9 @@ class NormalSolution:
     sweeps: int = 0
     operator_applications: float = 0.0
     stopped: str = ""
+
+
+S = TypeVar("S", bound=NormalSolution)
 
 
 class Contact(Handle):
@@ -276,10 +248,22 @@ class Contact(Handle):
         self._gap = shaped(initial_gap, lattice, "initial_gap")
 
     @property
-    def _surfaces(self) -> tuple[Array, ...]:
-        """Materials, gap and nodes that can touch, as the core takes them; the gap of others is 0."""
+    def _surfaces(self) -> tuple[Any, ...]:
+        """Lattice, materials, gap and nodes that can touch, for the core; the gap of others is 0."""
         gap = checked_field(np.where(self._mask, self._gap, 0.0), self.lattice, "initial_gap")
-        return self._pair.as_array(), gap, self._mask.ravel().astype(np.int32)
+        return self.lattice, self._pair, gap, self._mask
+
+    def _solved(self, kind: type[S], procedure: Callable[..., int], *arguments: Any) -> S:
+        """Return the solution that a procedure of the core finds, with views of its fields."""
+        try:
+            held = HeldState(procedure(self, *arguments), self.lattice.shape)
+        finally:
+            kernel_cache.warn_of_faults()
+        found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
+        found |= {"zone": held.view("zone").astype(np.int8), "stopped": _STOPPED[found["stopped"]]}
+        names = [field.name for field in fields(kind)]
+        found |= {name: held.view(name) for name in names if name not in found}
+        return kind(**{name: found[name] for name in names}).behind(held)
 
     def _warn_of_rim(self, found: NormalSolution) -> None:
         """Warn of contact at the rim of the window, unless the bodies end there: all nodes touch that can."""
@@ -329,14 +313,8 @@ class NormalContact(Contact):
         interface: Interface = UNILATERAL,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        where = method_code(method), lattice.basis.T, lattice.first, lattice.extent
-        self._create(
-            _api.create_normal_contact,
-            *where,
-            *self._surfaces,
-            checked_interface(interface),
-            thread_count(threads),
-        )
+        given = *self._surfaces, checked_interface(interface), thread_count(threads)
+        self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
         self,
@@ -372,26 +350,9 @@ class NormalContact(Contact):
         else:
             control, target = 2, number(approach, "approach", fits=np.isfinite)
         checked_tolerance(tolerance)
-        limits = tolerance, integer(max_sweeps, "max_sweeps"), self.lattice.size
-        out = self._solve(_api.solve_normal_contact, control, target, *limits)
-        pressure, gap, zone, load, delta, residuals, sweeps, work, flags = out
-        shape = self.lattice.shape
-        gap = gap.reshape(shape)
-        gap[~self._mask] += self._gap[~self._mask]
-        solution = NormalSolution(
-            pressure=pressure.reshape(shape),
-            gap=gap,
-            zone=zone.reshape(shape).astype(np.int8),
-            normal_load=load,
-            approach=delta,
-            residual_normal=float(residuals[0]),
-            residual_force=float(residuals[1]),
-            converged=bool(flags[0]),
-            sweeps=sweeps,
-            operator_applications=work,
-            touches_rim=bool(flags[1]),
-            stopped=why_stopped(flags[2]),
-        )
+        limits = tolerance, integer(max_sweeps, "max_sweeps")
+        solution = self._solved(NormalSolution, flat.press, control, target, *limits)
+        solution.gap[~self._mask] += self._gap[~self._mask]
         self._warn_of_rim(solution)
         return solution
 
@@ -405,24 +366,10 @@ def memory_needed(
     part: Literal["problem", "operator", "set-up of the operator"] = "problem",
     threads: int = 1,
 ) -> int:
-    """Return the memory (bytes) of a frictionless problem on a window.
-
-    Parameters
-    ----------
-    method
-        ``"direct"`` or ``"fft"``.
-    n_row, n_col
-        Rows and columns of the window.
-    contact
-        Nodes in contact; default: all.
-    part
-        The whole problem; the full 3x3 flexibility operator; or the additional memory of its set-up.
-    threads
-        Number of threads.
-    """
+    """Return the memory (bytes) of a frictionless problem on a window."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    return int(_api.memory_needed(*window, code, thread_count(threads)))
+    return int(flat.normal_memory(*window, code, thread_count(threads)))
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:

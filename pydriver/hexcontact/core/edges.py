@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from . import _core, memory
-from .calls import called
+from . import flat, memory
 from .contact import ElasticPair
 from .estimators import Ellipse
-
-_api = _core.hc_f2py_edges
+from .lattice import Nodes
 
 _UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
 _GIVEN = 12  # arrays that it is made from, with copies and zones
@@ -27,47 +25,18 @@ _MARGIN = 6  # nodes about a contact from which its edge follows, at most, and o
 _Part = tuple[slice, slice]
 Source = Literal["edges", "nodes"]
 Limits = tuple[Array | float, Array | float]
-_Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
+_Zone = tuple[Array, Mask, bool]  # fields and zones of the core; whether it is the stick area
 
 
 def tractions_memory(
     n_row: int, n_col: int, contact: int, sheared: bool, unlike: bool, threads: int = 0
 ) -> int:
-    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns.
-
-    Parameters
-    ----------
-    n_row, n_col : int
-        Rows and columns of the window.
-    contact : int
-        Nodes in contact.
-    sheared : bool
-        Whether the shear tractions change.
-    unlike : bool
-        Whether the materials are dissimilar.
-    threads : int
-        Number of threads; 0: as many as OpenMP would take.
-    """
-    return int(_api.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
+    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns."""
+    return int(flat.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
 
 
 class Edge(NamedTuple):
-    """An area of the plane whose edge runs between the nodes.
-
-    Parameters
-    ----------
-    area : float
-        Its area, m^2.
-    radius : float
-        Radius (m) of the disc with the same area.
-    length : float
-        Length of the edge, m.
-    segments : ndarray, shape (n, 2, 2)
-        Unordered pieces of the edge, each from a point to a point (m); none where the zone ends at nodes that
-        cannot touch.
-    ellipse : Ellipse
-        Ellipse with the second moments of the area; of an elliptic area it is the edge.
-    """
+    """An area of the plane whose edge runs between the nodes."""
 
     area: float
     radius: float
@@ -77,17 +46,7 @@ class Edge(NamedTuple):
 
 
 class ZoneMesh(NamedTuple):
-    """Triangles that fill an area of the plane up to its edge between the nodes, and a field there.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n,)
-        Corners, m.
-    values : ndarray, shape (n,)
-        The field there.
-    triangles : ndarray of int, shape (m, 3)
-        Corners of each triangle, counterclockwise.
-    """
+    """Triangles that fill an area of the plane up to its edge between the nodes, and a field there."""
 
     x: Array
     y: Array
@@ -98,7 +57,7 @@ class ZoneMesh(NamedTuple):
         """Return closed polygons of shape (n, 2), m, counterclockwise around the area."""
         if not self.triangles.size:
             return []
-        corners, number, count = _core.hc_f2py_lattice.outline_of_zone(self.triangles.T + 1, self.x.size)
+        corners, number, count = flat.outline_of_zone(self.triangles + 1, self.x.size)
         points = np.stack([self.x, self.y], axis=1)[corners[:count] - 1]
         polygons = np.split(points, np.flatnonzero(np.diff(number[:count])) + 1)
         return [np.append(polygon, polygon[:1], axis=0) for polygon in polygons]
@@ -112,12 +71,10 @@ class TractionField:
 
     Parameters
     ----------
-    parts : ndarray
+    parts : ndarray, shape (5 or 13, n_row, n_col)
         The field as the core holds it.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as columns, m.
-    start : tuple of float
-        Position of its first node, m.
+    nodes : Nodes
+        Its nodes.
     source : str
         See below.
     whole : tuple, optional
@@ -134,30 +91,27 @@ class TractionField:
     def __init__(
         self,
         parts: Array,
-        basis: Array,
-        start: tuple[float, float],
+        nodes: Nodes,
         source: Source = "edges",
         whole: tuple[tuple[int, ...], _Part] | None = None,
     ) -> None:
-        self._parts, self._basis, self._start, self._whole = parts, basis, start, whole
-        self.source, self.sheared = source, parts.shape[-1] == _LIMITED
+        self._parts, self._nodes, self._whole = parts, nodes, whole
+        self.source, self.sheared = source, len(parts) == _LIMITED
 
     @classmethod
     def of_nodes(cls, tractions: Array, basis: Array, start: tuple[float, float]) -> Self:
         """Return the field of p, q_x and q_y at the nodes, joined linearly; see `ContactEdges`."""
         parts = np.stack([*tractions, tractions[0], np.full_like(tractions[0], np.nan)])
-        return cls(parts.T, basis.T, start, "nodes")
+        return cls(parts, Nodes(basis, start, parts.shape[1:]), "nodes")
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside the window."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        where = self._basis, self._start, self._parts
-        found = called(_api.tractions_at_points, *where, x.ravel(), y.ravel())
-        return np.asarray(found).reshape(3, *x.shape) + 0.0  # no sign on zero
+        found = flat.tractions_at_points(self._nodes, self._parts, x, y)
+        return np.ascontiguousarray(np.moveaxis(found, -1, 0)) + 0.0  # no sign on zero
 
     def at_nodes(self) -> Array:
         """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""
-        found = np.asarray(_api.tractions_at_nodes(self._parts).T)
+        found = np.asarray(flat.tractions_at_nodes(self._parts))
         if self._whole is None:
             return found
         shape, part = self._whole
@@ -169,21 +123,9 @@ class TractionField:
 class ContactEdges:
     """The edges of a contact and of the stick area in it.
 
-    Parameters
-    ----------
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    gap : ndarray, shape (n_row, n_col)
-        Gap, m; that of nodes that cannot touch has no effect.
-    contact : ndarray of bool, shape (n_row, n_col)
-        Nodes in contact.
-    candidate : ndarray of bool, shape (n_row, n_col)
-        Nodes that can touch. Where a contact ends at others, as at the rim of a punch, its pressure does not
-        vanish, and its edge is that of the cells of its nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the (equilateral) lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
+    Nodes are in contact, and can touch (`candidate`). Where a contact ends at nodes that cannot, as at the
+    rim of a punch, its pressure does not vanish, and its edge is that of the cells of its nodes. Basis
+    vectors of the (equilateral) lattice are rows, `start` is the position of node [0, 0].
     """
 
     def __init__(
@@ -195,7 +137,7 @@ class ContactEdges:
         basis: Array,
         start: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self._basis, self._start = basis.T, start
+        self._nodes = Nodes(basis, start, pressure.shape)
         self._fields, self._zones = (pressure, gap), (contact, candidate)
 
     def contact(self) -> Edge:
@@ -203,27 +145,11 @@ class ContactEdges:
         return self._edge(self._whole())
 
     def stick(self, stick: Mask, reserve: Array) -> Edge:
-        """Return the part of the contact area that sticks.
-
-        Parameters
-        ----------
-        stick : ndarray of bool, shape (n_row, n_col)
-            Nodes that stick, all in contact.
-        reserve : ndarray, shape (n_row, n_col)
-            Reserve of friction beyond the shear traction, mu p - |q| (Pa), at these nodes.
-        """
+        """Return the part of the contact area that sticks, with the reserve of friction mu p - |q| there."""
         return self._edge(self._zone(stick, reserve, True))
 
     def contact_mesh(self, field: Array, vanishes: bool) -> ZoneMesh:
-        """Return a mesh of the contact area, with a field up to its edge.
-
-        Parameters
-        ----------
-        field : ndarray, shape (n_row, n_col)
-            Values at the nodes in contact.
-        vanishes : bool
-            Whether it is zero at the edge, like tractions; else it is linear from the nodes inside.
-        """
+        """Return a mesh of the contact area, with a field up to its edge, where tractions vanish."""
         return self._mesh(self._whole(), field, vanishes)
 
     def stick_mesh(self, stick: Mask, reserve: Array) -> ZoneMesh:
@@ -232,26 +158,19 @@ class ContactEdges:
 
     def contact_distances(self) -> Array:
         """Return the distances of the nodes from the edge of the contact, in spacings, positive inside."""
-        return self._distances(self._whole())
+        return np.asarray(flat.distances_of_zone(self._nodes, *self._whole()))
 
     def stick_distances(self, stick: Mask, reserve: Array) -> Array:
         """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
-        return self._distances(self._zone(stick, reserve, True))
+        return np.asarray(flat.distances_of_zone(self._nodes, *self._zone(stick, reserve, True)))
 
     def field(
         self, shear: Array | None = None, stick: Mask | None = None, limits: Limits | None = None
     ) -> TractionField:
         """Return pressure and shear traction between the nodes, to the edges.
 
-        Parameters
-        ----------
-        shear : ndarray, shape (2, n_row, n_col), optional
-            Shear traction along x and y, Pa.
-        stick : ndarray of bool, shape (n_row, n_col), optional
-            Nodes that stick, all in contact.
-        limits : tuple of array_like, optional
-            Finite coefficient of friction, and bound of the shear traction (Pa); by default they are unknown,
-            and the shear traction is linear between the nodes.
+        The limits are a finite coefficient of friction, and a bound of the shear traction (Pa). Without them,
+        or without nodes that stick, the shear traction is linear between the nodes.
         """
         part = self._around_contact()
         limited = not (shear is None or stick is None or limits is None)
@@ -262,16 +181,15 @@ class ContactEdges:
             memory.require(needed, "the tractions to the edges", 'choose source = "nodes"')
         pressure, gap, touching, candidate = (given[part] for given in (*self._fields, *self._zones))
         along = (none, none) if shear is None else (component[part] for component in shear)
-        zones = np.stack([touching, candidate, none if stick is None else stick[part]]).astype(np.int32)
+        zones = np.stack([touching, candidate, none != 0 if stick is None else stick[part]])
         known = [
             none + (np.asarray(limit)[part] if np.ndim(limit) else limit) for limit in limits or (0.0, 0.0)
         ]
-        parts = called(
-            *(_api.field_of_tractions, self._basis, gap.T, zones.T, np.stack([pressure, *along]).T),
-            *(np.minimum(known, np.finfo(float).max).T, limited, count),
-        )
-        x, y = self._start + self._basis @ [part[1].start, part[0].start]
-        return TractionField(parts, self._basis, (float(x), float(y)), whole=(self._zones[0].shape, part))
+        x, y = self._nodes.start + self._nodes.basis.T @ [part[1].start, part[0].start]
+        nodes = Nodes(self._nodes.basis, (float(x), float(y)), none.shape)
+        given = np.stack([pressure, *along]), np.minimum(known, np.finfo(float).max), count
+        parts = flat.field_of_tractions(nodes, np.stack([pressure, gap]), zones, *given)
+        return TractionField(parts, nodes, whole=(self._nodes.shape, part))
 
     def _around_contact(self) -> _Part:
         """Return rows and columns of the contact and of the nodes about it, beyond which there is nothing."""
@@ -282,30 +200,14 @@ class ContactEdges:
         return rows, cols
 
     def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
-        """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.
+        """Return tractions (Pa) corrected at the edges of the contact and of the stick area.
 
-        Parameters
-        ----------
-        shear : ndarray, shape (2, n_row, n_col)
-            Shear traction along x and y, Pa.
-        stick : ndarray of bool, shape (n_row, n_col)
-            Nodes that stick, all in contact.
-        friction : ndarray, shape (n_row, n_col)
-            Coefficient of friction; unless it is positive and finite, the shear traction does not change.
-        pair : ElasticPair
-            The two bodies.
-
-        Returns
-        -------
-        ndarray, shape (3, n_row, n_col)
-            With the loads of the nodal tractions, Pa. Nodes next to the edge but outside carry small values.
+        Unless the coefficient of friction is positive and finite, the shear traction does not change. Loads
+        are those of the nodal tractions; nodes next to the edge but outside carry small values.
         """
-        pressure, gap = self._fields
-        _, zones, _ = self._zone(stick, gap, True)
-        given = np.stack([pressure, *shear]).T
-        lambdas = pair.as_array()
+        zones, given = np.stack([*self._zones, stick]), np.stack([self._fields[0], *shear])
         return np.asarray(
-            called(_api.tractions_to_edges, self._basis, lambdas, gap.T, zones, friction.T, given, 0).T
+            flat.tractions_to_edges(self._nodes, pair, np.stack(self._fields), zones, friction, given)
         )
 
     def stress(
@@ -320,61 +222,33 @@ class ContactEdges:
     ) -> tuple[Array, float]:
         """Return the stress (Pa) that hats of the corrected tractions miss next to the edges.
 
-        Parameters
-        ----------
-        shear, stick, friction
-            As of `tractions`.
-        corrected : ndarray, shape (3, n_row, n_col)
-            What that returned, Pa.
-        body : int
-            1 or 2.
-        poisson_ratio : float
-            Its Poisson's ratio.
-        points : ndarray, shape (n, 3)
-            x, y and depth below the surface of the body, m.
-
-        Returns
-        -------
-        ndarray, shape (n, 6)
-            Components xx, yy, zz, xy, yz, xz.
-        float
-            Share of the edge of the contact near the points where the pressure does not vanish like a root,
-            so that nothing is corrected.
+        `corrected` is what `tractions` returns; points are x, y and depth below the surface of the body (m).
+        The share of the edge of the contact near them follows where the pressure does not vanish like a
+        root, so that nothing is corrected.
         """
-        pressure, gap = self._fields
-        _, zones, _ = self._zone(stick, gap, True)
-        given = np.stack([pressure, *shear]).T
-        fields = gap.T, zones, friction.T, given, corrected.T
-        found, refused = called(
-            _api.stress_to_edges, self._basis, self._start, *fields, body, poisson_ratio, points.T, 0
+        zones, given = np.stack([*self._zones, stick]), np.stack([self._fields[0], *shear])
+        found: tuple[Array, float] = flat.stress_to_edges(
+            *(self._nodes, np.stack(self._fields), zones, friction, given, corrected),
+            *(body, poisson_ratio, points),
         )
-        return np.asarray(found.T), float(refused)
+        return found
 
     def _whole(self) -> _Zone:
         return self._zone(self._zones[0], self._fields[0], False)
 
     def _zone(self, nodes: Mask, reserve: Array, sticks: bool) -> _Zone:
-        fields, zones = np.stack([*self._fields, reserve]), np.stack([*self._zones, nodes])
-        return fields.T, zones.T.astype(np.int32), sticks
+        return np.stack([*self._fields, reserve]), np.stack([*self._zones, nodes]), sticks
 
     def _edge(self, zone: _Zone) -> Edge:
-        numbers, segments, count = called(
-            _api.edge_of_zone,
-            *(self._basis, self._start, *zone),
-            _api.count_cut_triangles(zone[1][..., 2]),
-        )
-        area, radius, length, major, minor, angle, x, y = numbers.tolist()
-        return Edge(area, radius, length, segments.T[:count], Ellipse(major, minor, angle, (x, y)))
+        edge, segments, count = flat.edge_of_zone(self._nodes, *zone, flat.count_cut_triangles(zone[1][2]))
+        return Edge(edge.area, edge.radius, edge.length, segments[:count], Ellipse.of(edge))
 
     def _mesh(self, zone: _Zone, field: Array, vanishes: bool) -> ZoneMesh:
-        inside = zone[1][..., 2]
-        nodes, cut = int(inside.sum()), _api.count_cut_triangles(inside)
+        inside = zone[1][2]
+        nodes, cut = int(inside.sum()), flat.count_cut_triangles(inside)
         room = nodes + 3 * cut, 2 * nodes + 3 * cut  # a cut triangle has at most three points and parts
-        points, values, triangles, (n_point, n_triangle) = called(
-            _api.mesh_of_zone, self._basis, self._start, *zone, field.T, vanishes, *room
+        points, values, triangles, (n_point, n_triangle) = flat.mesh_of_zone(
+            self._nodes, *zone, field, vanishes, *room
         )
-        x, y = points[:, :n_point]
-        return ZoneMesh(x, y, values[:n_point], triangles.T[:n_triangle].astype(np.intp) - 1)
-
-    def _distances(self, zone: _Zone) -> Array:
-        return np.asarray(called(_api.distances_of_zone, self._basis, *zone).T)
+        x, y = points[:n_point].T
+        return ZoneMesh(x, y, values[:n_point], triangles[:n_triangle].astype(np.intp) - 1)

@@ -5,38 +5,22 @@ Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ..arrays import Array, Mask
-from . import _core
-from .calls import called
+from . import flat
+from .flat import area_radius as area_radius
+from .flat import boundary as boundary
+from .flat import boundary_circle as boundary_circle
+from .flat import edge_radius as edge_radius
+from .flat import pressure_center as pressure_center
+from .flat import slip_ring as slip_ring
+from .flat import unresolved_slip_zones as unresolved_slip_zones
 
-_api = _core.hc_f2py_measures
-
-
-@dataclass(frozen=True)
-class CircleFit:
-    """Circle through the boundary nodes, equations (9.1)-(9.4).
-
-    Parameters
-    ----------
-    radius : float
-        a, mean of the radii r_i = |X_i - X_0| + l_e/2 of the boundary nodes: (9.1), (9.2).
-    mean_deviation : float
-        E_a = mean |r_i - a| / a (9.3).
-    standard_deviation : float
-        sigma = sqrt(mean (r_i - a)^2) / a (9.4).
-    count : int
-        Number of boundary nodes.
-    """
-
-    radius: float
-    mean_deviation: float
-    standard_deviation: float
-    count: int
+NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
+LATTICE_ERRORS: tuple[str, ...] = flat.LatticeErrors._fields
 
 
 class Ellipse(NamedTuple):
@@ -47,193 +31,40 @@ class Ellipse(NamedTuple):
     angle: float
     center: tuple[float, float]
 
-
-def boundary(zone: Mask) -> Mask:
-    """Return the nodes of ``zone`` with a neighbor outside it (or outside the window)."""
-    return np.asarray(_api.zone_boundary(zone.T) != 0).T
-
-
-def boundary_circle(
-    x: Array, y: Array, zone: Mask, spacing: float, center: tuple[float, float] = (0.0, 0.0)
-) -> CircleFit:
-    """Fit a circle to the boundary nodes of a zone as in (9.1)-(9.4).
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    zone : ndarray of bool, shape (n_row, n_col)
-        Nodes of the zone; not empty.
-    spacing : float
-        l_e, m.
-    center : tuple of float
-        X_0, m.
-
-    Returns
-    -------
-    CircleFit
-    """
-    numbers, count = _api.circle_of_zone(x.T, y.T, zone.T, spacing, center)
-    radius, mean, standard = numbers.tolist()
-    return CircleFit(radius, mean, standard, count)
-
-
-def area_radius(zone: Mask, cell_area: float) -> float:
-    """Return the radius (m) of the circle with the area of the cells of a zone; cell area in m^2."""
-    return float(_api.radius_of_area(np.count_nonzero(zone), cell_area))
-
-
-def edge_radius(
-    x: Array, y: Array, pressure: Array, spacing: float, center: tuple[float, float] = (0.0, 0.0)
-) -> float:
-    """Return the radius at which the pressure vanishes, to a fraction of the spacing.
-
-    Near the edge p^2 is linear in r^2 (p grows like the square root of the distance). A straight line through
-    the nodes with a_A - 6 l_e <= r <= a_A - l_e gives the zero; the outermost nodes, which carry most of the
-    discretization error, are left out. a_A is the area-equivalent radius.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    spacing : float
-        l_e, m.
-    center : tuple of float
-        Center of the contact, m.
-
-    Returns
-    -------
-    float
-        Radius, m; nan if fewer than three nodes are in the band.
-    """
-    return float(_api.radius_of_pressure(x.T, y.T, pressure.T, spacing, center))
-
-
-def pressure_center(x: Array, y: Array, pressure: Array) -> tuple[float, float]:
-    """Return the centroid of a pressure (m); nan if there is none."""
-    along, across = _api.center_of_pressure(x.T, y.T, pressure.T).tolist()
-    return along, across
+    @classmethod
+    def of(cls, found: Any) -> Self:
+        """Return an ellipse of the core."""
+        return cls(found.semi_major, found.semi_minor, found.angle, (found.x, found.y))
 
 
 def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
-    """Return the ellipse with the second moments of the nodes of a zone (variance a^2/4 along a).
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    zone : ndarray of bool, shape (n_row, n_col)
-        Nodes of the zone; not empty.
-
-    Returns
-    -------
-    Ellipse
-    """
-    return _ellipse(_api.ellipse_of_zone(x.T, y.T, zone.T))
+    """Return the ellipse with the second moments of the nodes of a zone that is not empty."""
+    return Ellipse.of(flat.moment_ellipse(x, y, zone))
 
 
 def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
-    """Return the ellipse on which the pressure vanishes, to a fraction of the spacing.
-
-    The square of the pressure is a quadratic polynomial near the edge; it is fitted to the nodes between
-    1 - 6 l_e/b and 1 - l_e/b of the way from the center to the moment ellipse with the minor semi-axis b.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes, m.
-    pressure : ndarray, shape (n_row, n_col)
-        Contact pressure, Pa.
-    spacing : float
-        l_e, m.
-
-    Returns
-    -------
-    Ellipse
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than six nodes to fit, or the fit is no ellipse.
-    """
-    return _ellipse(called(_api.ellipse_of_pressure, x.T, y.T, pressure.T, spacing))
+    """Return the ellipse on which the pressure vanishes: docs/theory/edges.md."""
+    return Ellipse.of(flat.edge_ellipse(x, y, pressure, spacing))
 
 
 def limits_of_error(
     spacings: Array, values: Array, rough: Mask | None = None, unresolved: Mask | None = None
 ) -> Array:
-    """Estimate the error of values on the first, finest lattice against their limit for a vanishing spacing.
+    """Estimate the error of values on the first, finest lattice: docs/theory/error_bars.md, (A1) to (A3).
 
-    A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted: docs/theory/error_bars.md,
-    (A1) to (A3).
-
-    Parameters
-    ----------
-    spacings : ndarray, (n,)
-        Spacings in units of the first.
-    values : ndarray, (n, m)
-        m quantities, on each of the lattices.
-    rough : ndarray of bool, (m,), optional
-        Quantities that depend on a few nodes at the edge of a zone: an order of 1/2 is possible, too.
-    unresolved : ndarray of bool, (m,), optional
-        Quantities that depend on a slip zone narrower than the lattice resolves: still slower orders are.
-
-    Returns
-    -------
-    ndarray, (m,)
-        Bounds that hardly any error exceeds; NaN for NaN.
+    The values of a lattice are a row. `rough` quantities depend on a few nodes at the edge of a zone, so that
+    an order of 1/2 is possible; `unresolved` ones on a slip zone narrower than the lattice resolves, so that
+    still slower orders are.
     """
-    rough, unresolved = (
-        np.zeros(values.shape[1], dtype=bool) if mask is None else mask for mask in (rough, unresolved)
-    )
-    return np.asarray(called(_api.errors_of_limits, spacings, values, rough, unresolved))
-
-
-def unresolved_slip_zones(
-    spacing: float, contact_area: Array, stick_area: Array, max_traction: Array, max_pressure: Array
-) -> Mask:
-    """Test whether the slip zones of load steps are narrower than the lattice resolves.
-
-    Parameters
-    ----------
-    spacing : float
-        Spacing (m).
-    contact_area, stick_area : ndarray, (n,)
-        Areas to the edge between the nodes (m2).
-    max_traction, max_pressure : ndarray, (n,)
-        Largest shear tractions and pressures (Pa).
-    """
-    areas, tractions = (contact_area, stick_area), (max_traction, max_pressure)
-    return np.asarray(called(_api.unresolved_slip_zones, spacing, *areas, *tractions)) != 0
-
-
-NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
-LATTICE_ERRORS = ("max_pressure", "contact_area", "stick_area", "dissipated_energy")
+    none = np.zeros(values.shape[1], dtype=bool)
+    masks = (none if mask is None else mask for mask in (rough, unresolved))
+    return np.asarray(flat.limits_of_error(spacings, values.T, *masks))
 
 
 def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> tuple[Array, float]:
-    """Estimate the largest relative errors of a lattice; docs/theory/expected_errors.md, (X1), (X2).
-
-    Parameters
-    ----------
-    spacings : float
-        Spacings in the radius.
-    load_ratio : float
-        Tangential load Q/mu P; 0: nothing slips.
-    goal : float
-        Target of the error.
-
-    Returns
-    -------
-    errors : ndarray, (4,)
-        Of `LATTICE_ERRORS`.
-    needed : float
-        Spacings for the goal.
-    """
-    errors, needed = _core.hc_f2py_steps.errors_of_lattice(spacings, load_ratio, goal)
-    return np.asarray(errors), float(needed)
+    """Estimate the `LATTICE_ERRORS`, and spacings for a goal: docs/theory/expected_errors.md, (X1), (X2)."""
+    errors, needed = flat.expected_lattice_errors(spacings, load_ratio, goal)
+    return np.array(errors), needed
 
 
 def expected_entry_error(
@@ -241,51 +72,19 @@ def expected_entry_error(
 ) -> tuple[float, float, float]:
     """Estimate the error of the shear tractions by nodes that enter a growing contact, (X3)-(X5).
 
-    Parameters
-    ----------
-    before, after : ndarray, (n,)
-        Contact radius (m) before and after each of the load steps in which it grows.
-    stick : float
-        mu/abs(beta); 0: the materials are alike.
-    load_ratio : float or None
-        Q/mu P of a tangential load that grows at the same time.
-    goal : float
-        Target of the error.
-
-    Returns
-    -------
-    error, steps, needed : float
-        The error as a share of all shear tractions; effective number of steps; number for the goal.
+    Its steps go from contact radii `before` to `after`; `stick` is mu/abs(beta), 0 if the materials are
+    alike; `load_ratio` is Q/mu P of a tangential load that grows, too. Return the error as a share of all
+    shear tractions, the number of steps as they count, and that for the goal.
     """
-    ratio = -1.0 if load_ratio is None else load_ratio
-    steps, error, needed = _core.hc_f2py_steps.errors_of_entry(
-        before, after, min(stick, np.finfo(float).max), ratio, goal
-    )
-    return float(error), float(steps), float(needed)
+    ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
+    entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
+    return entry, steps, needed
 
 
 def expected_turning_error(shear: Array) -> float:
     """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6).
 
-    Parameters
-    ----------
-    shear : ndarray, (n, 3)
-        Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each
-        load step.
-
-    Returns
-    -------
-    float
-        The error as a share of the energy.
+    `shear` has the tangential load or shift along x and y, and torque or twist, each over its largest, a row
+    for the end of each load step.
     """
-    return float(_core.hc_f2py_steps.error_of_turns(shear.T)) if len(shear) else 0.0
-
-
-def slip_ring(load_ratio: float) -> float:
-    """Return the width of the slip ring over the contact radius, 1 - (1 - Q/mu P)^(1/3)."""
-    return float(_core.hc_f2py_steps.width_of_ring(load_ratio))
-
-
-def _ellipse(numbers: Array) -> Ellipse:
-    major, minor, angle, x, y = numbers.tolist()
-    return Ellipse(major, minor, angle, (x, y))
+    return float(flat.turning_errors(shear)) if len(shear) else 0.0

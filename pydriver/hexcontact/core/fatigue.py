@@ -25,8 +25,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, number, reals
 from ..errors import DeckError
-from . import _core
-from .calls import called
+from . import flat
 
 __all__ = [
     "CriticalPlane",
@@ -39,8 +38,6 @@ __all__ = [
     "ruiz",
     "smith_watson_topper",
 ]
-
-_flat = _core.hc_f2py_fatigue
 
 
 class CriticalPlane(NamedTuple):
@@ -80,7 +77,8 @@ def smith_watson_topper(stress: ArrayLike, young_modulus: float, poisson_ratio: 
     DeckError
         If the history is empty or not finite, or a number is out of its range.
     """
-    return _critical(1, stress, _positive(young_modulus, "young_modulus"), _ratio(poisson_ratio))
+    moduli = _positive(young_modulus, "young_modulus"), _ratio(poisson_ratio)
+    return CriticalPlane(*flat.smith_watson_topper(_history(stress, 6), *moduli))
 
 
 def findley(stress: ArrayLike, slope: float) -> CriticalPlane:
@@ -93,7 +91,7 @@ def findley(stress: ArrayLike, slope: float) -> CriticalPlane:
     slope : float
         Influence of the normal stress, 0.2 to 0.4 for ductile metals.
     """
-    return _critical(2, stress, _finite(slope))
+    return CriticalPlane(*flat.findley(_history(stress, 6), _finite(slope)))
 
 
 def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_stress: float) -> CriticalPlane:
@@ -109,7 +107,7 @@ def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_st
         G and sigma_y [Pa].
     """
     moduli = _positive(shear_modulus, "shear_modulus"), _positive(yield_stress, "yield_stress")
-    return _critical(3, stress, _finite(slope), *moduli)
+    return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), _finite(slope), *moduli))
 
 
 def crossland(stress: ArrayLike, slope: float) -> Array:
@@ -122,7 +120,7 @@ def crossland(stress: ArrayLike, slope: float) -> Array:
     slope : float
         Influence of the hydrostatic stress: (t - b/sqrt(3))/(b/3) from the limits of torsion t and bending b.
     """
-    return _invariant(False, stress, slope)
+    return np.asarray(flat.crossland(_history(stress, 6), _finite(slope)))
 
 
 def dang_van(stress: ArrayLike, slope: float) -> Array:
@@ -135,7 +133,7 @@ def dang_van(stress: ArrayLike, slope: float) -> Array:
     slope : float
         Influence of the hydrostatic stress: 3 (t/b - 1/2) from the limits of torsion t and bending b.
     """
-    return _invariant(True, stress, slope)
+    return np.asarray(flat.dang_van(_history(stress, 6), _finite(slope)))
 
 
 def ruiz(traction: ArrayLike, slip: ArrayLike, stress: ArrayLike) -> Ruiz:
@@ -148,11 +146,10 @@ def ruiz(traction: ArrayLike, slip: ArrayLike, stress: ArrayLike) -> Ruiz:
     stress : array_like, shape (..., times, 6)
         Stress at the surface [Pa].
     """
-    (q, points), (s, _), (history, _) = _flattened(traction, 2), _flattened(slip, 2), _flattened(stress, 6)
-    if not q.shape[1:] == s.shape[1:] == history.shape[1:]:
+    q, s, history = _history(traction, 2), _history(slip, 2), _history(stress, 6)
+    if not q.shape[:-1] == s.shape[:-1] == history.shape[:-1]:
         raise DeckError("traction, slip, stress: expected the same points and times")
-    values = called(_flat.ruiz, q, s, history)
-    return Ruiz(*(np.reshape(value, points) for value in values))
+    return Ruiz(*flat.ruiz(q, s, history))
 
 
 def life(
@@ -176,32 +173,20 @@ def life(
     ndarray
         Cycles; inf beyond 1e30, 0 below one half, NaN for NaN.
     """
-    values = reals(value, "value")
     names = {"young_modulus": young_modulus, "strength": strength, "b": b, "ductility": ductility, "c": c}
-    numbers = [number(v, name) for name, v in names.items()]
-    cycles = called(_flat.cycles_of, numbers, values.ravel())
-    return np.reshape(cycles, values.shape)
+    return np.asarray(
+        flat.life(reals(value, "value"), **{name: number(v, name) for name, v in names.items()})
+    )
 
 
-def _flattened(history: ArrayLike, components: int) -> tuple[Array, tuple[int, ...]]:
-    """Return a history as the core takes it, and the shape of its points."""
+def _history(history: ArrayLike, components: int) -> Array:
+    """Return a history of vectors or tensors."""
     array = reals(history, "stress" if components == 6 else "traction, slip")
     if array.ndim < 2 or array.shape[-1] != components or not array.size:
         raise DeckError(
             f"a history of shape {array.shape}: expected (..., times, {components}), a time or more"
         )
-    return np.ascontiguousarray(array).reshape(-1, *array.shape[-2:]).T, array.shape[:-2]
-
-
-def _critical(criterion: int, stress: ArrayLike, *numbers: float) -> CriticalPlane:
-    history, points = _flattened(stress, 6)
-    values, normals = called(_flat.critical_planes, criterion, (*numbers, 0.0, 0.0)[:3], history)
-    return CriticalPlane(np.reshape(values, points), np.reshape(normals.T, (*points, 3)))
-
-
-def _invariant(of_dang_van: bool, stress: ArrayLike, slope: float) -> Array:
-    history, points = _flattened(stress, 6)
-    return np.reshape(called(_flat.invariants, of_dang_van, _finite(slope), history), points)
+    return array
 
 
 def _finite(slope: float) -> float:

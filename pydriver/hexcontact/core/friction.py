@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import _core
-from .calls import SLIP, HeldState, called
+from . import flat
 from .contact import (
     UNILATERAL,
     Contact,
@@ -30,18 +29,16 @@ from .contact import (
     method_code,
     shaped,
     thread_count,
-    why_stopped,
     window_size,
 )
+from .handles import HeldState
 from .lattice import Lattice
-
-_api = _core.hc_f2py_friction
 
 Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
-_FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
+_FIELDS = CORE["fields"]
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
 
@@ -50,20 +47,8 @@ MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 class FrictionLaw:
     """Friction at the nodes of a window: no traction is above min(mu p^k, limit).
 
-    Attributes
-    ----------
-    coefficient : float or ndarray, (n_row, n_col)
-        Coefficient of friction mu, everywhere or at each node; ``inf``: no slip. With a direction, the
-        geometric mean of the two coefficients.
-    shear_limit : float
-        Bound of the shear traction [Pa]; ``inf``: none. With a direction, of the geometric mean of the
-        half-axes of the ellipse.
-    power : float
-        Power k of the pressure.
-    ratio : float
-        Coefficient along a direction over that across it: the tractions that it allows are an ellipse.
-    angle : float
-        Angle of that direction from x [rad].
+    The coefficient mu is ``inf`` for no slip. With a ratio of the coefficient along a direction (angle from
+    x, rad) to that across, coefficient and limit are geometric means: the tractions allowed are an ellipse.
     """
 
     coefficient: float | Array
@@ -162,6 +147,10 @@ class ContactState(NormalSolution):
     sliding: bool = False
     cuts: int = 0
 
+    def recounted(self, **changes: Any) -> ContactState:
+        """Return this end of a load step with other counts, residuals or slip of the step."""
+        return dataclasses.replace(self, **changes).behind(self.known)
+
 
 class FrictionalContact(Contact):
     """A contact problem with friction; `advance` solves the step from one load to the next.
@@ -217,13 +206,8 @@ class FrictionalContact(Contact):
         law = _checked_law(friction_coefficient, shear_limit, lattice)
         word(coupling, "coupling", ("full", "goodman"))
         self._create(
-            _api.create_frictional_contact,
-            *(method_code(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
-            *self._surfaces,
-            *law.as_arguments(),
-            checked_interface(interface),
-            coupling == "goodman",
-            thread_count(threads),
+            *(flat.create_sheared, method_code(method, iteration), *self._surfaces, law),
+            *(checked_interface(interface), coupling == "goodman", thread_count(threads)),
         )
 
     def virgin(self) -> ContactState:
@@ -294,34 +278,16 @@ class FrictionalContact(Contact):
         word(entry, "entry", ("implicit", "interpolated"))
         checked_tolerance(tolerance)
         if guess is not None:
-            traction = np.reshape(np.asarray(guess[0], dtype=float), (3, self.lattice.size))
-            called(_api.set_guess, self._handle, traction.T, [*guess[1]])
-        before = self._held(state)
-        after, new_numbers, residuals, sweeps, cuts, work, flags = self._solve(
-            _api.advance_friction,
-            *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
-            *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
-            *(self.lattice.size, before.handle),
-            held=lambda handle: HeldState(handle, self.lattice.shape),
+            flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
+        found = self._solved(
+            *(ContactState, flat.advance, [_CONTROLS[word] for word in control], [*targets, *strain], static),
+            *(entry == "interpolated", tolerance),
+            *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts"), self._held(state)),
         )
-        numbers = new_numbers.tolist()
-        arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}
         if not self._mask.all():
-            arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
-        after.record(arrays["gap"], numbers)
-        found = ContactState(
-            **arrays,
-            zone=after.take_zones(),
-            **dict(zip(_NUMBERS, numbers, strict=True)),
-            **dict(zip(_RESIDUALS, residuals.tolist(), strict=True)),
-            converged=bool(flags[0]),
-            sliding=bool(flags[1]),
-            touches_rim=bool(flags[2]),
-            stopped=why_stopped(flags[3]),
-            sweeps=sweeps,
-            cuts=cuts,
-            operator_applications=work,
-        )
+            gap = np.where(self._mask, found.gap, np.nan)
+            gap.flags.writeable = False  # the core has another
+            found = dataclasses.replace(found, gap=gap).behind(found.known)
         self._warn_of_rim(found)
         return found
 
@@ -339,35 +305,23 @@ class FrictionalContact(Contact):
             The end of the second step with the slip of both, and the residual of the friction conditions for
             this slip; the work is that of the second.
         """
-        slip, residual = called(_api.record_steps, self._handle, self._columns(first), self._columns(last))
-        slip_x, slip_y = (np.ascontiguousarray(column).reshape(self.lattice.shape) for column in slip.T)
-        return dataclasses.replace(
-            last,
+        (slip_x, slip_y), residual = flat.record_steps(self, self._held(first), self._held(last))
+        return last.recounted(
             slip_increment_x=slip_x,
             slip_increment_y=slip_y,
             residual_tangential=residual,
             cuts=first.cuts + last.cuts,
         )
 
-    def _columns(self, state: ContactState) -> Array:
-        """Return the fields of a state as columns of one array."""
-        return np.array([self._vector(state, name) for name in _FIELDS]).T
-
     def _held(self, state: ContactState) -> HeldState:
         """Return a state in the memory of the core, which is no copy if it was found there."""
-        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
-        held = HeldState.of(state, numbers)
-        if held is not None and state.pressure.shape == self.lattice.shape:
-            return held
-        fields = [self._vector(state, name) for name in _FIELDS if name not in SLIP]
-        return HeldState.copied(self.lattice.shape, fields, numbers)
-
-    def _vector(self, state: ContactState, name: str) -> Array:
-        """Return a field of a state as a vector, which is no copy if it can be."""
-        values = getattr(state, name)
-        if name == "gap":
-            values = np.where(self._mask, shaped(values, self.lattice, name), 0.0)
-        return checked_field(values, self.lattice, name)
+        if state.known is not None and state.pressure.shape == self.lattice.shape:
+            return state.known
+        numbers = {name: number(getattr(state, name), name) for name in CORE["numbers"]}
+        gap = np.where(self._mask, shaped(state.gap, self.lattice, "gap"), 0.0)
+        given = {name: getattr(state, name) for name in _FIELDS} | {"gap": gap}
+        fields = {name: checked_field(values, self.lattice, name) for name, values in given.items()}
+        return HeldState.copied({**fields, "zone": np.asarray(state.zone)}, numbers)
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
         """Return a state of a smaller window on the window of this problem.
@@ -388,9 +342,8 @@ class FrictionalContact(Contact):
         known = lattice.embed(np.ones(lattice.shape), self.lattice, 0.0).astype(bool)
         motion = [getattr(state, name) for name in MOTION]
         if loaded or any(motion):
-            traction = np.asfortranarray(np.stack([arrays[name].ravel() for name in _FIELDS[:3]], axis=1))
-            displacement = called(_api.relative_displacement, self._handle, traction, motion)
-            closing, s_x, s_y = (column.reshape(self.lattice.shape) for column in displacement.T)
+            traction = [arrays[name] for name in ("pressure", "traction_x", "traction_y")]
+            closing, s_x, s_y = flat.relative_displacement(self, traction, motion)
             arrays["gap"] = np.where(known, arrays["gap"], self._gap + closing)
             arrays["relative_displacement_x"] = np.where(known, arrays["relative_displacement_x"], s_x)
             arrays["relative_displacement_y"] = np.where(known, arrays["relative_displacement_y"], s_y)
@@ -428,24 +381,6 @@ def memory_needed(
     unlike: bool = True,
     threads: int = 1,
 ) -> int:
-    """Return the memory (bytes) of a problem with friction on a window.
-
-    Parameters
-    ----------
-    method
-        ``"direct"`` or ``"fft"``.
-    n_row, n_col
-        Rows and columns of the window.
-    contact
-        Nodes in contact; default: all.
-    loads
-        Number of prescribed loads, 1 to 4; the other motions are prescribed.
-    coupled
-        Whether pressure and shear are coupled.
-    unlike
-        Whether the materials are dissimilar.
-    threads
-        Number of threads.
-    """
+    """Return the memory (bytes) of a problem with friction on a window."""
     window = window_size(method, n_row, n_col, contact)
-    return int(_api.friction_memory_needed(*window, loads, coupled, unlike, thread_count(threads)))
+    return int(flat.friction_memory(*window, loads, coupled, unlike, thread_count(threads)))

@@ -14,24 +14,14 @@ The potential of a unit load at the apex of a pyramid, (3 sqrt(3)/2) ln 3:
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, broadcast, integer, number, reals, word
 from ..errors import DeckError
-from . import _core
-from .calls import called
-from .influence_below import (
-    mesh_displacement,
-    mesh_stress,
-    pyramid_displacement,
-    pyramid_stress,
-    triangle_displacement_below,
-    triangle_stress,
-)
+from . import flat
 
 __all__ = [
     "Displacement",
@@ -52,8 +42,6 @@ __all__ = [
 
 Load = Literal["constant", "linear_x", "linear_y", "bilinear"]
 Direction = Literal["normal", "x", "y"]
-
-_flat = _core.hc_f2py_influence
 
 _DEGREES = {"constant": (0, 0), "linear_x": (1, 0), "linear_y": (0, 1), "bilinear": (1, 1)}
 _DIRECTIONS = {"x": 1, "y": 2, "normal": 3}
@@ -147,7 +135,7 @@ def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k
     3.525494
     """
     exponents = {name: _exponent(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
-    return _evaluate(_flat.triangle_integral, x, y, vertices=_vertices(vertices), **exponents)
+    return np.asarray(flat.triangle_integral(_vertices(vertices), *_points(x=x, y=y), **exponents))
 
 
 def triangle_displacement(
@@ -188,18 +176,17 @@ def triangle_displacement(
         If an argument is not a finite number, has the wrong shape or is out of range.
     """
     k, m = _DEGREES[word(load, "load", _DEGREES)]
-    components = _evaluate(
-        _flat.triangle_displacement,
-        x,
-        y,
-        vertices=_vertices(vertices),
-        direction=_DIRECTIONS[word(direction, "direction", _DIRECTIONS)],
-        k=k,
-        m=m,
-        shear_modulus=number(shear_modulus, "shear_modulus"),
-        poisson_ratio=number(poisson_ratio, "poisson_ratio"),
+    found = flat.triangle_displacement(
+        *(
+            _vertices(vertices),
+            *_points(x=x, y=y),
+            _DIRECTIONS[word(direction, "direction", _DIRECTIONS)],
+            k,
+            m,
+        ),
+        *(number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")),
     )
-    return Displacement(*components)
+    return Displacement(*_components(found))
 
 
 def linear_load_displacement(
@@ -237,16 +224,9 @@ def linear_load_displacement(
         If an argument is not a finite number, has the wrong shape or is out of range.
     """
     loads = reals(traction, "traction", (3, 3), ": x, y, z at each corner")
-    components = _evaluate(
-        _flat.linear_triangle_displacement,
-        x,
-        y,
-        vertices=_vertices(vertices),
-        traction=loads.T,
-        shear_modulus=number(shear_modulus, "shear_modulus"),
-        poisson_ratio=number(poisson_ratio, "poisson_ratio"),
-    )
-    return Displacement(*components)
+    moduli = number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")
+    given = _vertices(vertices), *_points(x=x, y=y), loads
+    return Displacement(*_components(flat.linear_triangle_displacement(*given, *moduli)))
 
 
 def pyramid_kernels(x: ArrayLike, y: ArrayLike) -> PyramidKernels:
@@ -271,7 +251,7 @@ def pyramid_kernels(x: ArrayLike, y: ArrayLike) -> PyramidKernels:
     DeckError
         If a coordinate is not a finite number, or the shapes do not broadcast.
     """
-    return PyramidKernels(*_evaluate(_flat.pyramid_kernels, x, y))
+    return PyramidKernels(*_components(flat.pyramid_kernels(*_points(x=x, y=y))))
 
 
 def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> PyramidFunctions:
@@ -304,69 +284,200 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
 
 
 def load_potential(shape: str, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the integral of a load on a node over the distance of points, in spacings.
-
-    Parameters
-    ----------
-    shape : str
-        One of `LOAD_SHAPES`; each load has the volume sqrt(3)/2 of the unit pyramid.
-    x, y : array_like
-        Points relative to the node, in spacings.
-    """
+    """Return the integral of a load on a node over the distance of points, in spacings."""
     number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
-    return _evaluate(_flat.potential_of_load, x, y, shape_number=number)
+    return np.asarray(flat.load_potential(number, *_points(x=x, y=y)))
 
 
 def displacement_errors(shape: str, nodes_in_radius: float, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface.
-
-    Parameters
-    ----------
-    shape : str
-        One of `LOAD_SHAPES`.
-    nodes_in_radius : float
-        Spacings in the contact radius.
-    x, y : array_like
-        Points relative to the center, a node, in spacings.
-
-    Returns
-    -------
-    ndarray
-        Errors over the approach, in the common shape of the points.
-    """
+    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface."""
     number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
-    return _evaluate(_flat.errors_of_displacement, x, y, shape_number=number, radius=nodes_in_radius)
+    return np.asarray(flat.displacement_errors(number, nodes_in_radius, *_points(x=x, y=y)))
 
 
 def pressure_errors(nodes_in_radius: float) -> tuple[float, float]:
-    """Return the largest errors of Hertz's pressure for r < 0.8 a: constant on cells, linear between nodes.
-
-    Parameters
-    ----------
-    nodes_in_radius : float
-        Spacings in the contact radius.
-
-    Returns
-    -------
-    tuple of float
-        Over the largest pressure.
-    """
-    constant, linear = _flat.errors_of_pressure(nodes_in_radius).tolist()
+    """Return the largest errors of Hertz's pressure, r < 0.8 a: constant on cells, linear between nodes."""
+    constant, linear = flat.pressure_errors(nodes_in_radius).tolist()
     return constant, linear
 
 
-def _evaluate(procedure: Callable[..., Any], x: ArrayLike, y: ArrayLike, **arguments: Any) -> Array:
-    """Evaluate at all points; the result has the shape of one value, then that of the points."""
-    px, py = broadcast(x=x, y=y).values()
-    # f2py takes no empty arrays; one point serves to check the other arguments
-    point = {"x": px.ravel(), "y": py.ravel()} if px.size else {"x": np.zeros(1), "y": np.zeros(1)}
-    values = called(procedure, **point, **arguments)
-    return np.ascontiguousarray(values[..., : px.size]).reshape(values.shape[:-1] + px.shape)
+# --- below the surface: stress is positive in tension, z points into the body ------------------------------
+
+
+def pyramid_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float) -> Array:
+    """Return the stress below the surface by the unit pyramid of the equilateral lattice.
+
+    The error is below 1e-12 of the envelope 1/(2 pi max(1, R)^2), R the distance from the node, up to 1e5
+    spacings.
+
+    Parameters
+    ----------
+    x, y, z : array_like
+        Points relative to the node, in spacings; z >= 0 points into the body.
+    poisson_ratio : float
+        nu of the body, in (-1, 0.5].
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 6)
+        By a pressure and by tractions along x and y on the body, each 1 at the node: components xx, yy, zz,
+        xy, yz, xz, positive in tension.
+
+    Raises
+    ------
+    DeckError
+        If an argument is not a finite number or out of range, or the shapes do not broadcast.
+    """
+    return np.asarray(flat.pyramid_fields(*_points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[1])
+
+
+def pyramid_displacement(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float) -> Array:
+    """Return the displacement below the surface by the unit pyramid times the shear modulus.
+
+    Arguments as of `pyramid_stress`; the result has the shape (..., 3, 3): by each load along x, y, z.
+    """
+    return np.asarray(flat.pyramid_fields(*_points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[0])
+
+
+def triangle_stress(
+    vertices: ArrayLike,
+    x: ArrayLike,
+    y: ArrayLike,
+    z: ArrayLike,
+    poisson_ratio: float,
+    load: ArrayLike = (1.0, 1.0, 1.0),
+) -> Array:
+    """Return the stress below the surface by a linear load on a triangle.
+
+    The load ends at the edges; on them, at z = 0, some stresses are infinite, and the result is meaningful
+    only in a sum over triangles with continuous loads.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (3, 2)
+        Corners of the triangle.
+    x, y, z : array_like
+        Points; z >= 0 points into the body.
+    poisson_ratio : float
+        nu of the body, in (-1, 0.5].
+    load : array_like, shape (3,)
+        The load at the corners.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 6)
+        By the load as a pressure, and as a traction along x and y on the body: components as of
+        `pyramid_stress`.
+
+    Raises
+    ------
+    DeckError
+        If an argument is not a finite number or out of range, or the shapes do not broadcast.
+    """
+    return _triangle_below(vertices, load, poisson_ratio, x=x, y=y, z=z)[1]
+
+
+def triangle_displacement_below(
+    vertices: ArrayLike,
+    x: ArrayLike,
+    y: ArrayLike,
+    z: ArrayLike,
+    poisson_ratio: float,
+    load: ArrayLike = (1.0, 1.0, 1.0),
+) -> Array:
+    """Return the displacement below the surface by a linear load on a triangle times the shear modulus.
+
+    Arguments as of `triangle_stress`; the result has the shape (..., 3, 3): by each load along x, y, z.
+    """
+    return _triangle_below(vertices, load, poisson_ratio, x=x, y=y, z=z)[0]
+
+
+def mesh_stress(
+    vertices: ArrayLike, tractions: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float
+) -> Array:
+    """Return the stress below the surface by tractions on any set of triangles.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3, 2)
+        Corners of the triangles.
+    tractions : array_like, shape (n, 3, 3)
+        At each corner the pressure, and the tractions along x and y on the body; linear on each triangle.
+    x, y, z : array_like
+        Points; z >= 0 points into the body.
+    poisson_ratio : float
+        nu of the body, in (-1, 0.5].
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        Components as of `pyramid_stress`.
+
+    Raises
+    ------
+    DeckError
+        If an argument is not a finite number or out of range, or the shapes do not fit.
+    """
+    return _mesh_below(vertices, tractions, poisson_ratio, x=x, y=y, z=z)[1]
+
+
+def mesh_displacement(
+    vertices: ArrayLike, tractions: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float
+) -> Array:
+    """Return the displacement by tractions on any set of triangles times the shear modulus.
+
+    Arguments as of `mesh_stress`; the result has the shape (..., 3): along x, y, z.
+    """
+    return _mesh_below(vertices, tractions, poisson_ratio, x=x, y=y, z=z)[0]
+
+
+def _points(**coordinates: ArrayLike) -> list[Array]:
+    """Return points as arrays of one shape."""
+    return list(broadcast(**coordinates).values())
+
+
+def _components(found: Array) -> Array:
+    """Return components first, then the axes of the points."""
+    return np.ascontiguousarray(np.moveaxis(found, -1, 0))
 
 
 def _vertices(vertices: ArrayLike) -> Array:
-    """Return the corners of a triangle as columns."""
-    return reals(vertices, "vertices", (3, 2), ": three points").T
+    """Return the corners of a triangle."""
+    return reals(vertices, "vertices", (3, 2), ": three points")
+
+
+def _triangle_below(
+    vertices: ArrayLike, load: ArrayLike, poisson_ratio: float, **points: ArrayLike
+) -> tuple[Array, Array]:
+    """Return displacement and stress by a linear load on a triangle."""
+    given = _shaped(vertices, "vertices", (3, 2)), _shaped(load, "load", (3,)), *_points(**points)
+    found: tuple[Array, Array] = flat.triangle_interior(*given, number(poisson_ratio, "poisson_ratio"))
+    return found
+
+
+def _mesh_below(
+    vertices: ArrayLike, tractions: ArrayLike, poisson_ratio: float, **points: ArrayLike
+) -> tuple[Array, Array]:
+    """Return displacement and stress by tractions on triangles."""
+    corners = reals(vertices, "vertices")
+    if corners.ndim != 3 or not corners.size:
+        raise DeckError(f"vertices: an array of shape {corners.shape}, expected (n, 3, 2): three points each")
+    given = [
+        _shaped(values, name, (len(corners), 3, axes))
+        for values, name, axes in ((corners, "vertices", 2), (tractions, "tractions", 3))
+    ]
+    found: tuple[Array, Array] = flat.mesh_interior(
+        *given, *_points(**points), number(poisson_ratio, "poisson_ratio")
+    )
+    return found
+
+
+def _shaped(values: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+    """Return finite numbers of a shape."""
+    array = reals(values, name)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise DeckError(f"{name}: an array of shape {array.shape}, expected finite numbers of shape {shape}")
+    return array
 
 
 def _exponent(value: int, name: str) -> int:

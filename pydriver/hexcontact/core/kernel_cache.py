@@ -27,12 +27,10 @@ import re
 import time
 import uuid
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..errors import DeckError, KernelFolderWarning, warn
-from . import _core
-
-_cache: Any = _core.hc_f2py_cache
+from . import flat
 
 MEMORY, FOLDER, FOLDER_SIZE, SHARED = (
     f"HEXCONTACT_KERNEL_{word}" for word in ("MEMORY", "FOLDER", "FOLDER_SIZE", "FOLDER_SHARED")
@@ -114,14 +112,14 @@ def configure(
     Examples
     --------
     >>> from hexcontact import kernel_cache
-    >>> kernel_cache.configure(memory="1 GB")
+    >>> kernelflat.configure(memory="1 GB")
     """
     bound = None if memory is None else _bytes(memory, "memory")
     size = None if folder_size is None else _bytes(folder_size, "folder_size")
     take_settings()
     if bound is not None:
         _settings.bound = bound
-        _cache.limit_kernels(bound)
+        flat.limit_kernels(bound)
     if size is not None:
         _settings.folder_size = size
     if folder is not None and not isinstance(folder, bool):
@@ -143,8 +141,8 @@ def bound() -> int:
 def clear() -> None:
     """Drop the cached spectra in memory; those in use remain with their problems."""
     take_settings()
-    _cache.limit_kernels(0)
-    _cache.limit_kernels(_settings.bound)
+    flat.limit_kernels(0)
+    flat.limit_kernels(_settings.bound)
 
 
 def statistics() -> Statistics:
@@ -153,16 +151,16 @@ def statistics() -> Statistics:
     Examples
     --------
     >>> from hexcontact import kernel_cache
-    >>> kernel_cache.statistics().memory <= 256e6
+    >>> kernelflat.statistics().memory <= 256e6
     True
     """
-    return Statistics(*(int(n) for n in _cache.kernel_statistics()))
+    return Statistics(*flat.kernel_statistics())
 
 
 def limit_growth(spare: int) -> None:
     """Limit the growth of the cache to `spare` bytes until the next call, or shrink it; its bound remains."""
     take_settings()
-    _cache.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
+    flat.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
 
 
 def take_settings() -> None:
@@ -172,7 +170,7 @@ def take_settings() -> None:
         memory, size = (_bytes(given[name] or _DEFAULTS[name], name) for name in (MEMORY, FOLDER_SIZE))
         _settings.bound, _settings.folder_size = memory, size
         _settings.shared = _yes(given[SHARED], SHARED)
-        _cache.limit_kernels(memory)
+        flat.limit_kernels(memory)
         if given[FOLDER]:
             _settings.folder = Path(given[FOLDER]).expanduser().absolute()
             _open_folder()
@@ -184,7 +182,7 @@ def warn_of_faults() -> None:
     """Warn of faults of the folder since the last call."""
     if _settings.folder is None:
         return
-    for line in _cache.kernel_message().decode(errors="replace").strip().splitlines():
+    for line in flat.kernel_message().splitlines():
         _warn(line)
 
 
@@ -228,7 +226,7 @@ def _open_folder() -> None:
             _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
     # for the core, blanks at the end are no part of a name
     name = b"" if folder is None else os.fsencode(folder) + b"/"
-    _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room, _settings.shared)
+    flat.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room, _settings.shared)
 
 
 def _pruned(folder: Path, bound: int) -> int:
@@ -256,7 +254,7 @@ def _maker() -> str:
     """Identify what the bits of a spectrum depend on: program, processor, libraries for mathematics."""
     from .._version import __version__
 
-    core = Path(str(_core.__file__)).stat()
+    core = Path(flat.LIBRARY).stat()
     parts = [__version__, f"core {core.st_size} {core.st_mtime_ns}", platform.machine()]
     with contextlib.suppress(OSError):
         processor = re.findall(

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, integer, number, reals
 from ..errors import DeckError
-from . import _core
+from . import flat
+
+
+class Nodes(NamedTuple):
+    """Nodes from the first one: basis vectors, one a row, position of the first [m], rows and columns."""
+
+    basis: Array
+    start: tuple[float, float]
+    shape: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -88,7 +97,7 @@ class Lattice:
     @cached_property
     def basis(self) -> Array:
         """Basis vectors, one a row [m]."""
-        basis: Array = np.ascontiguousarray(_core.hc_f2py_normal.lattice_basis(self.spacing).T)
+        basis: Array = flat.lattice_basis(self.spacing)
         return basis
 
     @property

@@ -5,16 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..variables import CORE, VARIABLES
-from . import _core
-from .calls import called
+from ..variables import VARIABLES
+from . import flat
 from .contact import ElasticPair, Interface, NormalSolution
-from .friction import MOTION, ContactState, FrictionLaw
+from .flat import bulk_strain as bulk_strain
+from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
-
-_api = _core.hc_f2py_measures
-# what measures need of a state with friction beside pressure and gap
-_MEASURED = ("traction_x", "traction_y", "relative_displacement_x", "relative_displacement_y")
 
 
 def nodal_residuals(
@@ -27,63 +23,27 @@ def nodal_residuals(
     tangential: bool,
 ) -> Array:
     """Return the residuals at the nodes, R_n or, tangential, R_t: docs/theory/residuals.md."""
-    vectors = _vectors(solution, "traction", "slip_increment")
-    residuals = called(
-        _api.nodal_residuals,
-        lattice.basis.T,
-        pair.as_array(),
-        *friction.as_arguments(),
-        interface,
-        tangential,
-        solution.pressure.T,
-        solution.gap.T,
-        vectors,
-    )
-    return np.asarray(residuals.T)
-
-
-def bulk_strain(
-    young_modulus: float, poisson_ratio: float, stress: tuple[float, float, float], plane_strain: int
-) -> tuple[Array, Array]:
-    """Return a bulk stress xx, yy, xy (Pa) and its strain: free sides (0), no strain along x (1), y (2)."""
-    found: tuple[Array, Array] = _api.strain_of_bulk((young_modulus, poisson_ratio), plane_strain, stress)
-    return found
+    if tangential:
+        # a copy: the slip may be that of several parts of the step
+        return np.asarray(flat.tangential_residual(lattice, pair, interface, friction, solution.copied()))
+    return np.asarray(flat.normal_residual(lattice, pair, interface, solution.pressure, solution.gap))
 
 
 def measures(
     lattice: Lattice, friction: FrictionLaw, initial_gap: Array, candidate: Mask, solution: NormalSolution
 ) -> dict[str, float]:
-    """Return the measures of a state in the load history, by the names of `hexcontact.variables`.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    friction : FrictionLaw
-        Friction at the nodes.
-    initial_gap : ndarray, shape (n_row, n_col)
-        Gap before loading, m; only that of nodes in contact has effect.
-    candidate : ndarray of bool, shape (n_row, n_col)
-        Nodes that can touch.
-    solution : NormalSolution
-        The state, with friction or without.
-    """
-    frictional = isinstance(solution, ContactState)
-    numbers = called(
-        _api.measures_of_state,
-        *(lattice.basis.T, lattice.first, lattice.origin, *friction.as_arguments(), frictional),
-        *(solution.pressure.T, solution.gap.T, initial_gap.T, solution.zone.T, candidate.T),
-        [getattr(solution, name, 0.0) for name in MOTION],
-        # one by one: a stack of them would be a copy of half of the state
-        *(getattr(solution, name, solution.pressure).T for name in _MEASURED),
-    )
-    found = dict(zip(CORE["measures"], numbers.tolist(), strict=True))
-    return {name: value for name, value in found.items() if frictional or not VARIABLES[name].frictional}
+    """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
+    given = initial_gap, candidate, solution
+    if isinstance(solution, ContactState):
+        found: dict[str, float] = flat.measure_friction(lattice, friction, *given)._asdict()
+        return found
+    found = flat.measure_pressure(lattice, *given)._asdict()
+    return {name: value for name, value in found.items() if not VARIABLES[name].frictional}
 
 
 def turning_points(values: Array) -> list[int]:
     """Return the indices in a history at which a quantity turns back, with its first and last extreme."""
-    return [int(place) for place in np.flatnonzero(_api.turns_of_history(values))]
+    return [int(place) for place in np.flatnonzero(flat.turns_of_history(values))]
 
 
 def cycles(motion: Array, load: Array) -> list[tuple[int, int, float]]:
@@ -91,33 +51,13 @@ def cycles(motion: Array, load: Array) -> list[tuple[int, int, float]]:
 
     Each has the indices of its first and last step in the history, and the area of its loop (J).
     """
-    count, places, areas = _api.cycles_of_history(motion, load)
-    steps = (places.T[:count] - 1).tolist()
+    count, places, areas = flat.cycles_of_history(motion, load)
+    steps = (places[:count] - 1).tolist()
     return [(first, last, float(area)) for (first, last), area in zip(steps, areas, strict=False)]
 
 
-def _vectors(solution: NormalSolution, *names: str) -> Array:
-    """Return vector fields as the core takes them; zeros without friction."""
-    if not isinstance(solution, ContactState):
-        return np.zeros((4, *solution.pressure.shape)).T
-    return np.stack([getattr(solution, f"{name}_{axis}") for name in names for axis in "xy"]).T
-
-
 def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:
-    """Return the direction of the line on which tangential loads lie.
-
-    Parameters
-    ----------
-    load : ndarray, shape (2, n)
-        The loads, N.
-    least, aside : float
-        Largest size of no load, and largest distance from the line (N).
-
-    Returns
-    -------
-    tuple of float or None
-        A unit vector whose larger component is positive; None if there is no load, or no such line.
-    """
+    """Return the direction of the line on which tangential loads lie."""
     size = np.hypot(*load)
     largest = load[:, int(np.argmax(size))]
     if not size.max() > least:

@@ -21,15 +21,7 @@ _NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
 
 
 def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/proc/self/cgroup")) -> int:
-    """Return the memory (bytes) that the machine and the limits of this process leave.
-
-    Parameters
-    ----------
-    cgroups : Path
-        Mount point of the control groups, by which batch systems and containers limit memory.
-    process : Path
-        File with the groups of this process.
-    """
+    """Return the memory (bytes) that the machine and the limits of this process leave."""
     return min([_left_on_machine(), *_left_in_limits(), *_left_in_groups(cgroups, process)])
 
 
@@ -63,24 +55,7 @@ def threads() -> int:
 
 
 def require(needed: int, what: str, advice: str, there: int | None = None) -> None:
-    """Raise an error if memory is short.
-
-    Parameters
-    ----------
-    needed : int
-        Memory in bytes.
-    what : str
-        Its purpose, with the size: ``"a window of 2048 x 2048 nodes"``.
-    advice : str
-        Advice for the user.
-    there : int, optional
-        `available`, which reads a dozen files, if it is known.
-
-    Raises
-    ------
-    ResourceError
-        If less than that is available.
-    """
+    """Raise an error if memory is short."""
     from . import kernel_cache
 
     there = available() if there is None else there

@@ -1,21 +1,23 @@
-"""Size of adaptive load steps, by the core (fortran/path: step_control, step_error)."""
+"""Size of adaptive load steps, and wear, by the core (fortran/path: step_control, step_error, wear_jumps)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Mask
-from . import _core
-from .calls import called
+from . import flat
 from .contact import ElasticPair, Interface, checked_interface
+from .flat import Change as Change
+from .flat import change_by_jump as change_by_jump
+from .flat import wear_left as wear_left
+from .flat import worn as worn
 from .friction import ContactState, FrictionLaw
+from .handles import HeldState
 from .lattice import Lattice
-
-_api = _core.hc_f2py_steps
-_wear = _core.hc_f2py_wear
 
 REJECTED, ACCEPTED, LIMITED, FAILED = range(4)
 """Verdicts on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones do
@@ -24,44 +26,11 @@ not help; the smallest one did not converge."""
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
-_FIELDS = (
-    "pressure",
-    "gap",
-    "traction_x",
-    "traction_y",
-    "relative_displacement_x",
-    "relative_displacement_y",
+NO_CHANGE = Change(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+_COMPARED = (
+    *("pressure", "gap", "zone", "traction_x", "traction_y"),
+    *("relative_displacement_x", "relative_displacement_y"),
 )
-_TRACTIONS = ("pressure", "traction_x", "traction_y")
-
-
-class Change(NamedTuple):
-    """Changes by halving a load step.
-
-    Attributes
-    ----------
-    stick : float
-        Change of the stick area, as a share of the largest contact area.
-    traction : float
-        Change of the shear tractions, as a share of those at full slip.
-    added : float
-        The part of `traction` due to this load step.
-    lattice : float
-        Possible change of the stick area by rings of nodes that enter, for any steps; a share, too.
-    gain : float
-        Change of the stick area over that of the tractions, both as shares, during the second half.
-    spent, turned : float
-        Dissipated energy of the halves, and the part that is uncertain since the load turns in each, over the
-        area of a node (J/m2).
-    """
-
-    stick: float = 0.0
-    traction: float = 0.0
-    added: float = 0.0
-    lattice: float = 0.0
-    gain: float = 1.0
-    spent: float = 0.0
-    turned: float = 0.0
 
 
 def change_by_halving(
@@ -73,100 +42,18 @@ def change_by_halving(
 ) -> Change:
     """Compare the two solutions at the end of a load step.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window of all states.
-    candidate : ndarray of bool, (n_row, n_col)
-        Nodes that can touch.
-    friction : FrictionLaw
-        Friction at the nodes.
-    states : sequence of ContactState or None
-        The end of the path in whole steps, the middle and the end of that in halves, and both paths at the
-        beginning of the step (None before the first load).
-    area : float
-        Largest contact area of the history (m2).
+    The states are the end of the path in whole steps, the middle and the end of that in halves, and both
+    paths at the beginning of the step (None before the first load); the area is the largest of the history.
     """
-    fields = np.zeros((len(states), len(_FIELDS), *lattice.shape))
-    zones = np.zeros((len(states), *lattice.shape), dtype=np.int32)
-    for number, state in enumerate(states):
-        if state is not None:
-            for field, name in zip(fields[number], _FIELDS, strict=True):
-                field[:] = getattr(state, name)
-            zones[number] = state.zone
-    change = called(
-        _api.change_by_halving,
-        lattice.basis.T,
-        candidate.T,
-        *friction.as_arguments(),
-        fields.T,
-        zones.T,
-        area,
-    )
-    return Change(*change.tolist())
+    zero = np.zeros(lattice.shape)
+    none = HeldState.copied(dict.fromkeys(_COMPARED, zero), {}) if None in states else None
+    known = (none if state is None else state for state in states)
+    return flat.compare_halves(lattice, candidate, friction, *known, area)
 
 
 def is_shear_free(state: ContactState | None) -> bool:
     """Test whether a state has no shear tractions: a path of such states has no history."""
-    if state is None:
-        return True
-    return bool(_api.is_shear_free(state.pressure.T, state.traction_x.T, state.traction_y.T))
-
-
-def worn(
-    lattice: Lattice, friction: FrictionLaw, coefficient: float, energy: Array, cycles: float, depth: Array
-) -> tuple[Array, float, float]:
-    """Wear the surfaces by cycles that are all alike: docs/theory/wear.md, (V3).
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    friction : FrictionLaw
-        Friction at the nodes.
-    coefficient : float
-        Coefficient of wear of both bodies together (m2/N).
-    energy : ndarray, (n_row, n_col)
-        Energy that friction dissipates in a cycle, by area (J/m2).
-    cycles : float
-        Number of cycles.
-    depth : ndarray, (n_row, n_col)
-        Worn depth before (m).
-
-    Returns
-    -------
-    depth : ndarray, (n_row, n_col)
-        Worn depth after (m).
-    volume, deepest : float
-        Worn volume (m3), largest worn depth (m).
-    """
-    mu = np.broadcast_to(friction.coefficient, lattice.shape)
-    found = _wear.wear_of_cycles(energy.T, coefficient, mu.T, cycles, lattice.cell_area, depth.T)
-    return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
-
-
-def wear_left(
-    friction: FrictionLaw, energies: Sequence[Array], before: ContactState, after: ContactState
-) -> float:
-    """Bound the change of the wear of a cycle by further repetitions: docs/theory/wear.md, (V9).
-
-    Parameters
-    ----------
-    friction : FrictionLaw
-        Friction at the nodes.
-    energies : sequence of ndarray, (n_row, n_col)
-        Energy that friction dissipates in each of the last cycles, at most three, by area (J/m2).
-    before, after : ContactState
-        Beginning and end of the last cycle.
-
-    Returns
-    -------
-    float
-        Share of the largest wear of a node.
-    """
-    mu = np.broadcast_to(friction.coefficient, after.pressure.shape)
-    tractions = np.array([[state.traction_x, state.traction_y] for state in (before, after)])
-    return float(_wear.wear_left_open(np.array(energies).T, tractions.T, after.pressure.T, mu.T))
+    return state is None or bool(flat.is_shear_free(state))
 
 
 def expected_end(
@@ -174,40 +61,27 @@ def expected_end(
 ) -> tuple[Array, Array]:
     """Expect the end of a load step of the next cycle of wear, to start it from.
 
-    Parameters
-    ----------
-    last : ndarray of float32, (2, 3, n_row, n_col)
-        Tractions when the load step was solved last (Pa), and their rates by cycle.
-    ahead : float
-        Cycles since then.
-    before, pressure : ndarray, (n_row, n_col)
-        Pressure that was expected at the end of the load step before, and that at its end (Pa).
-
-    Returns
-    -------
-    tractions : ndarray, (3, n_row, n_col)
-        Pressure and tractions along x and y (Pa).
-    expected : ndarray of float32, (n_row, n_col)
-        The pressure without the correction by the load step before.
+    `last` has the tractions when the load step was solved last, and their rates by cycle, in single
+    precision; `before` and `pressure` are the pressures expected and solved at the end of the load step
+    before. Return the tractions, and the pressure without the correction by the load step before.
     """
     shape = last.shape[2:]
     follows = before is not None and pressure is not None
     expected: Array = np.zeros(shape, np.float32) if before is None else before.copy()
     known = np.zeros(shape) if pressure is None else pressure
-    columns, values = _columns(last), expected.reshape(-1)
-    tractions = _wear.expected_end(columns, ahead, follows, known.ravel(), values)
-    return np.asarray(tractions.T.reshape(3, *shape)), expected
+    tractions = flat.expected_end(_flattened(last), ahead, follows, known.ravel(), expected.reshape(-1))
+    return np.asarray(tractions).reshape(3, *shape), expected
 
 
 def remember_end(state: ContactState, passed: float, last: Array) -> None:
     """Put the tractions of a state, and their change a cycle since `passed` cycles, in place of `last`."""
-    tractions = (getattr(state, name).ravel() for name in _TRACTIONS)
-    _wear.remembered_end(*tractions, passed, _columns(last))
+    tractions = (field.ravel() for field in (state.pressure, state.traction_x, state.traction_y))
+    flat.remembered_end(*tractions, passed, _flattened(last))
 
 
-def _columns(fields: Array) -> Array:
-    """Return fields as Fortran has them, in the same memory."""
-    return fields.reshape(*fields.shape[:-2], -1).T
+def _flattened(fields: Array) -> Array:
+    """Return fields with one axis of nodes, in the same memory."""
+    return fields.reshape(*fields.shape[:-2], -1)
 
 
 def energy_of_jump(
@@ -225,144 +99,60 @@ def energy_of_jump(
 ) -> Array:
     """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V4).
 
-    Parameters
-    ----------
-    lattice, friction, coefficient
-        As of `worn`.
-    pair, interface, candidate
-        Elastic constants, compliance of the interface, nodes that can touch.
-    cycle : tuple of ndarray, (n_row, n_col)
-        Energy that friction dissipates in the cycle before the jump, by area (J/m2), and path of slip (m).
-    state : ContactState
-        End of that cycle.
-    by_load : bool
-        The normal load is prescribed, not the approach.
-    cycles : float
-        Cycles of the jump.
-    tolerance : float
-        Bound of the residual of the pressure.
+    `cycle` has dissipated energy by area (J/m2) and path of slip (m) of the cycle before the jump, `state` is
+    its end.
     """
-    mu = np.broadcast_to(friction.coefficient, lattice.shape)
-    fields = *cycle, state.pressure, np.where(candidate, state.gap, 0.0)
-    ahead = called(
-        _wear.energy_of_jump,
-        *(lattice.basis.T, pair.as_array(), checked_interface(interface)),
-        *(field.T for field in fields),
-        *(candidate.T, mu.T, by_load, coefficient, cycles, tolerance),
-    )
-    return np.ascontiguousarray(ahead.T)
+    worn_by = candidate, friction, coefficient, *cycle, state, by_load, cycles, tolerance
+    return np.asarray(flat.energy_of_jump(lattice, pair, checked_interface(interface), *worn_by))
 
 
-def change_by_jump(
-    lattice: Lattice,
-    pair: ElasticPair,
-    friction: FrictionLaw,
-    coefficient: float,
-    energies: tuple[Array, Array, Array],
-    path: Array,
-    cycles: float,
-    max_pressure: float,
-) -> tuple[Change, Array, Array]:
-    """Compare two jumps with one of both: docs/theory/wear.md, (V5) and (V6).
-
-    Parameters
-    ----------
-    lattice, friction, coefficient
-        As of `worn`.
-    pair : ElasticPair
-        Elastic constants.
-    energies : tuple of ndarray, (n_row, n_col)
-        Energies by which the first jump wears, the second one, and one that is as long as both (J/m2).
-    path : ndarray, (n_row, n_col)
-        Path of slip of the cycle between the two (m).
-    cycles : float
-        Cycles of each jump.
-    max_pressure : float
-        Largest pressure (Pa).
-
-    Returns
-    -------
-    change : Change
-        For `StepControl`; its tolerance is that of the worn depth over the indentation of a node.
-    slower : ndarray, (n_row, n_col)
-        By how much the two wear more (m).
-    second : ndarray, (n_row, n_col)
-        Energy by which the second jump wears, corrected (J/m2).
-    """
-    mu = np.broadcast_to(friction.coefficient, lattice.shape)
-    change, slower, second = called(
-        _wear.change_by_jump,
-        *(lattice.basis.T, pair.as_array(), np.array(energies).T, path.T, coefficient, mu.T),
-        *(cycles, max_pressure),
-    )
-    return Change(*change.tolist()), np.ascontiguousarray(slower.T), np.ascontiguousarray(second.T)
-
-
-class Attempt:
-    """One attempt at a load step, in parts of its segment."""
-
-    def __init__(self, numbers: Array) -> None:
-        self.numbers = numbers
-
-    @property
-    def end(self) -> float:
-        """Fraction of the segment at its end."""
-        return float(self.numbers[1])
-
-    @property
-    def rejected(self) -> int:
-        """Number of attempts before it."""
-        return int(self.numbers[2])
+Attempt = SimpleNamespace
+"""An attempt at a load step: the numbers of `flat.Attempt`, such as its `end`."""
 
 
 class StepControl:
-    """Control of load steps: the size of the next one, and the changes by the last ones.
-
-    Parameters
-    ----------
-    least : float
-        Smallest load step, as a part of its segment.
-    """
+    """Control of load steps: the size of the next one, and the changes by the last ones."""
 
     def __init__(self, least: float = LEAST) -> None:
-        self._numbers = np.array([1.0, 0.5, *[0.0] * 6])
-        self._least = least
+        self._now = flat.StepControl(1.0, 0.5, *[0.0] * 6, least)
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], least: float = LEAST) -> StepControl:
         """Return the control from the record of a step."""
         control, past = cls(least), record["memory"]
-        names, energies = ("size", "first", "stick", "traction"), (past[name] for name in ("spent", "turned"))
-        control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"], *energies]
+        numbers = {name: record[name] for name in ("size", "first", "stick", "traction")}
+        numbers |= {"past_stick": past["stick"], "past_traction": past["traction"]}
+        control._now = control._now._replace(**numbers, spent=past["spent"], turned=past["turned"])
         return control
 
     @property
     def record(self) -> dict[str, Any]:
         """The control in the record of a step."""
-        size, first, stick, traction, *past = self._numbers.tolist()
+        size, first, stick, traction, *past, _ = self._now
         memory = dict(zip(("stick", "traction", "spent", "turned"), past, strict=True))
         return {"size": size, "first": first, "stick": stick, "traction": traction, "memory": memory}
 
     def begin_with(self, size: float) -> None:
         """Set the first size of a segment, as a part of it."""
-        self._numbers[1] = 0.5 * size  # the core doubles that of the segment before
+        self._now = self._now._replace(first=0.5 * size)  # the core doubles that of the segment before
 
     def forget(self) -> None:
         """Reset the changes, as after a load step of given size."""
-        self._numbers[2:] = 0.0
+        self._now = flat.StepControl(self._now.size, self._now.first, *[0.0] * 6, self._now.least)
 
     def first_attempt(self, fraction: float, largest: float) -> Attempt:
         """Return the first attempt at a load step that begins at a fraction of its segment."""
-        return Attempt(_api.first_attempt(self._numbers, self._least, fraction, largest))
+        self._now, attempt = flat.first_attempt(self._now, fraction, largest)
+        return Attempt(**attempt._asdict())
 
     def judge(self, attempt: Attempt, change: Change | None, tolerance: float) -> int:
         """Return the verdict on an attempt (None: it did not converge); a rejected one becomes the next."""
         known = change is not None
-        given = attempt.numbers, known, change or Change(), tolerance
-        return int(_api.decide_attempt(self._numbers, self._least, *given))
+        found, verdict = flat.decide_attempt(self._now, attempt, known, change or NO_CHANGE, tolerance)
+        vars(attempt).update(found._asdict())
+        return int(verdict)
 
     def accept(self, attempt: Attempt, change: Change, tolerance: float, verdict: int) -> tuple[float, float]:
         """Accept an attempt; return bounds on the errors of stick area and tractions, both as shares."""
-        given = attempt.numbers, change, tolerance, verdict
-        bounds = _api.accept_attempt(self._numbers, self._least, *given)
-        return float(bounds[0]), float(bounds[1])
+        self._now, stick, traction = flat.accept_attempt(self._now, attempt, change, tolerance, verdict)
+        return stick, traction

@@ -76,7 +76,8 @@ def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
         value = "" if problem.value is MISSING else shown(problem.value)
         message = f"{source.locate(key)}{key}{value and ' = '}{value}: {problem.sentence}"
         file, place = source.found(key)
-        faults.append(Fault(message, key, value, file, *(place or (None, None))))
+        line, column = place or (None, None)
+        faults.append(Fault(message, key, value, file, line, column, problem.sentence))
     faults = list(dict.fromkeys(faults))
     return DeckError("\n".join(dict.fromkeys(fault.message for fault in faults)), faults)
 

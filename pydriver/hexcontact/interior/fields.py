@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
-from ..core import _core
-from ..core.calls import called
+from ..core import flat
 from ..core.lattice import Lattice
 from ..errors import DeckError
-
-_api = _core.hc_f2py_interior
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Components of the stress in the order of the core."""
@@ -30,19 +27,10 @@ def at_points(
     x, y, depth = np.asarray(points, dtype=float).reshape(-1, 3).T
     if not x.size:
         return np.empty((len(tractions), 0, 3)), np.empty((len(tractions), 0, 6))
-    displacement, stress = called(
-        _api.interior_at_points,
-        lattice.basis.T,
-        lattice.start,
-        tractions.T,
-        body,
-        poisson_ratio,
-        x,
-        y,
-        depth,
-        threads,
+    found: tuple[Array, Array] = flat.interior_at_points(
+        lattice, tractions, body, poisson_ratio, x, y, depth, threads
     )
-    return displacement.T, stress.T
+    return found
 
 
 def on_planes(
@@ -59,23 +47,13 @@ def on_planes(
     Parameters as of `at_points`; `depths` are those of the planes below the surface of the body, m. Six
     `components` are those of the stress (Pa), three those of the displacement times the shear modulus (Pa m).
     """
-    field = called(
-        _api.interior_on_planes,
-        components,
-        lattice.basis.T,
-        lattice.start,
-        tractions.T,
-        body,
-        poisson_ratio,
-        np.ravel(depths),
-        threads,
-    )
-    return np.asarray(field.T)
+    where = lattice, tractions, body, poisson_ratio, np.ravel(depths)
+    return np.asarray(flat.interior_on_planes(components, *where, threads))
 
 
 def planes_memory(lattice: Lattice, threads: int = 0) -> int:
     """Return the memory in bytes that `on_planes` takes besides its result."""
-    return int(_api.memory_of_planes(lattice.n_col, lattice.n_row, threads))
+    return int(flat.memory_of_planes(lattice.n_col, lattice.n_row, threads))
 
 
 def invariants(stress: ArrayLike) -> Array:
@@ -85,6 +63,4 @@ def invariants(stress: ArrayLike) -> Array:
         raise DeckError(
             f"stress: an array of shape {values.shape}, expected (..., 6): {', '.join(COMPONENTS)}"
         )
-    flat = values.reshape(-1, 6)
-    scalars = _api.invariants_of_stress(flat.T).T if len(flat) else np.empty((0, 5))
-    return np.asarray(scalars).reshape(*values.shape[:-1], 5)
+    return np.asarray(flat.invariants_of_stress(values))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import netcdf_library
-from ..deck.below import Criteria, Fatigue, Stress
+from ..deck.below import Fatigue, Stress
 from ..deck.recorded import recorded
 from ..errors import DeckError
-from ..files import remove_stale, replacing
+from ..files import reading, remove_stale, replacing
 from ..text import quantity
-from .below import BelowSurface
 from .extremes import extremes_of, place_of
 
 if TYPE_CHECKING:
@@ -40,74 +39,25 @@ def files_of(deck: str, output: Path) -> dict[str, Path]:
     return {name: output.with_name(f"{output.stem}_{name}.nc") for name in tables_of(deck)}
 
 
-def computed(
-    result: BelowSurface, kept: list[int], names: list[str] | None = None
-) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield name and dataset of each table of stresses or fatigue parameters of the deck of a result."""
-    for name, table in tables_of(result.deck).items():
-        if names is None or name in names:
-            yield name, of_table(result, name, table, kept)
-
-
-def at_hand(
-    result: BelowSurface, kept: list[int], names: list[str] | None = None
-) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield the same as `computed`; tables that the run has written are read from their files."""
-    run, path = result.dataset.attrs.get("run"), Path(result.path)
-    files = files_of(result.deck, path) if path.name else {}
-    for name, table in tables_of(result.deck).items():
-        if names is not None and name not in names:
-            continue
-        found = read_table(files[name]) if files else None
-        if found is None or found.attrs.get("stress_of") != run:
-            found = of_table(result, name, table, kept)
-        yield name, found
-
-
-def of_table(
-    result: BelowSurface, name: str, table: Stress | Fatigue, kept: list[int] | None = None
-) -> xarray.Dataset:
-    """Compute a table of a deck; arguments and errors as of `computed`."""
-    if isinstance(table, Fatigue):
-        try:
-            found = of_cycle(result, table)
-        except DeckError as error:
-            raise DeckError(f"fatigue {name}: {error}") from error
-    else:
-        kept = kept or []
-        steps = kept[-1:] if table.steps is None else kept
-        if isinstance(table.steps, tuple):
-            steps = list(table.steps)
-        if missing := [number for number in steps if number not in kept]:
-            raise DeckError(f"stress {name}: there are no fields of step {missing[0]} (output.every)")
-        chosen = {"step": steps, "body": table.body, "source": table.source}
-        found = result.stress(*table.components, **chosen, **table.where)  # type: ignore[arg-type]
-    attributes = result.dataset.attrs
-    return found.assign_attrs(
-        {key: attributes[key] for key in ("source", "hexcontact_version")},
-        title=f"{attributes.get('title') or 'hexcontact'}: {name}",
-        stress_of=attributes["run"],
-        content=FATIGUE if isinstance(table, Fatigue) else STRESS,
-    )
-
-
-def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
-    """Return the fatigue parameters of a table."""
-    constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
-    given = {key: value for key, value in constants.items() if value is not None}
-    cycle = {"segment": table.segment, "steps": table.steps}
-    return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]
-
-
 def read_table(path: Path) -> xarray.Dataset | None:
-    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
+    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one.
+
+    Raises
+    ------
+    DeckError
+        If it is damaged.
+    """
     if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
-    try:
-        with netcdf_library.opened_by_xarray(path) as found:
-            return found.load()
-    except (OSError, ValueError):
-        return None
+    with reading(path), netcdf_library.opened_by_xarray(path) as found:
+        return found.load()
+
+
+def readable_table(path: Path) -> xarray.Dataset | None:
+    """Return the dataset of a file as `read_table`; None of a damaged one, too."""
+    with contextlib.suppress(DeckError):
+        return read_table(path)
+    return None
 
 
 def content_of(path: Path) -> dict[str, Any]:

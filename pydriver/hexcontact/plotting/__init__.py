@@ -8,23 +8,19 @@ window system; ``figure.savefig("name.pdf")`` writes it. `FIGURES` holds the fun
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
 from .maps import field_map, pressure_field
-from .sections import section, tractions
-from .zones import outlines, zones
-from .stress import stress, trailing_edge
-from .fatigue import fatigue
-from .lines import lines
-from .wear import wear
-from .boundary import contact_boundary
-from .history import history, loop, torsion
-from .compliance import compliance
+from .sections import section, tractions, wear
+from .zones import contact_boundary, outlines, zones
+from .history import compliance, history, loop, torsion
+from .below import fatigue, lines, stress, trailing_edge
 from .overview import overview
-from . import influence as influence
-from . import study as study
+from . import table as table
 from .registry import entries
 
 __all__ = [
@@ -47,6 +43,9 @@ __all__ = [
     "wear",
     "zones",
 ]
+
+for _module in pkgutil.iter_modules(__path__):  # any other figures
+    importlib.import_module(f"{__name__}.{_module.name}")
 
 FIGURES: dict[str, Callable[..., Figure]] = {
     name: entry.draw for name, entry in entries().items() if entry.of_a_result

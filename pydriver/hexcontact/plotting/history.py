@@ -1,4 +1,4 @@
-"""Quantities with one value for each load step: histories, and loops of load and motion."""
+"""Quantities with one value for each load step: histories, loops of load and motion, compliance."""
 
 from __future__ import annotations
 
@@ -10,21 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..analytic.shear import ClosedForms
+from ..analytic.friction import MindlinContact
+from ..analytic.hertz_gap import QuadraticGap
+from ..analytic.shear import CIRCULAR, ClosedForms
 from ..arrays import Array
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
-from ..result.history import LOADS_AND_MOTIONS, worth_showing
+from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
-from ..result.view import dataset_of, title_of
+from ..result.view import Results, as_list, dataset_of, title_of
 from ..text import scaled, worded
 from ..variables import PANELS, VARIABLES, names_where, spelled
-from .registry import figure
-from .style import COMPUTED, EXACT, GUIDE, drawing, handles_of, new_figure, set_title, shades
+from .registry import SEVERAL_RUNS, figure
+from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
@@ -59,11 +62,6 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
 
     Loads and motions below the noise, and quantities that stay 0, are left out. Areas extend to the edge
     between the nodes, where the histories have them.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each step.
     """
     noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
     panels: dict[str, dict[str, str]] = {}
@@ -119,18 +117,12 @@ def history(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
     quantities : sequence of str, optional
         Names of the history variables, one for each panel; by default those above the noise.
     over : str
         Quantity on the horizontal axis: "step", or a history variable such as "tangential_load_x".
     ax : matplotlib.axes.Axes, optional
         Axes to draw the quantities into, which then share a panel; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
 
     Raises
     ------
@@ -171,7 +163,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     place, label = dataset["step"].values, "load step"
     if over != "step":
         along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-        place, label = values_of(dataset, over) * along, _titled(over, length)
+        place, label = values_of(dataset, over) * along, titled(_spelled(over), length)
     begun = begins_at_zero([*names, *([over] if over != "step" else [])])
     place = np.insert(place, 0, 0.0) if begun else place
     marker = "o" if place.size <= _MANY else ""
@@ -183,7 +175,8 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
-    axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
+    named = _spelled(names[0] if len(names) == 1 else _common(names))
+    axes.set(xlabel=label, ylabel=titled(named, unit))
     if len(names) > 1:
         axes.legend([_apart(name, names) for name in names], handlelength=2.2)
     axes.grid(color="0.9", lw=0.5)
@@ -194,8 +187,8 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
                 axes.axvline(float(place[change + begun]), color=GUIDE, lw=0.7, ls=":", zorder=0)
 
 
-def _titled(name: str, unit: str) -> str:
-    return spelled(name.removesuffix("_fit")) + (f" ({unit})" if unit else "")
+def _spelled(name: str) -> str:
+    return spelled(name.removesuffix("_fit"))
 
 
 def _common(names: Sequence[str]) -> str:
@@ -220,25 +213,6 @@ def loop(
     """Draw the tangential load against the shift; for similar spheres also the closed solution.
 
     Both are taken along the direction of the largest load.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    cycles : int or sequence of int, optional
-        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
-        last cycle.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no tangential load in this result, or no such cycle.
     """
     dataset = _before_wear(dataset_of(result))
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
@@ -275,27 +249,7 @@ def loop(
 def torsion(
     result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Draw the torque against the twist; for similar spheres also the solution of Lubkin.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    cycles : int or sequence of int, optional
-        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
-        last cycle.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no torque in this result, or no such cycle.
-    """
+    """Draw the torque against the twist; for similar spheres also the solution of Lubkin."""
     dataset = _before_wear(dataset_of(result))
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise NotInResult("there is no torque in this result")
@@ -348,7 +302,7 @@ def _draw_loop(
             raise DeckError(f"there is no cycle {number}; the history has {len(found)}")
         first, last, area = found[place]
         steps = slice(first, last + 1)
-        label = f"cycle {place % len(found) + 1}: loop of {worded(area, 'J')}"
+        label = f"cycle {place % len(found) + 1}:\nloop of {worded(area, 'J')}"
         axes.fill(x[steps] * to_x, y[steps] * to_y, color=color, alpha=0.12, lw=0, label=label, zorder=1)
         if chosen is not None:
             axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)
@@ -359,3 +313,69 @@ def _draw_loop(
         axes.plot(closed[0] * to_x, closed[1] * to_y, color=EXACT, lw=1.1, label=name, zorder=2)
     axes.set(xlabel=f"{x_name} ({x_unit})", ylabel=f"{y_name} ({y_unit})")
     return to_y
+
+
+def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
+    """Return the shift of the first step with a tangential load over that of Mindlin, and its Q/(mu P).
+
+    Spheres are pressed, then sheared at a constant normal load; another result is an error.
+    """
+    gap, attributes = QuadraticGap.of(dataset), dataset.attrs
+    friction = float(attributes.get("friction_coefficient", np.nan))
+    frictional = attributes.get("algorithm") in ("static", "incremental") and 0.0 < friction < np.inf
+    if not frictional or gap is None:
+        raise NotInResult("the tangential compliance is that of spheres with friction")
+    normal = values_of(dataset, "normal_load")
+    load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
+    step = int(np.argmax(np.hypot(*load) > 1e-6 * friction * normal))  # 0 also without a tangential load
+    if step == 0 or abs(normal[step] - normal[step - 1]) > 1e-6 * normal[step]:
+        raise NotInResult(
+            "the tangential compliance needs a load step of shear alone after those of pressing"
+        )
+    hertz = gap.contact(float(normal[step]))
+    if hertz.semi_minor < CIRCULAR * hertz.semi_major:
+        raise NotInResult("the tangential compliance is that of spheres with friction")
+    gamma = float(attributes["tangential_compliance_ratio"])
+    compliance = 4.0 / float(attributes["effective_modulus"]) * (1.0 + 0.5 * gamma)
+    mindlin = MindlinContact(friction, float(normal[step]), hertz.semi_major, compliance)
+    size = float(np.hypot(*load[:, step]))
+    moved = float((shift[:, step] - shift[:, step - 1]) @ load[:, step]) / size
+    if not size < mindlin.sliding_load:
+        raise NotInResult("the first tangential load is as large as friction can carry")
+    return moved / float(mindlin.shift(size)), size / mindlin.sliding_load
+
+
+@figure("compliance", "initial tangential compliance of some files against beta", needs=SEVERAL_RUNS)
+def compliance(results: Results, ax: Axes | None = None) -> Figure:
+    """Draw the initial tangential compliance of spheres against Dundurs' beta, a point for each result.
+
+    The spheres are pressed, then sheared.
+
+    Raises
+    ------
+    ValueError
+        If one of the results is another one.
+    """
+    several = [dataset_of(one) for one in as_list(results)]
+    series: dict[tuple[float, str], list[tuple[float, float]]] = {}
+    shares = []
+    for dataset in several:
+        ratio, share = initial_compliance(dataset)
+        shares.append(share)
+        key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
+        series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
+    canvas, axes = drawing(ax, 4.6, 3.6)
+    axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
+    colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
+    for (mu, coupling), points in sorted(series.items()):
+        beta, ratio_of = np.array(sorted(points)).T
+        full = coupling == "full"
+        look: dict[str, Any] = {"marker": "o"} if full else {"marker": "s", "ls": "--", "mfc": "none"}
+        label = f"$\\mu$ = {mu:g}" + ("" if full else f", {coupling.title()}")
+        axes.plot(beta, ratio_of, color=colors.get(mu, "black"), ms=4, lw=0.9, label=label, **look)
+    axes.set(xlabel=r"$|\beta|$", ylabel=r"initial compliance $\Delta/\Delta_\mathrm{Mindlin}$")
+    axes.legend()
+    low, high = min(shares), max(shares)
+    at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
+    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
+    return canvas

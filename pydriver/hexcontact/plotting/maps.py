@@ -16,6 +16,7 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefin
 from ..arrays import Array, Mask
 from ..core.edges import ZoneMesh
 from ..core.interpolation import linear
+from ..result.mesh import triangles
 from ..result.result import Result
 from ..result.view import StepView
 from ..text import scaled
@@ -38,14 +39,8 @@ _WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
 def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
     """Return triangles that fill the contact area up to its edge, with a field at their corners.
 
-    Parameters
-    ----------
-    view : StepView
-        The step.
-    values : ndarray, shape (n_row, n_col)
-        A field; above `DRAWN_NODES` nodes in contact only every second, third, ... is used.
-    vanishes : bool
-        Whether it is zero at the edge, like tractions.
+    Above `DRAWN_NODES` nodes in contact the field is read at every second, third, ... node. Fields like
+    tractions vanish at the edge.
     """
     stride = _stride(view.contact)
     return view.edges(stride).contact_mesh(values[::stride, ::stride], vanishes)
@@ -56,13 +51,9 @@ def _whole_mesh(view: StepView, values: Array) -> ZoneMesh:
     shown = view.contact | (values != 0.0)
     stride = _stride(shown)
     x, y, values, shown = (field[::stride, ::stride] for field in (view.x, view.y, values, shown))
-    number = np.arange(shown.size).reshape(shown.shape)
-    corners = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
-    triangles = np.concatenate(
-        [np.stack([corners[k].ravel() for k in three], axis=1) for three in ((0, 1, 2), (1, 3, 2))]
-    )
-    inside = shown.ravel()[triangles].any(axis=1)
-    return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), triangles[inside])
+    corners = triangles(*shown.shape).astype(int)
+    inside = shown.ravel()[corners].any(axis=1)
+    return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), corners[inside])
 
 
 def _stride(shown: Mask) -> int:
@@ -144,24 +135,10 @@ def draw_field(
     arrows: bool = True,
     below: bool = False,
 ) -> None:
-    """Draw a field of several steps into panels with one color scale.
+    """Draw a field of several steps, each into its panel, with one color scale.
 
-    Parameters
-    ----------
-    canvas : Figure
-        Figure of the panels.
-    panels : sequence of Axes
-        One for each step.
-    views : sequence of StepView
-        The steps.
-    name : str
-        Name of the field; "traction" and "slip_increment" are the lengths of the vectors.
-    part : Part
-        Part of the plane to show.
-    arrows : bool
-        Whether vectors are also drawn as arrows.
-    below : bool
-        Whether the color bar of a single panel is below it instead of at its side.
+    The fields "traction" and "slip_increment" are the lengths of vectors, which may have arrows. The color
+    bar of a single panel is at its side, or below it.
     """
     field = _FIELDS[name]
     values = [field.values(view, name) for view in views]
@@ -220,27 +197,8 @@ def field_map(
     ----------
     name : str
         "pressure", "traction", "traction_x", "traction_y", "slip_increment" or "accumulated_slip".
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
     with_arrows : bool, optional
         Whether vectors are also drawn as arrows; by default if there are few maps.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the field of that step was not kept, or does not exist without friction.
     """
     views, labels, title = views_of(result, steps, source)
     single = len(views) == 1
@@ -261,30 +219,7 @@ def pressure_field(
     ax: Axes | None = None,
     source: str | None = None,
 ) -> Figure:
-    """Draw the contact pressure.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw into; by default those of a new figure.
-    source : {"edges", "nodes"}, optional
-        Where it comes from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept.
-    """
+    """Draw the contact pressure."""
     return field_map("pressure", result, steps, ax=ax, source=source)
 
 

@@ -28,26 +28,6 @@ def overview(result: Result | xarray.Dataset, step: int = -1, source: str | None
 
     Without friction: the pressure over the plane and along x; with friction also the shear traction, the
     zones and the history.
-
-    Parameters
-    ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    step : int
-        Number of the load step, from 1; -1 is the last one.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept.
     """
     view = StepView.of(result, step, source)
     with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)

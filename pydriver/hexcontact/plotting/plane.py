@@ -31,20 +31,10 @@ _ROWS = 5  # maps of a wide contact in one column
 
 @dataclass(frozen=True)
 class Part:
-    """A rectangle of the plane that maps show, with its unit of length.
+    """Select a rectangle of the plane that maps show, with its unit of length."""
 
-    Attributes
-    ----------
-    limits : tuple of float
-        x_min, x_max, y_min, y_max, m.
-    factor : float
-        Factor from m to the unit.
-    unit : str
-        The unit.
-    """
-
-    limits: Limits
-    factor: float
+    limits: Limits  # x_min, x_max, y_min, y_max, m
+    factor: float  # from m to the unit
     unit: str
 
     @classmethod

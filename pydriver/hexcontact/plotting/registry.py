@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ParamSpec
@@ -18,30 +19,40 @@ Draw = Callable[P, Figure]
 
 SEVERAL_RUNS = "several runs"
 
+_SHARED = """\
+result : Result or xarray.Dataset
+    Output of `Case.run` or `open_result`.
+results : Result or xarray.Dataset, or a sequence of them
+    Outputs of `Case.run` or `open_result`.
+step : int
+    Number of the load step, from 1; -1 is the last one.
+steps : int or sequence of int
+    Numbers of the load steps, from 1; -1 is the last one.
+cycles : int or sequence of int, optional
+    Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
+    last cycle.
+angle : float
+    Direction of the section from x, rad; at multiples of 30 degrees its points are nodes.
+through : tuple of float, optional
+    A point of the section, m; by default the node nearest to the center.
+ax : matplotlib.axes.Axes, optional
+    Axes to draw into; by default those of a new figure.
+source : {"edges", "nodes"}, optional
+    Where tractions come from, see `hexcontact.Result.traction_field`.
+"""
+"""Parameters that several figures have, as in their docstrings."""
+_PARAMETER = re.compile(r"^(\w+) : .*(?:\n    .*)+", re.MULTILINE)
+
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure that can be drawn.
+    """Describe a figure that can be drawn."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the figure on the command line.
-    help : str
-        One line about it.
-    needs : str
-        What it needs: "friction", "torque", ..., `SEVERAL_RUNS`; may be empty.
-    draw : callable
-        The function; its parameters besides the result are the options.
-    first : bool
-        Whether it is the first in lists.
-    """
-
-    name: str
-    help: str
-    needs: str
-    draw: Callable[..., Figure]
-    first: bool = False
+    name: str  # on the command line
+    help: str  # one line about it
+    needs: str  # "friction", "torque", ..., `SEVERAL_RUNS`; may be empty
+    draw: Callable[..., Figure]  # its parameters besides the result are the options
+    first: bool = False  # in lists
 
     @property
     def options(self) -> Mapping[str, inspect.Parameter]:
@@ -51,12 +62,17 @@ class Entry:
     @property
     def of_a_result(self) -> bool:
         """Whether it shows a result."""
-        return self.of_several or "result" in self.options
+        return not (self.of_a_study or self.of_a_table)
 
     @property
     def of_a_study(self) -> bool:
         """Whether it shows a study."""
         return "study" in self.options
+
+    @property
+    def of_a_table(self) -> bool:
+        """Whether it shows a table [[stress]] or [[fatigue]]."""
+        return "table" in self.options
 
     @property
     def of_several(self) -> bool:
@@ -72,7 +88,24 @@ def entries() -> dict[str, Entry]:
     return dict(sorted(_ENTRIES.items(), key=lambda item: not item[1].first))
 
 
-def styled(draw: Draw[P]) -> Draw[P]:
+def _documented(draw: Draw[P], needs: str) -> str:
+    """Complete the docstring of a figure: shared parameters, what it returns, and its errors."""
+    text, *parts = re.split(r"\n\n(Parameters|Raises)\n-+\n", inspect.getdoc(draw) or "")
+    own = dict(zip(parts[::2], parts[1::2], strict=True))
+    known = {one[1]: one[0] for one in _PARAMETER.finditer(f"{_SHARED}\n{own.get('Parameters', '')}")}
+    names = inspect.signature(draw).parameters.keys()
+    errors = "IndexError\n    If there is no such step.\n" * bool({"step", "steps"} & names)
+    lacks = f"there is no {needs} in the result, or " * bool(needs)
+    errors += own.get("Raises", f"ValueError\n    If {lacks}the result does not contain what is drawn.")
+    sections = {
+        "Parameters": "\n".join(known[name] for name in names if name in known),
+        "Returns": "matplotlib.figure.Figure",
+        "Raises": errors,
+    }
+    return "\n\n".join([text, *(f"{name}\n{'-' * len(name)}\n{part}" for name, part in sections.items())])
+
+
+def styled(draw: Draw[P], needs: str = "") -> Draw[P]:
     """Return a function that draws in the common style, and lays out figures that are not the caller's."""
     signature = inspect.signature(draw)
 
@@ -84,20 +117,15 @@ def styled(draw: Draw[P]) -> Draw[P]:
                 settle(figure)
             return figure
 
+    drawn.__doc__ = _documented(draw, needs)
     return drawn
 
 
 def figure(name: str, help: str, needs: str = "", first: bool = False) -> Callable[[Draw[P]], Draw[P]]:
-    """Register a function that draws a figure.
-
-    Parameters
-    ----------
-    name, help, needs, first : str, str, str, bool
-        See `Entry`.
-    """
+    """Register a function that draws a figure, see `Entry`."""
 
     def register(draw: Draw[P]) -> Draw[P]:
-        drawn = styled(draw)
+        drawn = styled(draw, needs)
         _ENTRIES[name] = Entry(name, help, needs, drawn, first)
         return drawn
 

@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..result.history import step_rows
+from ..result.history_words import step_rows
 from ..result.raster import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
@@ -37,7 +37,7 @@ def rounded(values: Any, digits: int = 4) -> list[float | None]:
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.ravel(values).tolist()]
 
 
-def kept_steps(result: Result) -> list[int]:
+def mapped_steps(result: Result) -> list[int]:
     """Return the numbers of the steps with maps, the last among them."""
     data = dataset_of(result)
     if "pressure" not in data:
@@ -52,17 +52,7 @@ def kept_steps(result: Result) -> list[int]:
 def drawn_data(
     result: Result, histories: Sequence[Mapping[str, Any]], numbers: Sequence[int]
 ) -> dict[str, Any]:
-    """Return the data of charts and maps for JSON.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    histories : sequence of mapping
-        History of each step, with its number.
-    numbers : sequence of int
-        Numbers of the steps with maps, see `kept_steps`.
-    """
+    """Return the data of charts for JSON, and of maps of the steps with some numbers."""
     palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
     return {
         "palette": np.round(255 * palette).astype(int).ravel().tolist(),
@@ -78,20 +68,7 @@ def drawn_data(
 
 
 def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
-    """Return the maps of some load steps, and sections through them along x.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    numbers : sequence of int
-        Numbers of the steps, whose pressure was kept.
-
-    Returns
-    -------
-    dict
-        Limits, maps (pictures in base64), arrows, zones, sections.
-    """
+    """Return limits, maps (pictures in base64), arrows, zones and sections along x of some load steps."""
     last = StepView.of(result, numbers[-1])
     part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
     known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
@@ -232,13 +209,7 @@ def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array) -> dict[str
 
 
 def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the charts of a history; none for a single load step.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each step, with its number.
-    """
+    """Return the charts of a history; none for a single load step."""
     if len(histories) < 2:
         return []
 

@@ -1,4 +1,4 @@
-"""Sections: pressure and shear traction along a line, with closed solutions where they apply."""
+"""Sections: pressure, shear traction and worn depth along a line, with closed solutions where they apply."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..errors import DeckError, NotInResult
 from ..result.interpolate import Line, section_line
 from ..result.result import Result
-from ..result.view import StepView
+from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from .plane import closed_solutions, views_of
 from .registry import figure
@@ -36,6 +36,9 @@ from .style import (
 
 if TYPE_CHECKING:
     import xarray
+
+    from ..result.result import Result
+
 
 Point = tuple[float, float]
 
@@ -61,39 +64,21 @@ def line_of(views: Iterable[StepView], angle: float, through: Point | None = Non
 
 @dataclass(frozen=True)
 class Cut:
-    """The line of a section, and the places along it at which values are drawn.
+    """Hold the line of a section, and the places along it at which values are drawn.
 
-    Attributes
-    ----------
-    line : Line
-        The line, see `line_of`.
-    angle : float
-        Its direction from x, rad.
-    place : ndarray
-        Distances (m) from its start at which values are drawn: of the nodes if enough lie on the line, but
-        not too many, and of one step; else of its crossings with lattice lines, between which fields are
-        linear away from edges, and of points between them.
-    at_nodes : bool
-        Whether the places are nodes, drawn as circles.
-    through : tuple of float, optional
-        Given point of the line, m.
+    These are the nodes if enough lie on the line, but not too many, and of one step; else its crossings with
+    lattice lines, between which fields are linear away from edges, and points between them.
     """
 
     line: Line
-    angle: float
-    place: Array
-    at_nodes: bool
-    through: Point | None
+    angle: float  # its direction from x, rad
+    place: Array  # distances (m) from its start
+    at_nodes: bool  # whether the places are nodes, drawn as circles
+    through: Point | None  # a given point, m
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
-        """Return the cut through the contacts of some steps of one result, see `line_of`.
-
-        Raises
-        ------
-        ValueError
-            If the line does not cross the window.
-        """
+        """Return the cut through the contacts of some steps of one result, see `line_of`."""
         line, lattice = line_of(views, angle, through), views[0].lattice
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
@@ -176,21 +161,16 @@ class Cut:
         along_axes = {"x": ("$q_x$", "$q_y$"), "y": ("$q_y$", "$-q_x$")}
         return along_axes.get(self.axis, ("$q$ along the line", "$q$ across the line"))
 
-    @property
-    def few(self) -> bool:
-        """Whether nodes are distinguishable."""
-        return self.at_nodes
-
     def look(self) -> dict[str, Any]:
         """Return the style of values: circles at nodes if they are distinguishable."""
-        if not self.few:
+        if not self.at_nodes:
             return {"ls": "-"}
         size = 3.5 if self.place.size < 80 else 2.5
         return {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9, "ls": ""}
 
     def beside(self, color: str) -> dict[str, Any]:
         """Return the style of a closed solution: a line under circles, dashes over a line."""
-        dash, order = ("-", 2) if self.few else ("--", 5)
+        dash, order = ("-", 2) if self.at_nodes else ("--", 5)
         return {"color": color, "ls": dash, "zorder": order}
 
 
@@ -232,8 +212,8 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
         bottom.plot(cut.along(cut.place), difference, lw=0.7, **style)
 
     bottom.axhline(0.0, color=GUIDE, lw=0.7)
-    dots = {"marker": "o" if cut.few else "", "ms": 2.5}
-    squares: dict[str, Any] = {"marker": "s" if cut.few else "", "mfc": "none", "ms": 3.5}
+    dots = {"marker": "o" if cut.at_nodes else "", "ms": 2.5}
+    squares: dict[str, Any] = {"marker": "s" if cut.at_nodes else "", "mfc": "none", "ms": 3.5}
     edges = view.tractions.source == "edges"
     color = THIRD if edges else COMPUTED
     draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)
@@ -257,29 +237,8 @@ def section(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    step : int
-        Number of the load step, from 1; -1 is the last one.
-    angle : float
-        Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
-    through : tuple of float, optional
-        A point of the line, m; by default the node nearest to the center.
     ax : matplotlib.axes.Axes, optional
         Axes for the pressure, without its difference from Hertz; by default those of a new figure.
-    source : {"edges", "nodes"}, optional
-        Where the pressure comes from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the pressure of that step was not kept.
     """
     view = StepView.of(result, step, source)
     if ax is not None:
@@ -310,30 +269,9 @@ def tractions(
 
     Parameters
     ----------
-    result : Result or xarray.Dataset
-        Output of `Case.run` or `open_result`.
-    steps : int or sequence of int
-        Numbers of the load steps, from 1; -1 is the last one.
-    angle : float
-        Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
-    through : tuple of float, optional
-        A point of the line, m; by default the node nearest to the center.
     ax : matplotlib.axes.Axes, optional
         Axes for the shear traction of one load step; by default those of a new figure, with the pressure
         above.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    IndexError
-        If there is no such step.
-    ValueError
-        If the contact is frictionless, or the tractions of that step were not kept.
     """
     views, labels, title = views_of(result, steps, source)
     exact = closed_solutions(result, views)
@@ -446,4 +384,44 @@ def _family(
         handles.append(Line2D([], [], label=", ".join(named), **_THIN))
     legend_under(canvas, handles)
     set_title(canvas, title)
+    return canvas
+
+
+_CURVES = 7
+
+
+@figure("wear", "pressure and worn depth along a line, by cycles of wear", needs="wear")
+def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
+    """Draw pressure and worn depth in a section of the contact, for several cycles of wear."""
+    dataset = dataset_of(result)
+    if "wear_cycles" not in dataset or "worn_depth" not in dataset:
+        raise NotInResult("the surfaces do not wear; a deck with [wear] is needed")
+    kept = np.isfinite(dataset["worn_depth"].values).any(axis=(1, 2))
+    steps = np.flatnonzero((dataset["wear_cycles"].values >= 0.0) & kept)
+    if not steps.size:
+        raise NotInResult("no fields of cycles that wear the surfaces were kept")
+    deepest = dataset["max_worn_depth"].values[steps]
+    wanted = np.linspace(0.0, deepest[-1], min(_CURVES, steps.size))
+    places = np.unique(np.abs(deepest[:, None] - wanted).argmin(axis=0))
+    views = [StepView.of(result, int(dataset["step"].values[step])) for step in steps[places]]
+    cut = Cut.of(views, angle, through)
+
+    canvas = new_figure(5.6, 5.0)
+    above, below = canvas.subplots(2, 1, sharex=True)
+    colors = shades(len(views))
+    depths = [cut.values(view, view.data["worn_depth"].values) for view in views]
+    pressures = [cut.values(view) for view in views]
+    to_stress, stress = scaled(float(max(values.max() for values in pressures)), "Pa")
+    to_depth, depth = scaled(float(max(values.max() for values in depths)), "m")
+    for color, pressure, worn in zip(colors, pressures, depths, strict=True):
+        above.plot(cut.along(cut.place), pressure * to_stress, color=color)
+        below.plot(cut.along(cut.place), worn * to_depth, color=color)
+    above.set(ylabel=f"pressure ({stress})", ylim=(0.0, None))
+    below.set(ylabel=f"worn depth ({depth})")
+    cut.show(below)
+    below.invert_yaxis()
+    labels = [f"{float(view.data['wear_cycles']):,.0f}".replace(",", "\u2009") for view in views]
+    color_scale(canvas, [above, below], labels, colors)
+    canvas.axes[-1].set_title("cycles", fontsize=9)
+    set_title(canvas, title_of(dataset))
     return canvas

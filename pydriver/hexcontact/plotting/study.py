@@ -14,7 +14,7 @@ from ..result.view import last_steps
 from ..text import quantity, scaled
 from ..variables import SUMMARY, VARIABLES, spelled
 from .registry import figure
-from .style import COMPUTED, color_scale, legend_under, new_figure, set_title, shades
+from .style import COMPUTED, color_scale, legend_under, new_figure, set_title, shades, titled
 
 if TYPE_CHECKING:
     import xarray
@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 _LEGEND = 8  # curves, more of which get a scale of colors
 
 
-def _titled(study: xarray.Dataset, name: str, unit: str) -> str:
-    words = spelled(name.removesuffix("_fit")) if name in VARIABLES else name
-    return f"{words} ({unit})" if unit else words
+def _spelled(name: str) -> str:
+    return spelled(name.removesuffix("_fit")) if name in VARIABLES else name
 
 
 def _scale(study: xarray.Dataset, name: str) -> tuple[float, str]:
@@ -57,10 +56,6 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
         Names of quantities, one for each panel; by default those of a summary that vary.
     over : str
         Parameter on the horizontal axis; by default the one with the most values.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
 
     Raises
     ------
@@ -114,7 +109,7 @@ def _draw(
         values = curves[name].isel(curve=k).values * factor
         style: dict[str, Any] = {"ls": "-" if joined else "", "marker": "o", "ms": 3, "color": colors[k]}
         axes.plot(place[order], values[order], label=label, **style)
-    axes.set(xlabel=_titled(curves, over, length), ylabel=_titled(curves, name, unit))
+    axes.set(xlabel=titled(_spelled(over), length), ylabel=titled(_spelled(name), unit))
     axes.grid(color="0.9", lw=0.5)
 
 

@@ -77,6 +77,11 @@ def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:
         figure.suptitle("\n".join(lines).replace("\u00a0", " "))
 
 
+def titled(words: str, unit: str) -> str:
+    """Return the label of an axis: a quantity and its unit, if it has one."""
+    return f"{words} ({unit})" if unit else words
+
+
 def legend_below(axes: Axes, **options: Any) -> None:
     """Draw a legend below the label of the x axis, for axes of any height."""
     down = ScaledTranslation(0.0, -0.42, axes.figure.dpi_scale_trans)

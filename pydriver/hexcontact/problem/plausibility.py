@@ -255,11 +255,12 @@ def row(case: Problem) -> str:
         return ""
     found = expected(case)
     pressure, axes = quantity(found["max_pressure"], "Pa", 3), _half_axes(found)
-    size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {found['spacings']:.2g} spacings"
+    spacings = _counted(found["spacings"], "spacing")
+    size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {spacings}"
     if axes:
         major, minor = (quantity(axis, "m", 3) for axis in axes)
         along, across = (quantity(length, "m", 3) for length in found["extent"])
-        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one; "
+        size = f"half-axes about {major} by {minor}, {spacings} in the smaller one; "
         size += f"extent about {along} in x, {across} in y"
     return (
         f"{size}; p_max about {pressure}, "

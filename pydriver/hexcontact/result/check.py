@@ -1,11 +1,11 @@
-"""Faults of results and of records of journals: missing parts, wrong kinds, impossible numbers."""
+"""Faults of results without a seal: missing parts, wrong kinds, impossible numbers."""
 
 from __future__ import annotations
 
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
-from ..deck.recorded import recorded
 from ..variables import (
-    FIELDS,
-    FIXED,
     INTERFACE,
     LARGEST,
     NOT_KEPT,
@@ -27,10 +24,10 @@ from ..variables import (
     VARIABLES,
     names_where,
 )
-from .layout import Metadata, history_of, lattice_of
-from .step import Step
+from .layout import COORDINATES, history_of, lattice_of
 
 if TYPE_CHECKING:
+    import netCDF4
     import xarray
 
 _CLOSE = 1e-6  # spacings by which a node may be off its place; relative difference of sums
@@ -41,11 +38,6 @@ _ALWAYS = names_where(lambda v: v.required == "always")
 _WITH_FRICTION = names_where(lambda v: bool(v.required))
 _NOISE = 1e-3  # of energies beside the normal load times the contact radius
 _NO_STEP = "{} holds numbers that no load step has"
-_EQUAL = 1e-9  # relative difference of equal moduli
-PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
-_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
-_OF_NODES = {"spacing", "origin"}  # keys of [grid] that a session writes with a load
-_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that it changes
 
 
 Fits = Callable[[Any], bool]  # test of a value
@@ -80,7 +72,6 @@ _PARAMETERS: dict[str, Fits] = {  # of the case: all of them or, in tests, none
     "coupling": _one_of("full", "goodman"),
     "tolerance": _is_positive,
 }
-MATERIALS = tuple(name for name in _PARAMETERS if name != "tolerance")  # and laws
 _ATTRIBUTES: dict[str, Fits] = {
     **dict.fromkeys(("title", "deck", "source", "history", "created", "run"), _is_text),
     **dict.fromkeys(("output_fields", "hexcontact_version"), _is_text),
@@ -103,13 +94,7 @@ _LATER = {
 
 
 def fault_of_result(dataset: xarray.Dataset) -> str:
-    """Return a fault of a result that was read from a file; empty if there is none.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Its data set; fields need not be in memory.
-    """
+    """Return a fault of the dataset of a result file, whose fields may be unread; empty if there is none."""
     attributes = {str(name): value for name, value in dataset.attrs.items()}
     if fault := _fault_of_attributes(attributes):
         return fault
@@ -125,18 +110,24 @@ def fault_of_result(dataset: xarray.Dataset) -> str:
         missing = set(_WITH_FRICTION if frictional else _ALWAYS) - dataset.variables.keys()
         if missing:
             return f"it has no {min(missing, key=_WITH_FRICTION.index)}"
-    return _fault_of_coordinates(dataset) or _fault_of_histories(dataset)
+    return _fault_of_coordinates(dataset) or _fault_of_histories(dataset) or _fault_of_fields(dataset)
 
 
-def fault_of_dimensions(name: str, dimensions: tuple[str, ...]) -> str:
-    """Return a fault of the dimensions of a variable of a file; empty if there is none."""
-    known = VARIABLES.get(name)
-    if known is None:
-        fits = len(set(dimensions)) == len(dimensions)
-    else:
-        characters = known.dtype == "str" and len(dimensions) == len(known.dims) + 1
-        fits = dimensions[: len(dimensions) - characters] == known.dims
-    return "" if fits else f"{name} is over {', '.join(dimensions) or 'nothing'}"
+def fault_of_dimensions(columns: Mapping[str, netCDF4.Variable]) -> str:
+    """Return a fault of the dimensions of the variables of a file; empty if there is none."""
+    for name in COORDINATES:
+        if name not in columns or 0 in columns[name].shape:
+            return f"it has no usable {name} coordinate"
+    for name, column in columns.items():
+        known, dimensions = VARIABLES.get(name), column.dimensions
+        if known is None:
+            fits = len(set(dimensions)) == len(dimensions)
+        else:
+            characters = known.dtype == "str" and len(dimensions) == len(known.dims) + 1
+            fits = dimensions[: len(dimensions) - characters] == known.dims
+        if not fits:
+            return f"{name} is over {', '.join(dimensions) or 'nothing'}"
+    return ""
 
 
 def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
@@ -211,8 +202,8 @@ def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, 
     return low, high
 
 
-def fault_of_fields(dataset: xarray.Dataset) -> str:
-    """Return a fault of a result without a seal, whose fields are read step by step; else nothing."""
+def _fault_of_fields(dataset: xarray.Dataset) -> str:
+    """Return a fault of the deck, or of the fields, which are read step by step; empty if there is none."""
     try:
         tomllib.loads(str(dataset.attrs["deck"]))
     except tomllib.TOMLDecodeError as error:
@@ -272,124 +263,3 @@ def _fault_of_values(
         if abs(np.count_nonzero(zone > 0) - cells) > _CLOSE * (1 + cells):
             return "zone does not fit to contact_area"
     return ""
-
-
-def fault_of_record(metadata: Metadata, step: Step) -> str:
-    """Return a fault of a record of a journal; empty if there is none."""
-    planned = metadata.planned_steps or (1 if step.control else 0)  # not known of adaptive steps
-    counts = {"every": metadata.every, "planned_steps": planned, "index": step.index + 1}
-    for name in ("title", "deck", "run", "created", "version", "deck_file"):
-        if not isinstance(getattr(metadata, name), str):
-            return f"its {name} is no text"
-    for name, value in counts.items():
-        if not isinstance(value, int) or value < 1:
-            return f"its {name} is no count"
-    if metadata.planned_steps and step.number > metadata.planned_steps:
-        return f"its index is beyond the {metadata.planned_steps} planned steps"
-    if not all(isinstance(line, str) for line in metadata.resumed) or set(metadata.fields) - set(FIELDS):
-        return "its metadata hold other things than text"
-    if not isinstance(metadata.parameters, dict):
-        return "its parameters are no table"
-    known = _PARAMETERS | _LATER
-    given = {name: value for name, value in metadata.parameters.items() if name in known}
-    for name, value in given.items():
-        if not known[name](value):
-            return f"its {name} is not what it should be"
-    if given and (missing := _PARAMETERS.keys() - given):
-        return f"it has no {min(missing)}"
-    history = {name: value for name, value in step.history.items() if not isinstance(value, str)}
-    return (
-        _fault_of_step(step)
-        or _fault_of_control(step)
-        or _fault_of_numbers(
-            history, metadata.parameters, metadata.story, step.lattice.size * step.lattice.cell_area
-        )
-        or _fault_of_values(step.fields, history, step.lattice.spacing)
-    )
-
-
-_CHOOSER = ("size", "first", "stick", "traction")
-_MEMORY = ("stick", "traction", "spent", "turned")
-_CONTROL: dict[str, Fits] = {  # of adaptive load steps
-    **dict.fromkeys(("position", "load_steps"), lambda value: type(value) is int and value >= 0),
-    **dict.fromkeys(("fraction", "done"), lambda value: _is_number(value) and 0 <= value <= 1),
-    "chooser": lambda value: _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _MEMORY),
-}
-
-
-def _has_numbers(table: Any, names: Sequence[str]) -> bool:
-    return isinstance(table, dict) and all(_is_number(table.get(name, "")) for name in names)
-
-
-def _fault_of_control(step: Step) -> str:
-    """Return a fault of the place of an adaptive load step in the load history; empty if there is none."""
-    control = step.control
-    if not control:
-        return ""
-    of_wear = "until" in control
-    for name, fits in (_CONTROL | ({} if of_wear else {"area": _is_positive})).items():
-        if name not in control or not fits(control[name]):
-            return f"its control.{name} is not what it should be"
-    if of_wear:
-        ahead = _is_number(control["until"]) and control["until"] >= 0
-        placed = ahead and control["done"] == control["fraction"]
-        return "" if placed else "its place among the cycles that wear the surfaces is not what it should be"
-    done = (control["position"] + control["fraction"]) / max(control["load_steps"], 1)
-    if done > 1 or not math.isclose(done, control["done"], rel_tol=_CLOSE):
-        return "its control.done does not fit to its place in the load history"
-    return ""
-
-
-def _fault_of_step(step: Step) -> str:
-    for name, values in step.fields.items():
-        if name not in FIELDS and name not in FIXED:
-            return f"{name} is no field"
-        if values.shape != step.lattice.shape:
-            return f"{name} has the shape {values.shape}, not {step.lattice.shape}"
-        if values.dtype.kind not in "fiu":
-            return f"{name} holds values of another kind ({values.dtype})"
-    for name, value in step.history.items():
-        if name not in VARIABLES or VARIABLES[name].dims != ("step",):
-            return f"{name} is no quantity of a load step"
-        if not isinstance(value, str if VARIABLES[name].dtype == "str" else int | float):
-            return f"{name} is of another kind"
-    return ""
-
-
-# --- records of one run -------------------------------------------------------------------------------------
-
-
-def fault_of_sequence(before: Metadata, after: Metadata) -> str:
-    """Return the reason why a record cannot follow another of the same journal; empty if it can.
-
-    Tolerances may change when a run is resumed, and a session adds loads.
-    """
-    for name in ("run", "created", "title", "version", "fields", "every"):
-        if getattr(before, name) != getattr(after, name):
-            return f"its {name} is another"
-    if after.resumed[: len(before.resumed)] != before.resumed:
-        return "it was written before them"
-    for name in MATERIALS:
-        if not _same(before.parameters.get(name), after.parameters.get(name)):
-            return f"its {name} is another"
-    if before.deck != after.deck:
-        was, now = physics(before.deck), physics(after.deck)
-        if now.get("grid", {}).keys() >= _OF_NODES:
-            was, now = ({k: v for k, v in deck.items() if k not in _OF_SESSIONS} for deck in (was, now))
-        if was != now:
-            return "its deck is of another problem"
-    return ""
-
-
-def physics(deck: str) -> dict[str, Any]:
-    """Return the tables of a deck that belong to the problem, without those of solution and output."""
-    tables = recorded(deck).data
-    solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
-    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Compare parameters of a case; numbers may differ by rounding."""
-    numbers = isinstance(one, float) and isinstance(other, float)
-    close = numbers and (math.isclose(one, other, rel_tol=_EQUAL) or (math.isnan(one) and math.isnan(other)))
-    return bool(one == other or close)

@@ -17,11 +17,12 @@ from .._version import __version__
 from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
-from ..interior.files import as_volume, at_hand, tables_of
+from ..interior.files import as_volume, tables_of
 from ..interior.stress import TENSOR
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh
+from .below import at_hand
 from .interpolate import is_kept, with_shown
 from .netcdf import is_mesh
 from .result import Result
@@ -35,19 +36,9 @@ _TRIANGLE = 5  # number of this kind of cell in VTK
 
 
 def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int]:
-    """Return the numbers of the steps whose fields are in a result.
+    """Return the numbers of the steps (default: all) whose fields are in a result.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-    numbers : sequence of int, optional
-        Only these steps; -1 is the last one.
-
-    Raises
-    ------
-    DeckError
-        If there is no such step, or the output lacks its fields.
+    A requested step without fields is a DeckError, and so is a result without any.
     """
     wanted = [int(step) for step in result.dataset["step"].values]
     if numbers is not None:
@@ -55,7 +46,11 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
             wanted = [int(result.step(number)["step"]) for number in numbers]
         except NoSuchStep as error:
             raise DeckError(f"--step: {error}") from error
-    kept = [number for number in wanted if any(is_kept(field) for _, field in _fields(result, number))]
+    kept = [
+        number
+        for number in wanted
+        if any(is_kept(field.values) for field in _fields(result, number).data_vars.values())
+    ]
     if not kept or (numbers is not None and len(kept) < len(wanted)):
         lost = sorted(set(wanted) - set(kept))
         where = f"step {lost[0]}" if numbers is not None else "any step"
@@ -64,18 +59,19 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
 
 
 def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
-    """Return `kept_steps` of a result; DeckError if its window has no triangles."""
+    """Return the `kept_steps` of a result; refuse a window without triangles."""
     steps = kept_steps(result, numbers)
     if min(result.lattice.shape) < 2:
         raise DeckError("a window of one row or one column has no triangles to export")
     return steps
 
 
-def _fields(result: Result, number: int, source: str | None = "nodes") -> Iterator[tuple[str, NDArray[Any]]]:
+def _fields(result: Result, number: int, source: str | None = "nodes") -> xarray.Dataset:
+    """Return the fields of a step, with the tractions of a source."""
     one = result.step(number)
     if source != "nodes":
         one = with_shown(one, result.lattice, source)
-    return ((name, one[name].values) for name in FIELDS if name in one)
+    return one[[name for name in FIELDS if name in one]]
 
 
 # --- VTK ------------------------------------------------------------------------------------------
@@ -88,44 +84,14 @@ def to_vtk(
     numbers: Sequence[int] | None = None,
     source: str | None = None,
 ) -> Path:
-    """Write a series of VTK files, one for each load step, and a ``.pvd`` file that lists them.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    folder : Path
-        Folder for the files, created if missing.
-    stem : str
-        Start of the names of the files.
-    numbers : sequence of int, optional
-        Only these steps.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    Path
-        The ``.pvd`` file, which ParaView opens.
-
-    Raises
-    ------
-    DeckError
-        If there is nothing to export.
-    """
+    """Write a VTK file for each load step, and return the ``.pvd`` file that lists them."""
     steps = _meshed_steps(result, numbers)
     _make(folder)
     return _series(folder, stem, "vtu", {number: _vtu(result, number, source) for number in steps})
 
 
 def volumes_to_vtk(result: Result, folder: Path, stem: str) -> list[Path]:
-    """Write the tables [[stress]] and [[fatigue]] of the deck of a result as structured grids.
-
-    Returns
-    -------
-    list of Path
-        A ``.pvd`` file for each table ``[[stress]]`` and ``[[fatigue]]``.
-    """
+    """Write the tables [[stress]] and [[fatigue]] as structured grids with a ``.pvd`` file each."""
     written = []
     for name, found in at_hand(result, kept_steps(result)):
         _make(folder)
@@ -140,11 +106,6 @@ def histories_to_csv(result: Result, folder: Path, stem: str) -> list[Path]:
     """Write the stress histories of the tables ``[[fatigue]]`` of the deck, in the format of pyLife.
 
     A line has point, load step, place (m) and the six stresses (MPa); points are written block by block.
-
-    Raises
-    ------
-    DeckError
-        If the deck has no such table.
     """
     tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}
     if not tables:
@@ -241,7 +202,7 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
 
 def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
     """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
-    fields = dict(_fields(result, number, source))
+    fields = {str(name): field.values for name, field in _fields(result, number, source).items()}
     for name in FIXED:
         if name in result.dataset:
             yield name, result.dataset[name].values.ravel(), VARIABLES[name].unit
@@ -280,27 +241,6 @@ def to_ugrid(
     """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
 
     The result has the same mesh, but its fields by row and column.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    target : Path
-        File to write.
-    numbers : sequence of int, optional
-        Only these steps.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If there is nothing to export.
     """
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
@@ -315,21 +255,18 @@ def to_ugrid(
         mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
-        names = [name for name in (*FIXED, *FIELDS) if name in result.dataset]
-        columns = {}
-        for name in names:
+        for name in (name for name in (*FIXED, *FIELDS) if name in result.dataset):
             variable = VARIABLES[name]
             fill = variable.missing if variable.dtype == "f8" else None
-            packed = {"zlib": True, "complevel": 1, "fill_value": fill}
             dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
-            column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
+            column = mesh.add_column(
+                *(file, name, variable.dtype, dims, attributes), zlib=True, complevel=1, fill_value=fill
+            )
             if name in FIXED:
                 column[...] = result.dataset[name].values.ravel()
-            else:
-                columns[name] = column
         for position, number in enumerate(steps):
-            for name, values in _fields(result, number, source):
-                columns[name][position] = values.ravel()
+            for shown, field in _fields(result, number, source).items():
+                file[str(shown)][position] = field.values.ravel()
     return target
 
 
@@ -343,34 +280,7 @@ def to_csv(
     numbers: Sequence[int] | None = None,
     source: str | None = None,
 ) -> list[Path]:
-    """Write the history as a table, the fields of some steps, a line for each node, and tables of the deck.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    folder : Path
-        Folder for the files, created if missing.
-    stem : str
-        Start of the names of the files.
-    numbers : sequence of int, optional
-        Steps whose fields are written.
-    source : {"edges", "nodes"}, optional
-        Where tractions come from, see `hexcontact.Result.traction_field`.
-
-    Returns
-    -------
-    list of Path
-        The files.
-
-    Raises
-    ------
-    DeckError
-        If there are no such steps, or a table [[stress]] or [[fatigue]] of a finished run has the name of
-        another file or cannot be computed.
-    """
-    import pandas as pd
-
+    """Write tables of the history, of the nodes in some steps, and those of the deck."""
     steps = [] if numbers is None else kept_steps(result, numbers)
     written = [folder / f"{stem}_history.csv", *(folder / f"{stem}_{number:04d}.csv" for number in steps)]
     wanted = (
@@ -390,13 +300,10 @@ def to_csv(
     with replacing(written[0]) as path:
         history.to_csv(path)
     for number, target in zip(steps, written[1:], strict=True):
-        rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
-        columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
-        table = pd.DataFrame(
-            {k: v.ravel() for k, v in (columns | dict(_fields(result, number, source))).items()}
-        )
+        fields = _fields(result, number, source)
+        table = fields.to_dataframe(dim_order=["row", "col"])[["x", "y", *fields.data_vars]]
         with replacing(target) as path:
-            table.rename(columns=_with_unit).to_csv(path, index=False)
+            table.rename(columns=_with_unit).to_csv(path)
     return written + [write_table(tables[name], target) for name, target in wanted.items()]
 
 

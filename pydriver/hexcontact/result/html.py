@@ -1,4 +1,4 @@
-"""Tables and small pictures of results for notebooks and terminals."""
+"""Display of results in notebooks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..arrays import Array
 from ..errors import NotInResult
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
-from .history import extent_of, step_rows
+from .history_words import extent_of, step_rows
 from .layout import history_of
 from .raster import SLIP, STICK, Plane, png_of
 from .view import StepView

@@ -1,20 +1,21 @@
-"""Fields between the nodes: at any point, and along lines.
+"""Fields of a load step between its nodes.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon with corners at the edges of triangles. Only pressure and shear traction go to the edges of contact
-and stick, which lie between the nodes, unless the source "nodes" is asked for.
+a polygon with corners at the edges of triangles. Pressure and shear traction go to the edges of contact and
+stick between the nodes, unless the source is "nodes".
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..analytic.hertz_gap import friction_of, is_compliant
 from ..arrays import Array
 from ..core.edges import ContactEdges, Limits, TractionField
 from ..core.interpolation import crossings, linear, nearest, section_ends
@@ -42,25 +43,10 @@ def interpolate(
     y: ArrayLike,
     tractions: TractionField | None = None,
 ) -> Array:
-    """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
+    """Return a field at points of the plane (m): tractions to the edges, others linear on the triangles.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    name : str
-        Name of the field, see `hexcontact.variables`. The zone at a point is that of the nearest node.
-    values : ndarray, (n_row, n_col)
-        Its values at the nodes.
-    x, y : array_like
-        Points (m), broadcast.
-    tractions : TractionField, optional
-        What pressure and shear traction are taken from; default: their values at the nodes, joined linearly.
-
-    Returns
-    -------
-    ndarray
-        Values at the points. Outside the window tractions and slip are 0, other fields NaN.
+    A zone is that of the nearest node. Without `tractions` pressure and shear are linear, too. Outside the
+    window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     if tractions is not None and name in TRACTIONS:
@@ -70,86 +56,126 @@ def interpolate(
     return between(values, lattice.basis, lattice.start, x, y, variable.padding)
 
 
-def traction_field(
-    lattice: Lattice, fields: Fields, limits: Limits | None, source: str | None = None, sharp: bool = True
-) -> TractionField:
-    """Return pressure and shear traction of a load step at any point.
+@dataclass(frozen=True, eq=False, repr=False)
+class NodalStep:
+    """A load step by its values at the nodes: fields between them, and along lines."""
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    fields : mapping of str to ndarray
-        Fields of the step: the pressure, and what was kept of shear tractions, gap and zone.
-    limits : tuple of array_like or None
-        Coefficient of friction and bound of the shear traction (Pa); None: unknown, or no friction.
-    source : str, optional
-        ``"edges"``, or ``"nodes"``: the values at the nodes, joined linearly; by default the edges, if
-        there are any and the gap was kept.
-    sharp : bool
-        Whether the contact has a sharp edge, unlike that of a compliant interface.
+    index: int
+    lattice: Lattice
+    fields: Fields
+    friction: float = field(default=0.0, kw_only=True)
+    sharp: bool = field(default=True, kw_only=True)
+    shear_limit: float = field(default=math.inf, kw_only=True)
 
-    Raises
-    ------
-    DeckError
-        If the pressure was not kept, or the edges cannot be found.
-    """
-    if source not in (None, *SOURCES):
-        raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
-    zero = np.zeros(lattice.shape)
-    kept = {name: np.asarray(values) for name, values in fields.items() if is_kept(np.asarray(values))}
-    if "pressure" not in kept:
-        raise NotInResult("the pressure was not kept (output.fields, output.every)")
-    tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
-    if source == "nodes" or (source is None and not (sharp and "gap" in kept)):
-        return TractionField.of_nodes(tractions, lattice.basis, lattice.start)
-    if not sharp or "gap" not in kept:
-        why = "there are none with a compliant interface" if not sharp else "the gap was not kept"
-        raise NotInResult(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
-    zone = kept.get("zone")
-    contact = tractions[0] > 0.0 if zone is None else zone > 0
-    sheared = zone is not None and all(name in kept for name in TRACTIONS)
-    edges = ContactEdges(
-        *(tractions[0], kept["gap"], contact, np.isfinite(kept["gap"])), lattice.basis, lattice.start
-    )
-    if not (sheared and limits):
-        return edges.field(tractions[1:])
-    return edges.field(tractions[1:], np.asarray(zone == _STICK), limits)
+    @property
+    def number(self) -> int:
+        """Number of the step, from 1."""
+        return self.index + 1
+
+    @property
+    def limits(self) -> Limits | None:
+        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
+        if not math.isnan(self.friction):
+            return (self.friction, self.shear_limit) if 0.0 < self.friction < math.inf else None
+        if NODAL_FRICTION not in self.fields:  # of another law
+            return None
+        # a coefficient that varies, or has a bound; NaN where no step had a node
+        return np.nan_to_num(np.asarray(self.fields[NODAL_FRICTION])), self.shear_limit
+
+    def traction_field(self, source: str | None = None) -> TractionField:
+        """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
+        if source not in (None, *SOURCES):
+            raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+        there = {name: np.asarray(self.fields[name]) for name in (*TRACTIONS, *EDGES) if name in self.fields}
+        kept = {name: values for name, values in there.items() if is_kept(values)}
+        for name in ("pressure", "gap") if source == "edges" else ("pressure",):
+            if name not in kept:
+                raise NotInResult(
+                    f"the {name} of step {self.number} was not kept (output.fields, output.every)"
+                )
+        if source == "edges" and not self.sharp:
+            raise NotInResult(
+                "source = 'edges': expected nodes; the edges need the gap, and there are none with a "
+                "compliant interface"
+            )
+        zero, at = np.zeros(self.lattice.shape), (self.lattice.basis, self.lattice.start)
+        tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
+        if source == "nodes" or not (self.sharp and "gap" in kept):
+            return TractionField.of_nodes(tractions, *at)
+        zone, gap = kept.get("zone"), kept["gap"]
+        contact = tractions[0] > 0.0 if zone is None else zone > 0
+        edges = ContactEdges(tractions[0], gap, contact, np.isfinite(gap), *at)
+        if zone is None or not kept.keys() >= {*TRACTIONS} or not (limits := self.limits):
+            return edges.field(tractions[1:])
+        return edges.field(tractions[1:], np.asarray(zone == _STICK), limits)
+
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
+        """Return a field at points of the plane; see `hexcontact.Result.at`."""
+        [values] = chosen_fields([name], self.fields, self.number).values()
+        return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
+
+    def profile(
+        self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
+    ) -> xarray.Dataset:
+        """Return fields along a line between two points; see `hexcontact.Result.profile`."""
+        return self._along(Line(start, end), names, points, source)
+
+    def section(
+        self,
+        *names: str,
+        angle: float = 0.0,
+        through: Point | None = None,
+        points: int | None = None,
+        source: str | None = None,
+    ) -> xarray.Dataset:
+        """Return fields along a line across the contact; see `hexcontact.Result.section`."""
+        pressure = chosen_fields(["pressure"], self.fields, self.number)["pressure"]
+        return self._along(section_line(self.lattice, pressure, angle, through), names, points, source)
+
+    def _along(
+        self, line: Line, names: Sequence[str], points: int | None, source: str | None
+    ) -> xarray.Dataset:
+        fields = chosen_fields(names, self.fields, self.number)
+        return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
+
+    def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
+        """Return the tractions between the nodes, if there is one among some fields."""
+        return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
 
-def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> TractionField:
-    """Return pressure and shear traction of a load step of a result, see `traction_field`."""
-    fields = {name: step[name].values for name in (*TRACTIONS, *EDGES) if name in step}
-    for name in ("pressure", "gap") if source == "edges" else ("pressure",):
-        if name not in fields or not is_kept(fields[name]):
-            at = int(step["step"])
-            raise NotInResult(f"the {name} of step {at} was not kept (output.fields, output.every)")
-    from ..analytic.hertz_gap import friction_of, is_compliant
-
+def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
+    """Return a load step of a result, whose fields are read at their first use."""
     known = step.attrs
-    limits = limits_of(friction_of(known), step, float(known.get(SHEAR_LIMIT, math.inf)))
-    return traction_field(lattice, fields, limits, source, not is_compliant(known))
+    return NodalStep(
+        int(step["step"]) - 1,
+        lattice,
+        {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
+        friction=friction_of(known),
+        sharp=not is_compliant(known),
+        shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
+    )
+
+
+def loaded(step: NodalStep, more: Sequence[str] = (), edges: bool = True) -> dict[str, Any]:
+    """Return the tractions and `more` fields of a step; with `edges`, those that show the edges, if known."""
+    names = [name for name in (*TRACTIONS, *more) if name in step.fields]
+    if (
+        edges
+        and step.sharp
+        and all(name in step.fields and is_kept(np.asarray(step.fields[name])) for name in EDGES)
+    ):
+        names += EDGES
+    return dict(chosen_fields(names, step.fields, step.number))
 
 
 def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
-    """Return a load step whose tractions are those of `tractions_of` at the nodes."""
+    """Return a load step of a result with the tractions of a source at the nodes."""
     names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]
     if "pressure" not in names:
         return step
-    found = dict(zip(TRACTIONS, tractions_of(step, lattice, source).at_nodes(), strict=True))
+    shown = nodal(step, lattice).traction_field(source).at_nodes()
+    found = dict(zip(TRACTIONS, shown, strict=True))
     return step.assign({name: step[name].copy(data=found[name]) for name in names})
-
-
-def limits_of(friction: float, fields: Mapping[Any, ArrayLike], bound: float) -> Limits | None:
-    """Return coefficient of friction at the nodes and bound (Pa) of the shear traction; None if unknown.
-
-    The coefficient is one number, or NaN if it is among the fields of a step: it varies, or has a bound.
-    """
-    if not math.isnan(friction):
-        return (friction, bound) if 0.0 < friction < math.inf else None
-    if NODAL_FRICTION not in fields:  # of another law
-        return None
-    return np.nan_to_num(np.asarray(fields[NODAL_FRICTION])), bound  # NaN where no step had a node
 
 
 class PressureField:
@@ -189,17 +215,7 @@ class PressureField:
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line between two points of the plane.
-
-    Attributes
-    ----------
-    start : tuple of float
-        First point, m.
-    end : tuple of float
-        Last point, m.
-    zero : float
-        Distance (m) from the start at which distances along the line are 0.
-    """
+    """A straight line between two points (m); distances along it are 0 at `zero` (m) from its start."""
 
     start: Point
     end: Point
@@ -218,13 +234,7 @@ class Line:
         return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
 
     def corners(self, lattice: Lattice) -> Array:
-        """Return the distances (m) from the start at which the line crosses edges of triangles, and its ends.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The lattice, also outside of its window.
-        """
+        """Return distances (m) from the start at which the line crosses edges of triangles, and its ends."""
         return crossings(lattice, self.start, self.end)
 
     def points(self, distance: Array) -> tuple[Array, Array]:
@@ -236,43 +246,14 @@ class Line:
 def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point | None) -> Line:
     """Return the line across a contact at an angle (rad) from x, with a margin on both sides.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    pressure : ndarray, (n_row, n_col)
-        Contact pressure, Pa.
-    angle : float
-        Direction from x, rad.
-    through : tuple of float or None
-        A point (m) on the line, from which distances count; None: the node next to the center of pressure.
-
-    Raises
-    ------
-    DeckError
-        If nothing is in contact.
+    Distances count from the point `through` (m), by default from the node next to the center of pressure.
     """
     start, end, zero = section_ends(lattice, pressure, angle, through)
     return Line(start, end, zero)
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return the named fields of a load step; without names, all of the output.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of fields.
-    fields : mapping of str to array_like
-        The fields of the step.
-    step : int
-        Number of the step, for messages.
-
-    Raises
-    ------
-    DeckError
-        If there is no such field in the output.
-    """
+    """Return the named fields of a load step, by default all that were kept."""
     for name in names:
         if name not in fields:
             known = name in VARIABLES and VARIABLES[name].is_field
@@ -303,33 +284,10 @@ def profile(
     tractions: TractionField | None = None,
     **attributes: Any,
 ) -> xarray.Dataset:
-    """Return fields along a line.
+    """Return fields along a line, over ``distance`` (m), with `attributes` of the dataset.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    fields : mapping of str to ndarray
-        Values at the nodes, by the names of `hexcontact.variables`.
-    line : Line
-        The line.
-    points : int, optional
-        Number of points, evenly spaced. By default the points are the corners of the polygon of a field along
-        the line, so that straight lines between them are exact, and eight a spacing for curved tractions.
-    tractions : TractionField, optional
-        As of `interpolate`.
-    **attributes
-        Attributes of the data set.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimension ``distance`` (m), with the coordinates ``x`` and ``y`` (m).
-
-    Raises
-    ------
-    DeckError
-        If the number of points is below 2.
+    Without a number of `points` they are the corners of the polygon of a field, so that straight lines
+    between them are exact; tractions to the edges are curved and have eight points a spacing.
     """
     import xarray
 

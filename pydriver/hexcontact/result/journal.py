@@ -1,23 +1,25 @@
-"""The journal of a run: its finished load steps, each in a file of its own beside the output.
+"""The journal of a run, in a folder beside its output.
 
-A record is an uncompressed zip archive of the fields, an array for each type of numbers in the format of
-numpy, and a text (JSON) with all other data. It is written and read several times faster than a netCDF file
-of as many variables; checksums cover all of it, so that damage is an error. The metadata of the run with the
-whole deck are in the first record, and in those at which they changed; the others refer to it, and add the
-loads of a session. So records do not grow with the number of steps.
+The header (JSON) has the metadata of the run with the whole deck. A record is an uncompressed zip archive of
+the fields of a step as numpy saves them, and a text (JSON) with all other data. It is written and read
+several times faster than a netCDF file of as many variables. Records of a session have the loads that they
+add to the deck, so that no record grows with the number of steps. Every file has a seal, a digest of its
+content, so that damage is an error.
 """
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import hashlib
 import json
 import os
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,33 +27,28 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
-from ..files import beginning, made, reading, require_kinds
+from ..files import beginning, made, reading, replacing, require_kinds
 from ..variables import VARIABLES
-from .check import fault_of_record, fault_of_sequence
 from .layout import Metadata, assemble
-from .step import Step, Stored
+from .step import Step
 
 if TYPE_CHECKING:
     from .result import Result
 
+VERSION = 4
+HEADER = "header.json"
 SUFFIX = ".npz"
 STOPPED = "stopped.txt"  # the reason of an early end
 _LONGEST_REASON = 10_000  # bytes of it
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
-VERSION = 3
 _ABOUT = "about"  # name of the text among the arrays
-_LACKS = "{0} lacks the record of step {1}, {1:06d}" + SUFFIX
 _KIND = "a record of a journal"
 _LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
-_NO_FOLLOWER = "{} does not belong to the records before it: {}"
-_FIELDS, _COMPANION = "fields", "companion"  # parts with fields: of the step, of a second solution
-_PARTS = {
-    "index": int,
-    **dict.fromkeys(("lattice", "history", "control"), dict),
-    _FIELDS: list,
-    _COMPANION: list,
-}
+_COMPANION = "companion."  # before the names of restart data
+_PARTS = {"run": str, "index": int, **dict.fromkeys(("lattice", "history", "control"), dict)}
+_OTHER_VERSION = "{} was kept by hexcontact {}, whose journal has the layout {}; this version reads layout {}"
+_CHANGED = "{} is damaged: its content is not what was written"
 
 
 def journal_of(path: Path) -> Path:
@@ -59,27 +56,89 @@ def journal_of(path: Path) -> Path:
     return path.with_name(path.name + ".d")
 
 
+# --- the header ---------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass
+class Header:
+    """Metadata of a run; those of a session have its loads apart, and further records add to these."""
+
+    metadata: Metadata
+    loads: list[str] | None = None  # entries of [[load]] behind the deck; None: all are in it
+    steps: int = 0  # records that were there before
+
+    def follow(self, loads: Sequence[Any]) -> None:
+        """Add the loads of the next record, behind those that remain; their number is its first entry."""
+        assert self.loads is not None
+        self.loads[loads[0] :] = loads[1:]
+
+    def whole(self, steps: int) -> Metadata:
+        """Return the metadata of a run with a number of finished steps."""
+        if self.loads is None:
+            return self.metadata
+        deck = "".join([self.metadata.deck, *self.loads])
+        return dataclasses.replace(self.metadata, deck=deck, planned_steps=max(steps, self.steps))
+
+
+def write_header(folder: Path, header: Header) -> None:
+    """Write the header of the journal, or of the lattices, in a folder."""
+    write_sealed(folder / HEADER, dataclasses.asdict(header))
+
+
+def read_header(folder: Path) -> Header:
+    """Read the header in a folder."""
+    path = folder / HEADER
+    about = read_sealed(path)
+    with reading(path, "the header of a journal"):
+        return Header(Metadata.from_plain(about["metadata"]), about["loads"], about["steps"])
+
+
+def write_sealed(path: Path, about: Mapping[str, Any]) -> None:
+    """Write a text (JSON) with its seal."""
+    text = json.dumps({"hexcontact_version": __version__, **about}, default=np.generic.item)
+    seal = {"journal_version": VERSION, "sha256": _digest(json.loads(text))}
+    with replacing(path, path.with_name(path.name + _TEMPORARY)) as temporary:
+        temporary.write_text(f"{json.dumps(seal)[:-1]}, {text[1:]}", encoding="utf-8")
+
+
+def read_sealed(path: Path) -> dict[str, Any]:
+    """Read a text (JSON), and compare its seal."""
+    with reading(path, "a text of a journal"):
+        about: dict[str, Any] = json.loads(path.read_bytes())
+        require_kinds(about)
+        if (layout := about.pop("journal_version")) != VERSION:
+            raise DeckError(_OTHER_VERSION.format(path, about["hexcontact_version"], layout, VERSION))
+        if about.pop("sha256", "") != _digest(about):
+            raise DeckError(f"{_CHANGED.format(path)} (SHA-256)")
+        del about["hexcontact_version"]
+        return about
+
+
+def begins_like_sealed(path: Path) -> bool:
+    """Test whether a file begins like a text of a run, which may be damaged."""
+    return beginning(path, 200).startswith(b'{"journal_version": ')
+
+
+def _digest(about: Any) -> str:
+    return hashlib.sha256(json.dumps(about).encode()).hexdigest()
+
+
+# --- the journal --------------------------------------------------------------------------------------------
+
+
 class Journal:
     """The finished steps of a run, read from the disk one at a time.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder; a missing one is an empty journal.
-    companions : bool
-        Read the companions of steps, too.
-    ours : bool
-        Whether this process has written or read the records already: only their checksums are compared, and
-        the fields of large ones are not in memory, but read whenever they are asked for.
+    Of large records that this process has written or read before (`ours`), each field is loaded at its use.
+    Restart data are read on request (`companions`).
     """
 
     def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
         self.folder, self._companions, self._ours = folder, companions, ours
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
-        unfinished = [name for name in names if _is_temporary(name, folder)]
-        self._besides = [folder / name for name in names if name == STOPPED or name in unfinished]
-        self._last: Description | None = None  # in the last record, once it was read
+        self._left = [folder / name for name in names if name == STOPPED or _is_temporary(name, folder)]
+        self._headers = [folder / HEADER] if HEADER in names else []
 
     def __len__(self) -> int:
         """Return the number of finished steps."""
@@ -87,47 +146,52 @@ class Journal:
 
     def __iter__(self) -> Iterator[Step]:
         """Read the steps; DeckError if one is missing, damaged or of another run."""
-        known: Description | None = None
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
-                raise DeckError(_LACKS.format(self.folder, number))
-            about, step = read_step(record, self._companions, known.whole if known else None, not self._ours)
+                raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
+            about, step = read_record(record, self._companions, lazy=self._ours)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
-            with reading(record, _KIND):
-                fault = ""
-                if isinstance(about, Growth):
-                    fault = "their deck is another" if known is None else known.follow(about)
-                else:
-                    fault = fault_of_sequence(known.metadata, about) if known else ""
-                    known = Description(about, number)
-                if fault:
-                    raise DeckError(_NO_FOLLOWER.format(record, fault))
+            if about["run"] != self.run:
+                raise DeckError(f"{record} does not belong to the records before it: its run is another")
             yield step
-        self._last = known
+
+    @cached_property
+    def header(self) -> Header:
+        """The header."""
+        if not self._headers:
+            read_about(self.records[0])  # DeckError for another version
+            raise DeckError(f"{self.folder} lacks its header, {HEADER}")
+        return read_header(self.folder)
+
+    @cached_property
+    def grown(self) -> Header:
+        """The header with the loads that the records of a session add."""
+        header = dataclasses.replace(self.header, loads=copy.copy(self.header.loads))
+        for record in self.records[header.steps :] if header.loads is not None else ():
+            header.follow(read_about(record)["loads"])
+        return header
 
     @property
     def metadata(self) -> Metadata:
-        """Metadata of the run in the last record."""
-        if self._last is None:
-            self._last = described(self.records[-1])
-        return self._last.metadata
+        """Metadata of the run."""
+        return self.grown.whole(len(self))
 
     @property
     def run(self) -> str:
-        """Unique name of the run, in the last record."""
-        return read_about(self.records[-1]).run
+        """Unique name of the run."""
+        return self.header.metadata.run
 
     @property
     def stopped(self) -> str:
-        """Reason of an early end; empty if the run goes on, was killed or has finished."""
+        """Reason of an early end; empty if the run continues, was killed or has finished."""
         return beginning(self.folder / STOPPED, _LONGEST_REASON).decode(errors="replace")
 
     @property
     def complete(self) -> bool:
         """Whether it has all planned steps."""
-        about, last = read_step(self.records[-1], companion=False)
-        return len(self) == about.planned_steps or last.done == 1.0
+        done = read_about(self.records[-1])["control"].get("done")
+        return len(self) == self.metadata.planned_steps or done == 1.0
 
     def result(self, path: Path) -> Result:
         """Return all finished steps as a result in memory; `path` is its name."""
@@ -139,308 +203,104 @@ class Journal:
 
     @property
     def is_ours(self) -> bool:
-        """Whether a run has written one of the records."""
-        return any(map(begins_like_record, self.records))
+        """Whether a run has written one of the files."""
+        return any(map(begins_like_record, self.records)) or any(map(begins_like_sealed, self._headers))
 
     @property
     def files(self) -> list[Path]:
-        """The records, the reason of an early end, and remains of an interrupted write."""
-        return [*self.records, *self._besides]
+        """The records and the header, the reason of an early end, and remains of an interrupted write."""
+        return [*self.records, *self._headers, *self._left]
 
     def remove(self) -> None:
         """Delete all `files`, but not the lock."""
-        for path in reversed(self.records):  # what is left if it is killed is the beginning of a run
+        for path in [*reversed(self.records), *self._headers]:  # a killed process leaves the first steps
             path.unlink(missing_ok=True)
         self.tidy()
 
     def tidy(self) -> None:
         """Delete the reason of an early end, and remains of an interrupted write."""
-        for path in Journal(self.folder)._besides:
+        for path in Journal(self.folder)._left:
             path.unlink(missing_ok=True)
 
 
 def _is_temporary(name: str, folder: Path) -> bool:
-    """Test whether a run writes a record, or its output, under this temporary name."""
+    """Test whether a run writes one of its files, or its output, under this temporary name."""
     stem = name.removesuffix(_TEMPORARY)
-    return stem != name and bool(_RECORD.fullmatch(stem) or stem == folder.name.removesuffix(".d"))
+    ours = _RECORD.fullmatch(stem) or stem in (HEADER, folder.name.removesuffix(".d"))
+    return stem != name and bool(ours)
 
 
 # --- records ------------------------------------------------------------------------------------------------
 
 
-class Growth(NamedTuple):
-    """Reference of a record to metadata in an earlier one, and the text that it adds to the deck.
-
-    Attributes
-    ----------
-    run : str
-        Unique name of the run.
-    of : int
-        Number of the record with the metadata.
-    planned_steps : int
-        As in `Metadata`.
-    kept : int
-        Characters of the deck of the record before that remain.
-    added : str
-        Text that follows them.
-    checksum : int
-        CRC-32 of the whole deck.
-    """
-
-    run: str
-    of: int
-    planned_steps: int
-    kept: int
-    added: str
-    checksum: int
-
-
-class Description:
-    """Metadata of a run whose deck grows.
-
-    Parameters
-    ----------
-    metadata : Metadata
-        The metadata at first.
-    number : int
-        Number of the record that holds them; 0: that of the next one.
-
-    Attributes
-    ----------
-    whole : Metadata
-        The metadata at first.
-    number, planned_steps : int
-        As the argument, and as in `Metadata`.
-    """
-
-    def __init__(self, metadata: Metadata, number: int = 0) -> None:
-        self._begin(metadata, number)
-
-    def _begin(self, metadata: Metadata, number: int) -> None:
-        self.whole, self.number, self.planned_steps = metadata, number, metadata.planned_steps
-        self._pieces: list[str] = []  # of the deck
-        self._ends = [(0, 0)]  # lengths and checksums before each, and of all
-        self._add(metadata.deck)
-
-    @property
-    def metadata(self) -> Metadata:
-        """The metadata at present."""
-        deck = "".join(self._pieces)
-        return dataclasses.replace(self.whole, deck=deck, planned_steps=self.planned_steps)
-
-    def next(
-        self, number: int, added: str = "", kept: int | None = None, planned_steps: int | None = None
-    ) -> Metadata | Growth:
-        """Add text to the deck, and return what the next record holds of the metadata.
-
-        Parameters
-        ----------
-        number : int
-            Number of the record.
-        added, kept, planned_steps : optional
-            As the attributes of `Growth`; by default nothing is added.
-        """
-        kept = self._ends[-1][0] if kept is None else kept
-        self._replace(kept, added)
-        self.planned_steps = self.planned_steps if planned_steps is None else planned_steps
-        if not self.number:
-            self._begin(self.metadata, number)
-            return self.whole
-        checksum = self._ends[-1][1]
-        return Growth(self.whole.run, self.number, self.planned_steps, kept, added, checksum)
-
-    def follow(self, growth: Growth) -> str:
-        """Follow the reference of the next record; return why it cannot be that, else empty text."""
-        if growth.run != self.whole.run:
-            return "its run is another"
-        if growth.of != self.number or growth.kept > self._ends[-1][0]:
-            return "its metadata are others"
-        self._replace(growth.kept, growth.added)
-        self.planned_steps = growth.planned_steps
-        return "" if self._ends[-1][1] == growth.checksum else "its deck is another"
-
-    def _replace(self, kept: int, added: str) -> None:
-        """Replace all but the first `kept` characters of the deck."""
-        last = ""
-        while self._ends[-1][0] > kept:
-            self._ends.pop()
-            last = self._pieces.pop()
-        self._add(last[: kept - self._ends[-1][0]])
-        self._add(added)
-
-    def _add(self, piece: str) -> None:
-        if piece:
-            length, checksum = self._ends[-1]
-            self._pieces.append(piece)
-            self._ends.append((length + len(piece), zlib.crc32(piece.encode(), checksum)))
-
-
-def write_record(path: Path, about: Metadata | Growth, step: Step) -> None:
-    """Write a record.
-
-    Parameters
-    ----------
-    path : Path
-        File to write or replace.
-    about : Metadata or Growth
-        Metadata of the run, or a reference to those of earlier records.
-    step : Step
-        The step.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+def write_record(path: Path, run: str, step: Step, loads: Sequence[Any] = ()) -> None:
+    """Write the record of a step of a run, with the `loads` of `Header.follow`."""
     fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
     for name, values in fields.items():
         if values.shape != step.lattice.shape:
             raise ValueError(
                 f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
             )
-    parts = {_FIELDS: _alike(fields), _COMPANION: _alike(step.companion)}
-    known = {
+    about = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,
-        **({"growth": about._asdict()} if isinstance(about, Growth) else {"metadata": vars(about)}),
-        "index": step.index,
-        "lattice": dataclasses.asdict(step.lattice),
-        "history": dict(step.history),
-        **{part: [list(group) for group in groups] for part, groups in parts.items()},
-        "control": dict(step.control),
+        **{"run": run, "index": step.index, "lattice": dataclasses.asdict(step.lattice)},
+        **{"history": dict(step.history), "control": dict(step.control), "loads": loads},
     }
-    text = json.dumps(known, default=np.generic.item).encode()
+    text = json.dumps(about, default=np.generic.item).encode()
+    arrays = {_ABOUT: np.frombuffer(text, "u1"), **fields}
+    arrays |= {f"{_COMPANION}{name}": values for name, values in step.companion.items()}
     with zipfile.ZipFile(path, "w") as file:
-        _write_array(file, _ABOUT, [np.frombuffer(text, "u1")])
-        for part, groups in parts.items():
-            for number, group in enumerate(groups):
-                _write_array(file, f"{part}_{number}", [values[np.newaxis] for values in group.values()])
+        for name, values in arrays.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.ascontiguousarray(values), allow_pickle=False)
+        file.comment = _seal_of(file)
 
 
-def _alike(fields: Mapping[str, NDArray[Any]]) -> list[dict[str, NDArray[Any]]]:
-    """Return fields in groups of one type and shape."""
-    groups: dict[Any, dict[str, NDArray[Any]]] = {}
-    for name, values in fields.items():
-        groups.setdefault((values.dtype, values.shape), {})[name] = values
-    return list(groups.values())
+def _seal_of(archive: zipfile.ZipFile) -> bytes:
+    """Return the digest of the checksums of all members, which zipfile compares as it reads them."""
+    members = [(member.filename, member.file_size, member.CRC) for member in archive.infolist()]
+    return f"hexcontact {_digest(members)}".encode()
 
 
-def _write_array(archive: zipfile.ZipFile, name: str, parts: Sequence[NDArray[Any]]) -> None:
-    """Write an array that consists of parts along its first axis."""
-    first = parts[0]
-    header = {
-        "descr": np.lib.format.dtype_to_descr(first.dtype),
-        "fortran_order": False,
-        "shape": (sum(map(len, parts)), *first.shape[1:]),
-    }
-    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-        np.lib.format.write_array_header_1_0(member, header)
-        for part in parts:
-            member.write(np.ascontiguousarray(part).data)
-
-
-def read_step(
-    path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
-) -> tuple[Metadata | Growth, Step]:
-    """Read a record, with its companion or without, and without the metadata that it may refer to.
-
-    To `check` the step, these are given by `whole`, or read.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged or of another version.
-    FileNotFoundError
-        If it is missing.
-    """
+def read_record(path: Path, companion: bool = False, lazy: bool = False) -> tuple[dict[str, Any], Step]:
+    """Read the text and the step of a record; restart data on request, fields of a large one `lazy`."""
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
-        known = _known(file, path)
-        about = _about(known)
-        if check or path.stat().st_size < _LARGE:
-            fields: Mapping[str, NDArray[Any]] = _fields(file, _FIELDS, known)
+        about = _about(file, path)
+        names = [name.removesuffix(".npy") for name in file.namelist() if name != f"{_ABOUT}.npy"]
+        more = [name for name in names if name.startswith(_COMPANION)]
+        names = [name for name in names if name not in more]
+        if lazy and path.stat().st_size >= _LARGE:
+            fields: Mapping[str, NDArray[Any]] = Stored(path, names)
         else:
-            members = {f"{_FIELDS}_{number}.npy": names for number, names in enumerate(known[_FIELDS])}
-            fields = Stored(path, file, members)
-        lattice = made(Lattice, known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
+            fields = {name: _array(file, name) for name in names}
+        lattice = made(Lattice, about["lattice"] | {"origin": tuple(about["lattice"]["origin"])})
+        beside = {name.removeprefix(_COMPANION): _array(file, name) for name in more if companion}
         step = Step(
-            *(known["index"], lattice, fields, known["history"]),
-            companion=_fields(file, _COMPANION, known) if companion else {},
-            control=known["control"],
+            *(about["index"], lattice, fields, about["history"]),
+            companion=beside,
+            control=about["control"],
         )
-        if not check:
-            return about, step
-        if isinstance(about, Metadata):
-            metadata = about
-        else:
-            whole = whole or described(_record(path.parent, about.of)).whole
-            metadata = dataclasses.replace(whole, planned_steps=about.planned_steps)
-        fault = fault_of_record(metadata, step)
-        adaptive = step.control and "until" not in step.control
-        if (
-            not fault
-            and adaptive
-            and bool(known[_COMPANION]) != isinstance(step.control.get("companion"), dict)
-        ):
-            fault = "its second solution is not whole"
-        if fault:
-            raise DeckError(f"{path} is damaged: {fault}")
         return about, step
 
 
-def described(record: Path) -> Description:
-    """Return the metadata of a record, and read for it those before it to which it refers."""
-    number, growths = int(record.stem), []
-    while isinstance(about := read_about(record), Growth):
-        growths.append((record, about))
-        number -= 1
-        record = _record(record.parent, number)
-        if not record.exists() and growths[0][0].exists():
-            raise DeckError(_LACKS.format(record.parent, number))
-    known = Description(about, number)
-    for path, growth in reversed(growths):
-        with reading(path, _KIND):
-            if fault := known.follow(growth):
-                raise DeckError(_NO_FOLLOWER.format(path, fault))
-    return known
-
-
-def read_about(path: Path) -> Metadata | Growth:
-    """Read what a record holds of the metadata."""
+def read_about(path: Path) -> dict[str, Any]:
+    """Read the text of a record."""
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
-        return _about(_known(file, path))
+        return _about(file, path)
 
 
-def _record(folder: Path, number: int) -> Path:
-    return folder / f"{number:06d}{SUFFIX}"
-
-
-def _known(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
-    """Return the text of a record."""
-    known: dict[str, Any] = json.loads(_array(archive, _ABOUT).tobytes())
-    require_kinds(known)
-    if known["journal_version"] != VERSION:
-        raise DeckError(
-            f"{path} was kept by hexcontact {known['hexcontact_version']}, whose journal has the "
-            f"layout {known['journal_version']}; this version reads layout {VERSION}"
-        )
-    require_kinds(known, **_PARTS)
-    require_kinds(known["lattice"], origin=list)
-    return known
-
-
-def _about(known: Mapping[str, Any]) -> Metadata | Growth:
-    if "growth" not in known:
-        return Metadata.from_plain(known["metadata"])
-    require_kinds(known["growth"], **get_type_hints(Growth))
-    return made(Growth, known["growth"])
-
-
-def _fields(archive: zipfile.ZipFile, part: str, known: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return the fields of a part of a record."""
-    fields: dict[str, NDArray[Any]] = {}
-    for number, names in enumerate(known[part]):
-        fields |= zip(names, _array(archive, f"{part}_{number}"), strict=True)
-    return fields
+def _about(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
+    """Return the text of a record, and compare its seal."""
+    about: dict[str, Any] = json.loads(_array(archive, _ABOUT).tobytes())
+    require_kinds(about)
+    if about["journal_version"] != VERSION:
+        layout = about["journal_version"]
+        raise DeckError(_OTHER_VERSION.format(path, about["hexcontact_version"], layout, VERSION))
+    if archive.comment != _seal_of(archive):
+        raise DeckError(_CHANGED.format(path))
+    require_kinds(about, **_PARTS)
+    return about
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
@@ -456,3 +316,27 @@ def begins_like_record(path: Path) -> bool:
     """Test whether a file begins like a record, which may be damaged."""
     head = beginning(path, 30 + len(_ABOUT))
     return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
+
+
+class Stored(Mapping[str, NDArray[Any]]):
+    """Fields of a record, each loaded at every access: an output takes one after the other."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        self._path, self._names = path, names
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Read a field; DeckError if the file has been damaged since."""
+        with reading(self._path, _KIND), zipfile.ZipFile(self._path) as file:
+            return _array(file, name)
+
+    def __contains__(self, name: object) -> bool:
+        """Test whether there is such a field."""
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of fields."""
+        return len(self._names)

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     import xarray
 
 COORDINATES = ("step", "row", "col", "x", "y")
+MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
+_ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
+_STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin"),
@@ -43,45 +46,19 @@ def now() -> str:
 
 @dataclass(frozen=True)
 class Metadata:
-    """Data about a run in its result.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case.
-    deck : str
-        The whole deck as text; empty for a case that was built in Python.
-    fields : tuple of str
-        Fields of the output; empty: all.
-    every : int
-        The output has the fields of each step whose number is a multiple of this, and of the last one.
-    planned_steps : int
-        Load steps of the whole run; 0 while it is open.
-    parameters : mapping of str to number or text
-        Materials, tolerance and other parameters of the case.
-    run : str
-        Unique name of the run.
-    created : str
-        Start of the run, UTC.
-    version : str
-        Version of the program at its start.
-    resumed : tuple of str
-        A line for each time that the run was resumed.
-    deck_file : str
-        The file of the deck, to which its file names are relative; not in the output.
-    """
+    """Data about a run in its result."""
 
     title: str = ""
-    deck: str = ""
-    fields: tuple[str, ...] = ()
-    every: int = 1
-    planned_steps: int = 0
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    deck: str = ""  # the whole text
+    fields: tuple[str, ...] = ()  # of the output; empty: all
+    every: int = 1  # the output has the fields of steps of these numbers, and of the last one
+    planned_steps: int = 0  # 0: open
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # materials, tolerance and others
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    created: str = field(default_factory=now)
-    version: str = __version__
-    resumed: tuple[str, ...] = ()
-    deck_file: str = ""
+    created: str = field(default_factory=now)  # start of the run, UTC
+    version: str = __version__  # of the program at the start
+    resumed: tuple[str, ...] = ()  # a line for each time
+    deck_file: str = ""  # file names in the deck are relative to it; not in the output
 
     @property
     def story(self) -> str:
@@ -103,20 +80,14 @@ class Metadata:
 
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
-        """Return the metadata of what `dataclasses.asdict` gave, after JSON."""
+        """Return the metadata from the table of `dataclasses.asdict`, after JSON."""
         require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
         return made(cls, {**values, **tuples})
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Return the metadata of the attributes of a file.
-
-        Raises
-        ------
-        KeyError, ValueError
-            If one is missing or wrong.
-        """
+        """Return the metadata from the attributes of a file; KeyError or ValueError for a fault."""
         return cls(
             title=str(attributes["title"]),
             deck=str(attributes["deck"]),
@@ -134,14 +105,8 @@ class Metadata:
 class Layout:
     """Dimensions, coordinates, variables and attributes of a result.
 
-    Parameters
-    ----------
-    metadata : Metadata
-        Metadata of the run.
-    steps : sequence of Step
-        All its steps (heads are enough), in order.
-    trials : mapping of str to sequence, optional
-        Solutions on other lattices: values by trial, by the names of `hexcontact.variables`.
+    `steps` are all steps in order, heads are enough; `trials` are values on other lattices by
+    `hexcontact.variables`.
     """
 
     def __init__(
@@ -159,6 +124,7 @@ class Layout:
             present -= set(FIELDS) - set(metadata.fields)
         self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
         self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
+        self.block = max(1, _STEPS // self.window.size)  # load steps in a chunk
         self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
         if self.trials:
             self.variables |= {name: VARIABLES[name] for name in self.trials}
@@ -166,7 +132,7 @@ class Layout:
 
     def attributes_of(self, name: str) -> dict[str, Any]:
         """Return the CF attributes of a variable, with the name of its estimated error."""
-        attributes = VARIABLES[name].attributes
+        attributes = dict(_ATTRIBUTES_OF[name])
         if (error := f"{name}_error") in self.variables:
             attributes["ancillary_variables"] = error
         return attributes
@@ -211,7 +177,7 @@ class Layout:
         """Return the values of quantities with one value by step; texts as objects."""
         return {
             name: np.array(
-                [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
+                [step.history.get(name, "" if v.dtype == "str" else MISSING[name]) for step in self.steps],
                 dtype=object if v.dtype == "str" else v.dtype,
             )
             for name, v in self.variables.items()
@@ -223,13 +189,13 @@ class Layout:
         if self.keeps(position) and name in step.fields:
             return self.padded(name, step)
         variable = self.variables[name]
-        return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
+        return np.full(self.window.shape, MISSING[name], dtype=variable.dtype)
 
     def padded(self, name: str, step: Step) -> NDArray[Any]:
         """Return a field of `step` on the window of the whole result."""
         variable = VARIABLES[name]
         values = np.asarray(step.fields[name], dtype=variable.dtype)
-        if values.shape != step.lattice.shape:
+        if values.shape != (step.lattice.n_row, step.lattice.n_col):
             raise ValueError(
                 f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
             )
@@ -299,25 +265,10 @@ def assemble(
     trials: Mapping[str, Sequence[Any]] | None = None,
     stopped: str = "",
 ) -> xarray.Dataset:
-    """Return the data set of the steps of a run.
+    """Return the dataset of the steps of a run, which are read twice: no generator.
 
-    Parameters
-    ----------
-    metadata : Metadata
-        Metadata of the run.
-    steps : iterable of Step
-        The finished steps in order, which are read twice: no generator.
-    complete : bool
-        Whether these are all steps of the run.
-    trials : mapping of str to sequence, optional
-        As for `Layout`.
-    stopped : str
-        Reason why the run ended early, if it did.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``step``, ``row``, ``col``; the layout is described in docs/netcdf.md.
+    `complete`: these are all steps of the run; `trials` as of `Layout`; `stopped`: reason of an early end.
+    The layout is described in docs/netcdf.md.
     """
     import xarray
 
@@ -354,13 +305,7 @@ _GIVEN = {
 
 
 class Quantities(Mapping[str, Variable]):
-    """The quantities of a result by name; printed, a table.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names, see `hexcontact.variables`.
-    """
+    """The quantities of a result by name; printed, a table."""
 
     def __init__(self, names: list[str]) -> None:
         self._names = [name for name in VARIABLES if name in names]

@@ -1,4 +1,4 @@
-"""The triangular lattice as a mesh: its triangles, and their description in netCDF (UGRID-1.0)."""
+"""The triangles of the lattice as a mesh in netCDF (UGRID-1.0)."""
 
 from __future__ import annotations
 
@@ -20,19 +20,10 @@ _CHUNK = 1 << 16  # triangles
 
 
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
-    """Return the triangles between the nodes of a window.
+    """Return the nodes at the corners of each triangle of a window, counterclockwise, shape (n, 3).
 
-    The short diagonal halves each cell into equilateral triangles, on which tractions are linear.
-
-    Parameters
-    ----------
-    n_row, n_col : int
-        Size of the window. Node (row j, col i) of the window has the number ``j*n_col + i``.
-
-    Returns
-    -------
-    ndarray of int, shape (2*(n_row - 1)*(n_col - 1), 3)
-        Numbers of the nodes at their corners, counterclockwise, from 0.
+    The short diagonal halves each cell into equilateral triangles, on which tractions are linear. Node (row
+    j, col i) has the number ``j*n_col + i``.
     """
     first = np.arange(n_row * n_col, dtype=np.int32).reshape(n_row, n_col)[:-1, :-1].ravel()
     right, up, across = first + 1, first + n_col, first + n_col + 1
@@ -40,15 +31,7 @@ def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
 
 
 def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
-    """Write the mesh of a window, unless it has one row or column only.
-
-    Parameters
-    ----------
-    file : netCDF4.Dataset
-        File open for writing.
-    lattice : Lattice
-        The window.
-    """
+    """Write the mesh of a window to an open file, unless it has one row or column only."""
     if min(lattice.shape) < 2:
         return
     faces = triangles(lattice.n_row, lattice.n_col)
@@ -87,21 +70,7 @@ def add_column(
     values: Any = None,
     **options: Any,
 ) -> netCDF4.Variable:
-    """Add a variable to a file.
-
-    Parameters
-    ----------
-    file : netCDF4.Dataset
-        File open for writing.
-    name, dtype, dims
-        Its name, type and dimensions.
-    attributes : mapping
-        Its attributes.
-    values : array_like, optional
-        Its values.
-    **options
-        Options of `netCDF4.Dataset.createVariable`.
-    """
+    """Add a variable with its attributes and values to a file; `options` go to ``createVariable``."""
     column = file.createVariable(name, dtype, dims, **options)
     column.setncatts(attributes)
     column.set_auto_maskandscale(False)  # which looks for more attributes

@@ -1,4 +1,4 @@
-"""Result files: writing step by step, reading, refusal of damaged and foreign files.
+"""The result file, in netCDF.
 
 HDF5 files may have further bytes at their end. Those of a result are its seal of 48 bytes: a mark, and a
 SHA-256 of the SHA-256 of each block before it. So damage shows before HDF5 reads it, also in indices of
@@ -8,7 +8,6 @@ chunks. A program that rewrites the file with HDF5 removes the seal.
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,8 +23,8 @@ from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
-from .check import fault_of_dimensions, fault_of_fields, fault_of_result
-from .layout import COORDINATES, Layout, Metadata
+from .check import fault_of_dimensions, fault_of_result
+from .layout import MISSING, Layout, Metadata
 from .step import Step
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 # Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
 _BELOW = ("stress", "fatigue", "\\")
 _CHUNK = 512  # nodes of a chunk along row and col
-_STEPS = 64**2  # nodes of a chunk with several steps
 _MARK = b"hexcontact sha-2"
 _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes
@@ -48,38 +46,20 @@ _END = slice(28, 36)  # in the head: the address where the file ends
 
 
 def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
-    """Write the file of a result.
-
-    Parameters
-    ----------
-    path : Path
-        File to write or replace.
-    layout : Layout
-        Layout of all the steps.
-    steps : iterable of Step
-        The steps with their fields, which are read once.
-    complete : bool
-        Whether they are all steps of the run.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write the file of a result from its steps, which are read once; OSError if that fails."""
     with _new_file(path) as file:
         with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
             given = [
-                _text(file, name, values)
+                _text(file, name, values, layout)
                 if VARIABLES[name].dtype == "str"
                 else (_column(file, name, layout), values)
                 for name, values in (layout.coordinates() | layout.histories() | layout.trials).items()
             ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
-            vars(file)["defined"] = True
             file.setncatts(layout.attributes(complete))
-            # chunks are written once; the default, 64 MB a variable, is set with the end of definitions
+            # chunks are written once; the default is 64 MB a variable
             for column in file.variables.values():
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
@@ -91,7 +71,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         block: list[Step] = []
         for position, step in enumerate(steps):
             block.append(step)
-            if len(block) == _block(layout) or position == len(layout.steps) - 1:
+            if len(block) == layout.block or position == len(layout.steps) - 1:
                 _write_block(columns, layout, position - len(block) + 1, block)
                 block.clear()
             layout.complete_fixed(fixed, step)
@@ -100,32 +80,16 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 column[...] = fixed[name]
 
 
-@functools.cache
-def _file_type() -> type[netCDF4.Dataset]:
-    """Return files that only leave the mode of definitions once they are `defined`: leaving it flushes."""
-    import netCDF4
-
-    class File(netCDF4.Dataset):
-        def _redef(self) -> None:
-            if "defined" in vars(self):
-                super()._redef()  # type: ignore[misc]
-
-        def _enddef(self) -> None:
-            if "defined" in vars(self):
-                super()._enddef()  # type: ignore[misc]
-
-    return File
-
-
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; at the end close it and add its checksum."""
-    file_type = _file_type()
+    import netCDF4
+
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
         with LOCK:
-            file = file_type(path, "w", format="NETCDF4_CLASSIC")
+            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:
@@ -133,11 +97,6 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
-
-
-def _block(layout: Layout) -> int:
-    """Return the number of load steps in a chunk."""
-    return max(1, _STEPS // layout.window.size)
 
 
 def _write_block(
@@ -156,19 +115,21 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     variable = VARIABLES[name]
     options: dict[str, Any] = {}
     if variable.dims[-2:] == ("row", "col"):
-        block = {"step": _block(layout), "row": _CHUNK, "col": _CHUNK}
+        block = {"step": layout.block, "row": _CHUNK, "col": _CHUNK}
         sizes = [min(block[dim], layout.sizes[dim]) for dim in variable.dims]
         options = {"compression": "zlib", "complevel": 1, "chunksizes": sizes}
         options["fletcher32"] = True  # damage is an error
         if variable.dtype == "f8":
-            options["fill_value"] = variable.missing
+            options["fill_value"] = MISSING[name]
     attributes = layout.attributes_of(name)
     if options and name not in ("x", "y"):
         attributes["coordinates"] = "x y"
     return mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
 
 
-def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF4.Variable, NDArray[Any]]:
+def _text(
+    file: netCDF4.Dataset, name: str, texts: NDArray[Any], layout: Layout
+) -> tuple[netCDF4.Variable, NDArray[Any]]:
     """Create the text variable `name`, and return it with its characters.
 
     Characters, not netCDF strings, on which HDF5 crashes if a file is open more than once.
@@ -176,7 +137,7 @@ def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF
     variable = VARIABLES[name]
     characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
     file.createDimension(f"{name}_length", characters.shape[1])
-    attributes = {**variable.attributes, "_Encoding": "utf-8"}
+    attributes = {**layout.attributes_of(name), "_Encoding": "utf-8"}
     column = mesh.add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
     column.set_auto_chartostring(False)
     return column, characters
@@ -204,13 +165,7 @@ def is_ours(path: Path) -> bool:
 
 
 def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
-    """Refuse to overwrite files of stresses, or other files even with `overwrite`.
-
-    Raises
-    ------
-    DeckError
-        If there is such a file.
-    """
+    """Refuse to overwrite files of stresses, and with `overwrite` any other file."""
     for path in stresses:
         if not overwrite and os.path.lexists(path):
             raise DeckError(f"{path} exists already; --overwrite (overwrite=True in Python) replaces it")
@@ -247,25 +202,15 @@ def read_output(path: Path) -> Result:
     """Open an output file; its fields are read at their first use.
 
     All bytes are checked first. In a file without a seal, of an earlier version or rewritten by another
-    program, the fields are read and checked instead.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged, of another kind or of another version.
-    FileNotFoundError
-        If it is missing.
+    program, the fields are read and checked instead. Raises DeckError for a damaged or foreign file,
+    FileNotFoundError for a missing one.
     """
     with reading(path):
         sealed = check_seal(path)
     with reading(path), opened(path) as file:
         _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
-        for name in COORDINATES:
-            if 0 in file[name].shape:
-                raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
-        for name, column in file.variables.items():
-            if fault := fault_of_dimensions(name, column.dimensions):
-                raise DeckError(f"{path} is damaged: {fault}")
+        if not sealed and (fault := fault_of_dimensions(file.variables)):
+            raise DeckError(f"{path} is damaged: {fault}")
     with reading(path):
         from .result import Result
 
@@ -275,7 +220,7 @@ def read_output(path: Path) -> Result:
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:
                 variable.load()
-        if fault := fault_of_result(result.dataset) or ("" if sealed else fault_of_fields(result.dataset)):
+        if not sealed and (fault := fault_of_result(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
@@ -315,13 +260,7 @@ def is_sealed(path: Path) -> bool:
 
 
 def check_seal(path: Path) -> bool:
-    """Test whether a file has a valid seal; False without a seal.
-
-    Raises
-    ------
-    DeckError
-        If the seal is broken.
-    """
+    """Test whether a file has a valid seal; False without a seal, DeckError for a broken one."""
     with path.open("rb") as file:
         head, size = file.read(_END.stop), file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _SIZE))

@@ -1,4 +1,4 @@
-"""Small pictures of fields: points of a plane, and images."""
+"""Small pictures over a plane."""
 
 from __future__ import annotations
 
@@ -18,15 +18,7 @@ STICK, SLIP = "#0072b2", "#f0c05a"
 
 @dataclass(frozen=True)
 class Plane:
-    """Pixels over a rectangle of the plane.
-
-    Attributes
-    ----------
-    limits : tuple of float
-        x_min, x_max, y_min, y_max, m.
-    longer : int
-        Pixels of the longer side.
-    """
+    """Pixels over a rectangle of the plane, x_min, x_max, y_min, y_max (m), `longer` on its longer side."""
 
     limits: tuple[float, float, float, float]
     longer: int

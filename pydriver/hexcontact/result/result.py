@@ -1,30 +1,34 @@
-"""The result of a run: quantities by name, fields between the nodes and along lines, tables, comparison."""
+"""The result of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast, overload
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, number
+from ..analytic.hertz_gap import friction_of
+from ..arrays import Array, has_entries, integer, number
 from ..core.lattice import Lattice
-from ..deck.below import Stage
-from ..errors import DeckError
-from ..interior.below import BelowSurface
+from ..deck.below import Criteria, Fatigue, cycle_of
+from ..deck.faults import NOWHERE
+from ..errors import DeckError, NotInResult, PathWarning, warn
+from ..interior.extremes import with_places
+from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
+from ..interior.region import region
+from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions
 from ..text import did_you_mean, text_table
 from ..variables import FIELDS, TRACTIONS, VARIABLES
-from .history import WEARING, cycles, segments, stages, worn_by_cycle
+from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .interpolate import (
-    Line,
+    NodalStep,
     Point,
     PressureField,
     TractionField,
     chosen_fields,
-    interpolate,
-    profile,
-    section_line,
-    tractions_of,
+    loaded,
+    nodal,
     with_shown,
 )
 from .layout import Quantities, history_of, lattice_of, step_of
@@ -35,6 +39,7 @@ if TYPE_CHECKING:
 
     from ..analytic.compare import Comparison
 
+_FEW_STEPS = 4  # load steps of a cycle; fewer have none between its ends
 _LISTED = "result.quantities lists what there is"
 _ELSEWHERE = {
     "plot": "hexcontact.plotting draws results: hexcontact.plotting.overview(result)",
@@ -46,7 +51,7 @@ _ELSEWHERE = {
 """Advice for names that are no quantities."""
 
 
-class Result(BelowSurface):
+class Result:
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; ``result.dataset`` is the
@@ -181,7 +186,7 @@ class Result(BelowSurface):
         DeckError, IndexError
             If pressure or gap were not kept, or there is no such step.
         """
-        return tractions_of(self.step(number), self.lattice, source)
+        return self._nodal(number).traction_field(source)
 
     def pressure_field(self, number: int = -1) -> PressureField:
         """Return the pressure of a load step at any point; see `traction_field`."""
@@ -240,8 +245,7 @@ class Result(BelowSurface):
         DeckError, IndexError
             If there is no such field in the output, or no such step.
         """
-        [values] = self._fields([name], step).values()
-        return interpolate(self.lattice, name, values, x, y, self._tractions([name], step, source))
+        return self._nodal(step).at(name, x, y, source)
 
     def profile(
         self,
@@ -282,7 +286,7 @@ class Result(BelowSurface):
         IndexError
             If there is no such step.
         """
-        return self._along(Line(start, end), names, step, points, source)
+        return self._nodal(step).profile(*names, start=start, end=end, points=points, source=source)
 
     def section(
         self,
@@ -319,9 +323,8 @@ class Result(BelowSurface):
         IndexError
             If there is no such step.
         """
-        pressure = self._fields(["pressure"], step)["pressure"]
-        line = section_line(self.lattice, pressure, angle, through)
-        return self._along(line, names, step, points, source)
+        along: dict[str, Any] = {"angle": angle, "through": through, "points": points, "source": source}
+        return self._nodal(step).section(*names, **along)
 
     def wear(
         self,
@@ -329,7 +332,7 @@ class Result(BelowSurface):
         segment: str | Sequence[str] | None = None,
         steps: Sequence[int] | None = None,
     ) -> xarray.Dataset:
-        """Return what one cycle of the loads wears off, of a run with friction and without [wear].
+        """Return the wear of one cycle of the loads, of a run with friction and without [wear].
 
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
         `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
@@ -342,27 +345,157 @@ class Result(BelowSurface):
         given = (self._fields(WEARING, at) for at in self.cycle_steps(segment, steps))
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
-    def _along(
-        self, line: Line, names: Sequence[str], step: int, points: int | None, source: str | None
-    ) -> xarray.Dataset:
-        number, fields = int(self.step(step)["step"]), self._fields(names, step)
-        tractions = self._tractions(fields, step, source)
-        return profile(self.lattice, fields, line, points, tractions, step=number)
-
-    def _tractions(self, names: Iterable[str], step: int, source: str | None) -> TractionField | None:
-        """Return the tractions between the nodes, if there is one among some fields."""
-        return self.traction_field(step, source) if any(name in TRACTIONS for name in names) else None
+    def _nodal(self, step: int) -> NodalStep:
+        """Return a load step by its nodal values; xarray reads those that are used from the file."""
+        return nodal(self.step(step), self.lattice)
 
     def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
         """Return the nodal values of some fields of a step, or of all."""
-        data = self.step(step)
-        known = [str(n) for n, values in data.data_vars.items() if values.dims == ("row", "col")]
-        # xarray reads only these fields from the file
-        return chosen_fields(names, {name: cast(Any, data[name]) for name in known}, int(data["step"]))
+        one = self._nodal(step)
+        return chosen_fields(names, one.fields, one.number)
 
-    def _stages(self) -> list[Stage]:
-        """Return segment, label and loads of each load step."""
-        return stages(cast(Any, self.history.to_dict("records")))
+    # --- below the surface ----------------------------------------------------------------------------------
+
+    def stress(
+        self,
+        *components: str,
+        step: int | Sequence[int] = -1,
+        body: int = 1,
+        source: str | None = None,
+        **where: Any,
+    ) -> xarray.Dataset:
+        """Return stresses and displacements (SI) below the surface, see docs/stress.md.
+
+        `components` are names of `hexcontact.variables.STRESSES`; several numbers of a step give the dataset
+        the dimension ``step``; `where` is one of ``points``, ``line``, ``plane`` and ``depths``, see
+        `hexcontact.interior.region`; `source` says of which tractions: ``"edges"``, corrected at the edges
+        of contact and stick, or ``"nodes"``, as they are. Raises DeckError, IndexError or ResourceError.
+        """
+        one = not has_entries(step)
+        given: Any = [step] if one else step
+        numbers = [int(self.step(integer(n, "step"))["step"]) for n in given]
+        if not numbers:
+            raise DeckError("step: expected the number of a step, or some of them")
+        several = None if one else numbers
+        of = self._body(body, numbers, edges=source != "nodes")
+        return with_places(below(of, where, components, several, source))
+
+    def _body(
+        self, body: int, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = True
+    ) -> Loaded:
+        """Return a body under the tractions of some steps."""
+        steps = self._loaded(numbers, more, edges)
+        given = self.lattice, steps, bodies_of(self.deck), body, friction_of(self.dataset.attrs)
+        return Loaded(*given, surface=lambda place: self.traction_field(numbers[place], "edges"))
+
+    def fatigue(
+        self,
+        *parameters: str,
+        segment: str | Sequence[str] | None = None,
+        steps: Sequence[int] | None = None,
+        body: int = 1,
+        **given: Any,
+    ) -> xarray.Dataset:
+        """Return fatigue parameters (SI) over a closed cycle, see docs/fatigue.md.
+
+        Parameters
+        ----------
+        *parameters : str
+            Some of ``smith_watson_topper``, ``life``, ``findley``, ``fatemi_socie``, ``crossland``,
+            ``dang_van``, ``ruiz``.
+        segment : str or sequence of str
+            Labels of the segments that make the cycle; the last one counts.
+        steps : sequence of int
+            Numbers of the load steps of the cycle instead; they are taken as they are.
+        body : int
+            The body, 1 or 2.
+        **given
+            Constants of the parameters, as in the table [[fatigue]] of a deck: ``findley_slope`` and others,
+            in SI or text with a unit; and the region as of `stress`, by default the nodes of the surface.
+
+        Raises
+        ------
+        DeckError
+            If a name, a constant or the body is wrong, the segments are no closed cycle, or fields of its
+            steps were not kept.
+        ResourceError
+            If there is not enough memory.
+        """
+        constants = {key: given.pop(key) for key in [*given] if key in Criteria.model_fields}
+        criteria = Criteria.parse({"parameters": parameters, **constants}, NOWHERE)
+        numbers = self.cycle_steps(segment, steps)
+        if steps is None and len(numbers) < _FEW_STEPS:
+            warn(
+                f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes "
+                f"and phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with "
+                "adaptive steps a smaller solver.step_tolerance",
+                PathWarning,
+            )
+        of = self._body(body, numbers, SLIPS if "ruiz" in parameters else ())
+        found = parameters_below(of, given or Fatigue.default_region, criteria)
+        about: dict[str, Any] = {"steps": np.array(numbers, dtype="i4")}
+        if (change := self._change_over(numbers)) is not None:
+            about["change_over_cycle"] = change
+        return with_places(found.assign_attrs(about))
+
+    def stress_histories(
+        self,
+        segment: str | Sequence[str] | None = None,
+        steps: Sequence[int] | None = None,
+        body: int = 1,
+        **where: Any,
+    ) -> Iterator[pandas.DataFrame]:
+        """Yield the stresses of a cycle by point and load step, in MPa, as pyLife takes them, block by block.
+
+        Arguments as of `fatigue`. The index is ``node_id, load_step``; the columns are ``x``, ``y`` and
+        ``depth`` (m), and ``S11``, ``S22``, ``S33``, ``S12``, ``S23``, ``S13``.
+        """
+        numbers = self.cycle_steps(segment, steps)
+        found = region(self.lattice, **(where or Fatigue.default_region))
+        for part, history in histories(self._body(body, numbers), found):
+            yield tabulated(found, part, history, numbers)
+
+    def cycle_steps(
+        self, segment: str | Sequence[str] | None = None, steps: Sequence[int] | None = None
+    ) -> list[int]:
+        """Return the numbers of the load steps of a closed cycle, arguments as of `fatigue`.
+
+        Raises DeckError if there are no such segments or they make no closed cycle.
+        """
+        if (segment is None) == (steps is None):
+            raise DeckError("expected either segment or steps, which define the cycle")
+        if segment is None:
+            numbers = [int(self.step(integer(n, "steps"))["step"]) for n in steps or ()]
+            if not numbers:
+                raise DeckError("steps: expected the numbers of the load steps of a cycle")
+            return numbers
+        labels = [segment] if isinstance(segment, str) else [str(label) for label in segment]
+        if not labels:
+            raise DeckError("segment: expected the label of a segment, or some of them")
+        try:
+            first, last = cycle_of(stages(cast(Any, self.history.to_dict("records"))), labels)
+        except ValueError as error:
+            raise DeckError(f"segment: {error}") from None
+        return list(range(first + 1, last + 2))
+
+    def _loaded(
+        self, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = False
+    ) -> list[dict[str, Any]]:
+        """Return tractions, bulk stress and other fields of some steps, and on request those of the edges."""
+        bulk = [name for name in LOADED if name not in TRACTIONS and name in self.dataset]
+        return [
+            loaded(self._nodal(number), more, edges) | {name: self.step(number)[name].item() for name in bulk}
+            for number in numbers
+        ]
+
+    def _change_over(self, numbers: Sequence[int]) -> float | None:
+        """Return the largest change of a traction over a cycle in the largest pressure; None if not kept."""
+        try:
+            start = nodal_tractions(self._loaded([numbers[0] - 1]))[0] if numbers[0] > 1 else np.zeros(())
+        except NotInResult:
+            return None
+        [end] = nodal_tractions(self._loaded([numbers[-1]]))
+        return float(abs(end - start).max() / max(end[0].max(), np.finfo(float).tiny))
 
     # --- tables ---------------------------------------------------------------------------------------------
 

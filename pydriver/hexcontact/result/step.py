@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -15,83 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from ..core.edges import Limits, TractionField
-from ..core.lattice import Lattice
-from ..files import reading
 from ..text import did_you_mean
-from ..variables import EDGES, TRACTIONS
-from .interpolate import (
-    Line,
-    Point,
-    chosen_fields,
-    interpolate,
-    limits_of,
-    profile,
-    section_line,
-    traction_field,
-)
+from .interpolate import NodalStep, loaded
 
 if TYPE_CHECKING:
-    from zipfile import ZipFile
-
     import xarray
-
-_LENGTHS = 26  # byte of a member of an archive at which the lengths of its name and extra field stand
-_BLOCK = 2**20  # bytes that are read at a time
-
-
-class Stored(Mapping[str, NDArray[Any]]):
-    """Fields of a step in a file, each read whenever it is asked for: an output takes one after the other.
-
-    Their arrays are not compressed, and all checksums are compared here.
-
-    Parameters
-    ----------
-    path, archive : Path, ZipFile
-        The file.
-    members : mapping of str to sequence of str
-        Names of the fields in each array of the archive, along its first axis.
-    """
-
-    def __init__(self, path: Path, archive: ZipFile, members: Mapping[str, Sequence[str]]) -> None:
-        self._path = path
-        self._places: dict[str, tuple[int, np.dtype[Any], tuple[int, ...]]] = {}
-        for member, names in members.items():
-            begin = archive.getinfo(member).header_offset
-            with path.open("rb") as file:
-                file.seek(begin + _LENGTHS)
-                begin += _LENGTHS + 4 + sum(struct.unpack("<HH", file.read(4)))  # name and extra field
-            with archive.open(member) as array:
-                np.lib.format.read_magic(array)
-                shape, _, kind = np.lib.format.read_array_header_1_0(array)
-                begin += array.tell()
-                while array.read(_BLOCK):  # compares the checksum at the end
-                    pass
-            size = math.prod(shape[1:]) * kind.itemsize
-            places = ((begin + number * size, kind, shape[1:]) for number in range(shape[0]))
-            self._places |= zip(names, places, strict=True)
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """Read a field; DeckError if the file has been damaged since."""
-        begin, kind, shape = self._places[name]
-        with reading(self._path, "a record of a journal"):
-            return np.fromfile(self._path, kind, math.prod(shape), offset=begin).reshape(shape)
-
-    def __contains__(self, name: object) -> bool:
-        """Test whether there is such a field."""
-        return name in self._places
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        """Return the number of fields."""
-        return len(self._places)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Step:
+class Step(NodalStep):
     """A finished load step.
 
     Its quantities are attributes, too: ``step.pressure`` is an array over the nodes, ``step.approach`` a
@@ -128,9 +59,6 @@ class Step:
         Bound of the shear traction, Pa; inf: none.
     """
 
-    index: int
-    lattice: Lattice
-    fields: Mapping[str, NDArray[Any]]
     history: Mapping[str, Any]
     companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     control: Mapping[str, Any] = field(default_factory=dict)
@@ -138,19 +66,17 @@ class Step:
     load_fraction: float = math.nan
     ramp_done: float = math.nan
     bodies: Sequence[Any] = ()
-    friction: float = 0.0
-    sharp: bool = True
-    shear_limit: float = math.inf
 
     def __post_init__(self) -> None:
-        if isinstance(self.fields, Stored):
+        if not isinstance(self.fields, dict | MappingProxyType):  # each is loaded at its use
             return
         safe = {name: _read_only(values) for name, values in self.fields.items()}
         object.__setattr__(self, "fields", MappingProxyType(safe))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        given = (getattr(self, entry.name) for entry in dataclasses.fields(self))
-        return type(self), tuple(dict(v) if isinstance(v, Mapping) else v for v in given)
+        given = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
+        plain: dict[str, Any] = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
+        return partial(type(self), **plain), ()
 
     def __getattr__(self, name: str) -> Any:
         """Return a quantity."""
@@ -172,11 +98,6 @@ class Step:
     def __dir__(self) -> list[str]:
         """List the quantities, too."""
         return [*super().__dir__(), *self.fields, *self.history]
-
-    @property
-    def number(self) -> int:
-        """Number of the step, from 1."""
-        return self.index + 1
 
     @property
     def x(self) -> Array:
@@ -201,7 +122,7 @@ class Step:
     @property
     def residuals(self) -> dict[str, float]:
         """Residuals of the contact conditions and loads by their symbols: R_n, R_t, R_P, R_Q, R_M."""
-        from .history import residuals
+        from .history_words import residuals
 
         return residuals(self.history)
 
@@ -215,62 +136,14 @@ class Step:
         """Finished share of the load history with adaptive load steps; 0 without."""
         return float(self.control.get("done", 0.0))
 
-    # --- between the nodes ----------------------------------------------------------------------------------
-
-    def traction_field(self, source: str | None = None) -> TractionField:
-        """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
-        names = (*TRACTIONS, *EDGES)
-        known = {name: self.fields[name] for name in names if name in self.fields}
-        return traction_field(self.lattice, known, self.limits, source, self.sharp)
-
-    @property
-    def limits(self) -> Limits | None:
-        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
-        return limits_of(self.friction, self.fields, self.shear_limit)
-
-    def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
-        """Return a field at points of the plane; see `hexcontact.Result.at`."""
-        [values] = chosen_fields([name], self.fields, self.number).values()
-        return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
-
-    def profile(
-        self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
-    ) -> xarray.Dataset:
-        """Return fields along a line between two points; see `hexcontact.Result.profile`."""
-        return self._along(Line(start, end), names, points, source)
-
-    def section(
-        self,
-        *names: str,
-        angle: float = 0.0,
-        through: Point | None = None,
-        points: int | None = None,
-        source: str | None = None,
-    ) -> xarray.Dataset:
-        """Return fields along a line across the contact; see `hexcontact.Result.section`."""
-        line = section_line(self.lattice, self.fields["pressure"], angle, through)
-        return self._along(line, names, points, source)
-
-    def _along(
-        self, line: Line, names: Sequence[str], points: int | None, source: str | None
-    ) -> xarray.Dataset:
-        fields = chosen_fields(names, self.fields, self.number)
-        return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
-
-    def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
-        """Return the tractions between the nodes, if there is one among some fields."""
-        return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
-
     def stress_at(
         self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
     ) -> xarray.Dataset:
         """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
         from ..interior.stress import Loaded, below
 
-        loaded: dict[str, Any] = {**self.history, **self.fields}
-        if not self.sharp:
-            loaded = {name: values for name, values in loaded.items() if name not in EDGES}
-        given = self.lattice, [loaded], self.bodies, body, self.friction
+        fields: dict[str, Any] = {**self.history, **loaded(self)}
+        given = self.lattice, [fields], self.bodies, body, self.friction
         of = Loaded(*given, surface=lambda _: self.traction_field("edges"))
         return below(of, {"points": points}, components, source=source)
 
@@ -278,7 +151,7 @@ class Step:
 
     def __repr__(self) -> str:
         """Describe the step in a line."""
-        from .history import describe
+        from .history_words import describe
 
         try:
             about = describe(self.history)
@@ -288,7 +161,7 @@ class Step:
 
     def _repr_html_(self) -> str:
         from ..text import html_table
-        from .history import extent_of, step_rows
+        from .history_words import extent_of, step_rows
 
         return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
 

@@ -1,9 +1,9 @@
-"""Result files: a journal of finished steps, and one netCDF file made from it.
+"""The store of a run: a journal of finished steps, from which the result file is made.
 
-While a run goes on, each finished step is a small file of its own in the journal beside the output
+While a run continues, each finished step is a small file of its own in the journal beside the output
 (``out.nc.d/000012.npz``), with all its fields, written under a temporary name, flushed to disk and renamed.
-``out.nc`` is assembled from the records, one step in memory at a time, and only replaced as a whole. So a
-run that is killed at any moment loses at most its present step, and the earlier ``out.nc`` is readable.
+``out.nc`` is assembled from the records, one step in memory at a time, and only replaced as a whole. So a run
+that is killed at any moment loses at most its present step, and the earlier ``out.nc`` is readable.
 """
 
 from __future__ import annotations
@@ -23,7 +23,17 @@ from typing import TYPE_CHECKING, Any, Self
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
 from ..lock import Lock, begun, names_a_run
-from .journal import STOPPED, SUFFIX, Description, Journal, journal_of, read_step, write_record
+from .journal import (
+    HEADER,
+    STOPPED,
+    SUFFIX,
+    Header,
+    Journal,
+    journal_of,
+    read_record,
+    write_header,
+    write_record,
+)
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
@@ -85,21 +95,8 @@ def _continues(journal: Journal, output: Result) -> bool:
 class Store:
     """Writes a run: each finished step to the journal, all of them to the output.
 
-    Use it as a context manager, or call `close`. Without `finish` the journal remains.
-
-    Parameters
-    ----------
-    path : path
-        Output file.
-    metadata : Metadata
-        Metadata of the run, with the fields of the output.
-    overwrite : bool
-        Replace an existing output or unfinished run, at `finish`.
-
-    Raises
-    ------
-    DeckError
-        If the output exists, is being written by another run or cannot be written.
+    Use it as a context manager, or call `close`. Without `finish` the journal remains. With `overwrite` an
+    existing output or unfinished run is replaced at `finish`.
     """
 
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
@@ -116,37 +113,24 @@ class Store:
 
     @property
     def metadata(self) -> Metadata:
-        """Metadata of the run; the next record has all of them if they are set."""
-        return self._about.metadata
+        """Metadata of the run; set ones are written with the next step."""
+        return self._header.whole(len(self.heads))
 
     @metadata.setter
     def metadata(self, metadata: Metadata) -> None:
-        self._about = Description(metadata)
+        self.describe(metadata)
+
+    def describe(self, metadata: Metadata, loads: list[str] | None = None) -> None:
+        """Set the metadata, of a session with its loads apart, which `append` may add to."""
+        self._header, self._described = Header(metadata, loads, len(self.heads)), False
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
-        """Open the journal of an unfinished run to resume it.
+        """Open the journal of an unfinished run to resume it; return its store and last finished step.
 
-        Its files do not change before `go_on`.
-
-        Parameters
-        ----------
-        path : path
-            Output file.
-
-        Returns
-        -------
-        store : Store
-            The store, with the lock.
-        last : Step or None
-            The last finished step with all its fields; None if the run is finished, or refines its lattice.
-
-        Raises
-        ------
-        DeckError
-            If there are no finished steps, one is missing or damaged, or another run writes them.
-        FileNotFoundError
-            If there is no journal.
+        The step has all its fields; it is None if the run is finished, or refines its lattice. No file
+        changes before `go_on`. Raises DeckError if no step is finished, one is missing or damaged, or another
+        run writes them; FileNotFoundError without a journal.
         """
         store = cls.__new__(cls)
         store._at(path)
@@ -189,7 +173,7 @@ class Store:
         The time at which the run `began` tells whether a complete output is its own if it left no records.
         """
         journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
-        left = trials.read()[0] if trials else None
+        left = trials.metadata if trials else None
         output = None
         with contextlib.suppress(DeckError):  # another file is not replaced
             output = read_output(self.path) if self.path.exists() else None
@@ -208,7 +192,7 @@ class Store:
             return None
         if left is not None:
             self.metadata = left
-            self._refuse_newer(not ours, trials.ledger)
+            self._refuse_newer(not ours, trials.folder / HEADER)
             return None
         if not journal and output is not None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
@@ -216,7 +200,7 @@ class Store:
             raise DeckError(
                 f"no load step of {self.path} was finished, so it has to be run from the beginning"
             )
-        last = None
+        last, _ = None, journal.header  # whose damage is not that of a record
         try:
             for last in journal:
                 self.heads.append(last.head)
@@ -225,7 +209,7 @@ class Store:
                 f"without it and those after it, hexcontact resume continues after step {len(self.heads)}"
             )
             raise
-        self.metadata = journal.metadata
+        self._header, self._described = journal.grown, True
         with reading(self.folder, "a journal"):
             Layout(self.metadata, self.heads)  # fails if the steps do not belong together
         self._refuse_newer(not ours, journal.records[0])
@@ -264,7 +248,7 @@ class Store:
         """Refuse or delete an existing output or unfinished run."""
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
-            count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
+            count, what = (len(trials.solutions), "lattice") if trials else (len(left), "step")
             raise DeckError(
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
@@ -304,14 +288,14 @@ class Store:
     def has_all_steps(self) -> bool:
         """Whether all planned steps are finished."""
         return bool(self.heads) and (
-            len(self.heads) == self._about.planned_steps or self.heads[-1].done == 1.0
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
         )
 
     @property
     def kept(self) -> str:
         """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
-        planned, count = self._about.planned_steps, len(self.heads)
+        planned, count = self.metadata.planned_steps, len(self.heads)
         finished = TrialFolder(self.folder).kept
         if self.heads and planned:
             finished = f"{count} of {planned} load steps are finished"
@@ -346,26 +330,26 @@ class Store:
         with self._replacing(self.path) as path:
             write(path, layout, steps, complete)
 
-    def append(self, step: Step, **growth: Any) -> None:
-        """Record a finished step on the disk; `growth` changes the deck as in `Description.next`.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the steps before it remain.
-        """
+    def append(self, step: Step, loads: Sequence[Any] = ()) -> None:
+        """Record a finished step on the disk, with the `loads` of a session as of `Header.follow`."""
         with self._mutex:
             self._require_open()
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
             record = self.folder / f"{step.number:06d}{SUFFIX}"
             try:
-                about = self._about.next(step.number, **growth)
-                with self.writing(f"step {step.number}"), self._replacing(record) as path:
-                    write_record(path, about, step)
+                with self.writing(f"step {step.number}"):
+                    if not self._described:
+                        write_header(self.folder, self._header)
+                    with self._replacing(record) as path:
+                        write_record(path, self._header.metadata.run, step, loads)
             except BaseException:
-                self._about.number = 0  # the next record does not refer to this one
+                if not self.heads:
+                    (self.folder / HEADER).unlink(missing_ok=True)
                 raise
+            self._described = True
+            if loads:
+                self._header.follow(loads)
             if step.companion and "until" in step.control and step.number > 2:
                 self._lighten(self.folder / f"{step.number - 2:06d}{SUFFIX}")
             self.heads.append(step.head)
@@ -383,20 +367,14 @@ class Store:
                     self._put_together(layout, Journal(self.folder, ours=True), complete=False)
 
     def _lighten(self, record: Path) -> None:
-        """Take from a record what only the next step starts from: the last two have it, one may be lost."""
+        """Remove restart data from an older record; the last two keep it, since one may be lost."""
         with self.writing("the journal"):
-            about, before = read_step(record, companion=False, check=False)
+            about, before = read_record(record)
             with self._replacing(record) as path:
-                write_record(path, about, before)
+                write_record(path, about["run"], before, about["loads"])
 
     def finish(self) -> None:
-        """Write the output and delete the journal.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the journal is kept.
-        """
+        """Write the output and delete the journal, which remains after an error."""
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
@@ -407,19 +385,7 @@ class Store:
     ) -> None:
         """Write the output of steps that are recorded elsewhere, and delete the journal.
 
-        Parameters
-        ----------
-        metadata : Metadata
-            Metadata of the run.
-        steps : iterable of Step
-            The steps, which are read twice: no generator.
-        trials : mapping of str to sequence
-            Solutions on other lattices, as for `hexcontact.result.layout.Layout`.
-
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written; the journal is kept.
+        The steps are read twice: no generator. `trials` as of `hexcontact.result.layout.Layout`.
         """
         with self._mutex:
             self._finish(Layout(metadata, [step.head for step in steps], trials), steps)
@@ -437,13 +403,7 @@ class Store:
             raise ValueError("the store is closed")
 
     def close(self, reason: str = "") -> None:
-        """Close the files; the journal of an unfinished run remains.
-
-        Parameters
-        ----------
-        reason : str
-            Reason of an early end, which is written to the journal.
-        """
+        """Close the files; the journal of an unfinished run remains, with the `reason` of an early end."""
         with self._mutex:
             if self._closed:
                 return

@@ -1,15 +1,13 @@
 """The lattices of an unfinished refinement, in the journal of its output.
 
-``out.nc.d/lattices/trials.json`` has the histories of the finished lattices. The load steps of the present
-lattice, and of the finest finished one, are in journals beside it: ``2_0.nc.d`` is level 2, not shifted.
+``out.nc.d/lattices`` has the header of the run, and the histories of each finished lattice: ``2_0.json`` is
+level 2, not shifted. The load steps of the present lattice, and of the finest finished one, are journals
+beside them: ``2_0.nc.d``.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import hashlib
-import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,141 +17,111 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import DeckError
-from ..files import beginning, made, reading, replacing, require_kinds
+from ..files import made, reading
 from ..lock import names_a_run
-from .journal import Journal, journal_of
+from .journal import (
+    HEADER,
+    Header,
+    Journal,
+    begins_like_sealed,
+    journal_of,
+    read_header,
+    read_sealed,
+    write_header,
+    write_sealed,
+)
 from .layout import Metadata
 
 if TYPE_CHECKING:
     from .result import Result
 
-VERSION = 2  # 1 had no checksum
 _JOURNAL = r"\d+_\d+\.nc\.d"
+_EARLIER = "trials.json"  # of the layouts 1 to 3
+_TEXT = rf"(\d+_\d+\.json|{re.escape(HEADER)}|{re.escape(_EARLIER)})(\.tmp)?"
 FOLDER = "lattices"  # in the journal
 
 
 class Solution(NamedTuple):
-    """The solution on one lattice.
+    """The histories of all load steps on one lattice."""
 
-    Parameters
-    ----------
-    level : int
-        How often the lattice was refined.
-    copy : int
-        0: the lattice itself, else the number of its shifted copy.
-    spacing : float
-        Spacing, m.
-    origin : tuple of float
-        Position of a node, m.
-    nodes : int
-        Nodes of its largest window.
-    histories : sequence of mapping
-        History of each load step.
-    """
-
-    level: int
-    copy: int
-    spacing: float
-    origin: tuple[float, float]
-    nodes: int
-    histories: Sequence[Mapping[str, Any]]
+    level: int  # number of refinements
+    copy: int  # 0: the lattice itself, else the number of its shifted copy
+    spacing: float  # m
+    origin: tuple[float, float]  # position of a node, m
+    nodes: int  # of its largest window
+    histories: Sequence[Mapping[str, Any]]  # by load step
 
 
 class TrialFolder:
-    """The lattices of an unfinished refinement.
-
-    Parameters
-    ----------
-    journal : Path
-        The journal of the output.
-    """
+    """The lattices of an unfinished refinement, in the journal of an output."""
 
     def __init__(self, journal: Path) -> None:
         self.folder = journal / FOLDER
-        self.ledger = self.folder / "trials.json"
 
     def __bool__(self) -> bool:
         """Test whether there are any."""
-        return self.ledger.exists()
+        return any((self.folder / name).exists() for name in (HEADER, _EARLIER))
 
     def path(self, level: int, copy: int = 0) -> Path:
         """Return the path of the output of a lattice, to which its journal belongs."""
         return self.folder / f"{level}_{copy}.nc"
 
-    def read(self) -> tuple[Metadata, list[Solution]]:
-        """Return the metadata of the run, and the finished lattices.
-
-        Raises
-        ------
-        DeckError
-            If the file is damaged or of another version.
-        """
-        path = self.ledger
-        with reading(path, "a list of finished lattices"):
-            about = json.loads(path.read_bytes())
-            require_kinds(about, solutions=list)
-            for solution in about["solutions"]:
-                require_kinds(solution, origin=list)
-            if about["trials_version"] not in (1, VERSION):
-                raise DeckError(
-                    f"{path} has the layout {about['trials_version']}; this version reads {VERSION}"
-                )
-            digest = about.pop("sha256", "")
-            if about["trials_version"] == VERSION and digest != _digest(about):
-                raise DeckError(f"{path} is damaged: its content is not what was written (SHA-256)")
-            found = [
-                made(Solution, {**solution, "origin": tuple(solution["origin"])})
-                for solution in about["solutions"]
-            ]
-            return Metadata.from_plain(about["metadata"]), found
-
-    def write(self, metadata: Metadata, solutions: Sequence[Solution]) -> None:
-        """Write the finished lattices to the disk as a whole."""
+    def begin(self, metadata: Metadata) -> None:
+        """Write the metadata of the run, also if it is resumed."""
         self.folder.mkdir(exist_ok=True)
-        about = {
-            "trials_version": VERSION,
-            "metadata": dataclasses.asdict(metadata),
-            "solutions": [solution._asdict() for solution in solutions],
-        }
-        about = json.loads(json.dumps(about, default=np.generic.item))  # as after reading
-        with replacing(self.ledger, self._temporary) as path:
-            path.write_text(json.dumps({"sha256": _digest(about), **about}), encoding="utf-8")
+        write_header(self.folder, Header(metadata))
 
-    def drop(self, level: int, copy: int = 0) -> None:
-        """Delete the load steps of a lattice."""
-        _clear(Journal(journal_of(self.path(level, copy))))
+    @property
+    def metadata(self) -> Metadata:
+        """Metadata of the run."""
+        if (earlier := self.folder / _EARLIER).exists():
+            raise DeckError(f"{earlier} was kept by an earlier version of hexcontact; run the deck again")
+        return read_header(self.folder).metadata
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """The finished lattices; DeckError if a file is damaged or of another run."""
+        run, found = self.metadata.run, []
+        for path in (path for path in self._texts() if re.fullmatch(r"\d+_\d+", path.stem)):
+            about = read_sealed(path)
+            self.check(run, about.pop("run"))
+            with reading(path, "a finished lattice"):
+                found.append(made(Solution, {**about, "origin": tuple(about["origin"])}))
+        return found
+
+    def add(self, solution: Solution) -> None:
+        """Write a finished lattice, and delete the load steps that are no longer needed."""
+        path = self.path(solution.level, solution.copy).with_suffix(".json")
+        write_sealed(path, {"run": self.metadata.run, **solution._asdict()})
+        if solution.copy:
+            _clear(Journal(journal_of(self.path(solution.level, solution.copy))))
+        elif solution.level:
+            _clear(Journal(journal_of(self.path(solution.level - 1))))
 
     def _latest(self) -> tuple[int, Journal]:
         """Return the level of the finest finished lattice, else 0, and its load steps."""
-        metadata, solutions = self.read()
-        level = max((solution.level for solution in solutions if not solution.copy), default=0)
+        level = max((solution.level for solution in self.solutions if not solution.copy), default=0)
         journal = Journal(journal_of(self.path(level)))
         if journal:
-            self.check(metadata, journal.metadata)
+            self.check(self.metadata.run, journal.run)
         return level, journal
 
-    def check(self, metadata: Metadata, of_lattice: Metadata) -> None:
+    def check(self, run: str, of_lattice: str) -> None:
         """Refuse load steps of a lattice of another run than that of the folder."""
-        if metadata.run != of_lattice.run:
-            raise DeckError(f"{self.folder} holds load steps of another run than {self.ledger}")
+        if run != of_lattice:
+            raise DeckError(f"{self.folder} holds load steps of another run than {self.folder / HEADER}")
 
     @property
     def kept(self) -> str:
         """Describe the finished lattices; empty without any."""
         if not self:
             return ""
-        if count := len(self.read()[1]):
+        if count := len(self.solutions):
             return f"{count} lattice{'s are' if count > 1 else ' is'} finished"
         return "load steps on the first lattice are finished" if self._latest()[1] else ""
 
     def result(self, path: Path) -> Result:
-        """Return the steps on the finest finished lattice, else on the first; `path` names the result.
-
-        Raises
-        ------
-        DeckError
-            If no step is finished.
-        """
+        """Return the steps on the finest finished lattice, else on the first; `path` names the result."""
         level, journal = self._latest()
         if not journal:
             raise DeckError(f"no load step of {path} was finished")
@@ -166,28 +134,32 @@ class TrialFolder:
 
     @property
     def is_ours(self) -> bool:
-        """Whether a run has written the list of finished lattices."""
-        return b'"trials_version": ' in beginning(self.ledger, 200)
+        """Test whether a run has written the header."""
+        return begins_like_sealed(self.folder / HEADER)
 
     def foreign(self) -> Iterator[Path]:
-        """Yield files named like those of a run, in a folder without a list of finished lattices."""
-        yield from (path for path in (self.ledger, self._temporary) if path.exists())
+        """Yield files named like those of a run, in a folder without a header."""
+        yield from self._texts()
         yield from (journal.files[0] for journal in self._journals() if journal.files and not journal.is_ours)
 
-    @property
-    def _temporary(self) -> Path:
-        return self.ledger.with_name(self.ledger.name + ".tmp")
+    def _named(self, pattern: str) -> list[Path]:
+        """Return the entries of the folder whose names match a pattern."""
+        names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
+        return [self.folder / name for name in names if re.fullmatch(pattern, name)]
+
+    def _texts(self) -> list[Path]:
+        """Return the header, the finished lattices, and remains of an interrupted write."""
+        return self._named(_TEXT)
 
     def _journals(self) -> list[Journal]:
         """Return the load steps of all lattices."""
-        names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
-        return [Journal(self.folder / name) for name in names if re.fullmatch(_JOURNAL, name)]
+        return [Journal(folder) for folder in self._named(_JOURNAL)]
 
     def remove(self) -> None:
         """Delete the files of runs, and no others."""
         for journal in self._journals():
             _clear(journal)
-        for path in (self.ledger, self._temporary):
+        for path in self._texts():
             path.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # it is missing, or has other files
             self.folder.rmdir()
@@ -209,10 +181,7 @@ def remove_all(folder: Path) -> None:
 
 
 def foreign_file(folder: Path) -> Path | None:
-    """Return a file named like one of a journal in a folder that no run has written to, or None.
-
-    A record or a list of finished lattices is the sign of a run.
-    """
+    """Return a file named like one of a journal in a folder that no run has written to, or None."""
     journal, trials = Journal(folder), TrialFolder(folder)
     if journal.is_ours or trials.is_ours:
         return None
@@ -224,7 +193,3 @@ def linked_folder(folder: Path) -> Path | None:
     trials = TrialFolder(folder)
     folders = [trials.folder, *(journal.folder for journal in trials._journals())]
     return next((path for path in folders if path.is_symlink()), None)
-
-
-def _digest(about: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(about).encode()).hexdigest()

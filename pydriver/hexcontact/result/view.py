@@ -1,4 +1,4 @@
-"""One load step of a result, for pictures and comparisons."""
+"""One load step of a result for pictures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..core.interpolation import linear
 from ..errors import NotInResult
 from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
-from .interpolate import is_kept, tractions_of
+from .interpolate import is_kept, nodal
 from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:
@@ -45,46 +45,18 @@ def title_of(dataset: xarray.Dataset) -> str:
 
 
 class StepView:
-    """One load step of a result for pictures; lengths in m, pressure in Pa.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case with the step (of several) and its loads.
-    number : int
-        Number of the step.
-    data : xarray.Dataset
-        All quantities of the step; the attributes are those of the result.
-    x, y, pressure : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes and contact pressure, as solved.
-    contact : ndarray of bool, shape (n_row, n_col)
-        Nodes with pressure.
-    lattice : Lattice
-        The window.
-    spacing : float
-        l_e.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows.
-    start : tuple of float
-        Position of the first node of the window, m.
-    center : tuple of float
-        Center of the Hertz contact, else of the pressure.
-    hertz : EllipticContact or None
-        Hertz solution, if the gap of the unworn surfaces is a quadratic form, and they are not worn.
-    source : str or None
-        Source of the tractions that are shown, "edges" or "nodes"; None: the edges where they are known.
-    """
+    """One load step of a result for pictures; SI units, arrays over the nodes of the window."""
 
     def __init__(self, dataset: xarray.Dataset, step: int, source: str | None = None) -> None:
-        self.source = source
+        self.source = source  # of the tractions; None: the edges where they are known
         self.data = step_of(dataset, step)
         self.number = int(self.data["step"])
         self.pressure = self.field("pressure")
-        self.contact = self.pressure > 0.0
+        self.contact = self.pressure > 0.0  # nodes with pressure
         self.x, self.y = dataset["x"].values, dataset["y"].values
         self.lattice = lattice_of(dataset)
-        self.spacing, self.basis = self.lattice.spacing, self.lattice.basis
-        self.start = self.lattice.start
+        self.spacing, self.basis = self.lattice.spacing, self.lattice.basis  # basis vectors as rows
+        self.start = self.lattice.start  # position of the first node of the window, m
         gap, load = QuadraticGap.of(dataset), float(self.data["normal_load"])
         if gap is None:
             weight = max(float(self.pressure.sum()), np.finfo(float).tiny)
@@ -97,15 +69,7 @@ class StepView:
 
     @classmethod
     def of(cls, result: AnyResult, step: int, source: str | None = None) -> StepView:
-        """Return the view of step number ``step`` (from 1; -1 is the last one) of a result.
-
-        Raises
-        ------
-        IndexError
-            If there is no such step.
-        ValueError
-            If the output lacks the pressure of that step.
-        """
+        """Return the view of step number ``step`` (from 1; -1 is the last one) of a result."""
         return cls(dataset_of(result), step, source)
 
     @property
@@ -125,13 +89,7 @@ class StepView:
         return math.copysign(math.hypot(x, y), x if abs(x) > abs(y) else y)
 
     def field(self, name: str) -> Array:
-        """Values of a field at the nodes.
-
-        Raises
-        ------
-        ValueError
-            If the output lacks the field, or lacks it in this step.
-        """
+        """Return the values of a field at the nodes; NotInResult if the output lacks it in this step."""
         words = spelled(name)
         if name not in self.data:
             if self.friction == 0.0 and name in VARIABLES and VARIABLES[name].frictional:
@@ -148,13 +106,7 @@ class StepView:
 
     @property
     def stick(self) -> Mask:
-        """Nodes that stick.
-
-        Raises
-        ------
-        ValueError
-            If the contact has no friction, or the output lacks its zones.
-        """
+        """Nodes that stick; NotInResult without friction, or without the zones in the output."""
         if self.friction == 0.0:
             raise NotInResult("a contact without friction has no stick and slip zones")
         return np.asarray(self.field("zone") == STICK)
@@ -188,7 +140,7 @@ class StepView:
     @functools.cached_property
     def tractions(self) -> TractionField:
         """Pressure and shear traction at any point, from the source."""
-        return tractions_of(self.data, self.lattice, self.source)
+        return nodal(self.data, self.lattice).traction_field(self.source)
 
     @functools.cached_property
     def _at_nodes(self) -> dict[str, Array]:
@@ -220,7 +172,7 @@ class StepView:
         return np.asarray(self.at(x, y, distances) > 0.0)
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
-        """Return the limits of a picture of the contact, and of what is worn: x_min, x_max, y_min, y_max."""
+        """Return the limits of a picture of the contact and the worn area: x_min, x_max, y_min, y_max."""
         zone = self.contact | (self.field("worn_depth") > 0.0) if self.has("worn_depth") else self.contact
         zone = zone if zone.any() else np.ones_like(zone)
         x, y = self.x[zone], self.y[zone]

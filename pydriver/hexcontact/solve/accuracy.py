@@ -1,11 +1,10 @@
-"""Estimates the distance of a result from the limit of vanishing spacing, by solutions on several lattices.
+"""Estimates of the distance from the limit of vanishing spacing, by solutions on several lattices.
 
 The lattice is refined by the square root of two from solution to solution. The difference of a solution and
 the limit has two parts: a trend with the spacing, and a scatter, since the contact lies differently on every
-lattice. The scatter is often the larger part, so that a pair of lattices shows little; it is measured at the
-least cost, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by fractions of
-it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same
-way for every scalar of the history and every load step.
+lattice. The scatter is often the larger part. It is measured at the least cost on shifted copies of a coarser
+lattice: of the same spacing, with another origin. The core fits both parts to the last solutions, for every
+scalar of the history and every load step (fortran/path/discretization_error.f90).
 """
 
 from __future__ import annotations
@@ -45,25 +44,10 @@ def driven(target: LoadStep) -> set[str]:
 
 
 def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep]) -> list[dict[str, float]]:
-    """Estimate the discretization error of every scalar of the finest solution.
+    """Estimate the discretization error of every scalar of the finest solution, by load step.
 
-    Parameters
-    ----------
-    solutions : sequence of Solution
-        At least three levels, and shifted copies.
-    targets : sequence of LoadStep
-        The load steps.
-
-    Returns
-    -------
-    list of dict of str to float
-        For each load step the error (>= 0, in the unit of the quantity) by the name of the quantity: 0 if it
-        is prescribed, NaN without a value on one of the lattices.
-
-    Raises
-    ------
-    ValueError
-        If there are too few solutions for three unknowns.
+    The error has the unit of its quantity: 0 if that is prescribed, NaN without a value on one of the
+    lattices. Three levels and shifted copies are needed, else ValueError.
     """
     best = finest(solutions)
     used = [s for s in solutions if s.level > best.level - LEVELS_FITTED]
@@ -89,15 +73,7 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
 
 
 def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the largest errors of the quantities that have the target, over their largest value.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each load step.
-    errors : sequence of mapping
-        Their errors.
-    """
+    """Return the largest error of each of the `JUDGED` quantities, over its largest value."""
     found = {}
     for name in JUDGED:
         if name in errors[0]:

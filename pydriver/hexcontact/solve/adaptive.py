@@ -1,7 +1,7 @@
 """Paths through load steps that are given, or chosen during the solution, ``steps = "auto"``.
 
 A chosen load step is solved as a whole and in two halves, on two independent paths; the halves are recorded.
-The change by halving, which has a bound, decides on the step and on the size of the next one; see
+The difference decides whether the step is accepted, and the size of the next one; see
 `hexcontact.core.steps`.
 """
 
@@ -18,6 +18,7 @@ from ..core.friction import ContactState
 from ..core.steps import (
     FAILED,
     LIMITED,
+    NO_CHANGE,
     REJECTED,
     Attempt,
     Change,
@@ -28,7 +29,7 @@ from ..core.steps import (
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from .frictional import FrictionWindow
+from .window import FrictionWindow
 
 
 class _Rim(Exception):
@@ -48,47 +49,17 @@ class _Solved(NamedTuple):
 
 
 class GivenPath:
-    """A path through load steps that are given.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    window : Window
-        Window to start with.
-    before : sequence of Step
-        The solved steps.
-
-    Attributes
-    ----------
-    window : Window
-        The present window.
-    position : int
-        Index of the present load step of the case.
-    """
+    """A path through given load steps, on a window that grows with the contact."""
 
     def __init__(self, case: Problem, window: Any, before: Sequence[Step]) -> None:
         self.case, self.window = case, window
         self.position = len(before)
 
     def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
-        """Solve a load step; one that reaches the rim is solved again on a larger window.
+        """Solve a load step; yield it with the state at its end.
 
-        Parameters
-        ----------
-        state : state of the solver or None
-            End of the last load step.
-        target : LoadStep
-            The load step.
-        begun : mapping of str to float
-            Loads and motions at the beginning of its segment.
-
-        Yields
-        ------
-        step : Step
-            The finished step.
-        state : state of the solver
-            Its end.
+        `begun` has the loads and motions at the beginning of its segment. If the contact reaches the rim, the
+        step is solved again on a larger window.
         """
         started = time.perf_counter()
         state, reached = self._reached(state, target, target.values(begun))
@@ -116,26 +87,7 @@ class GivenPath:
 
 
 class AdaptivePath(GivenPath):
-    """The two paths through a load history, with the choice of their load steps.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    window : FrictionWindow
-        Window to start with.
-    before : sequence of Step
-        The solved steps: heads, the last one with all its fields.
-
-    Attributes
-    ----------
-    window : FrictionWindow
-        The present window.
-    position : int
-        Index of the present load step of the case.
-    fraction : float
-        Its finished fraction.
-    """
+    """The two paths through a load history, with the choice of its load steps."""
 
     def __init__(self, case: Problem, window: FrictionWindow, before: Sequence[Step]) -> None:
         super().__init__(case, window, ())
@@ -170,24 +122,7 @@ class AdaptivePath(GivenPath):
     def steps(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
     ) -> Iterator[tuple[Step, ContactState]]:
-        """Solve the rest of an adaptive segment, or a load step of given size.
-
-        Parameters
-        ----------
-        state : ContactState or None
-            End of the last load step.
-        target : LoadStep
-            The segment.
-        begun : mapping of str to float
-            Loads and motions at its beginning.
-
-        Yields
-        ------
-        step : Step
-            Each load step when it is finished.
-        state : ContactState
-            Its end.
-        """
+        """Solve the rest of an adaptive segment, or a given load step; yield each step and its end."""
         if target.ramp is None:
             for step, reached in super().steps(state, self._numbered(target), begun):
                 yield self._given(step), reached
@@ -198,7 +133,7 @@ class AdaptivePath(GivenPath):
             attempt, taken, verdict = self._taken(state, target, begun)
             found = taken.change
             bound, traction_bound = self._size.accept(attempt, found, tolerance, verdict)
-            reached = dataclasses.replace(taken.halves, **self._work)
+            reached = taken.halves.recounted(**self._work)
             part = dataclasses.replace(self._numbered(target.until(attempt.end)), ramp=target.ramp)
             step = self.window.step(part, reached, self._before, started)
             contact = float(step.history["contact_area_fit"])
@@ -218,7 +153,7 @@ class AdaptivePath(GivenPath):
             yield self._placed(dataclasses.replace(step, history=history), attempt.end), state
 
     def _placed(self, step: Step, fraction: float) -> Step:
-        """Return a load step with the data that the choice and solution of the next one need."""
+        """Return a load step with the restart data of the next one."""
         self._number += 1
         count = len(self.case.load_steps)
         done = (self.position + fraction) / count
@@ -244,17 +179,7 @@ class AdaptivePath(GivenPath):
     def _taken(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
     ) -> tuple[Attempt, _Solved, int]:
-        """Attempt load steps until one is accepted, or smaller ones do not help.
-
-        Returns
-        -------
-        attempt : Attempt
-            The accepted step.
-        solved : _Solved
-            Its solution.
-        verdict : int
-            ACCEPTED or LIMITED.
-        """
+        """Try load steps until one is accepted, or smaller ones do not help; return it with its verdict."""
         assert target.ramp is not None
         tolerance = self.case.solver.step_tolerance
         self._before, self._work = state, {"sweeps": 0, "operator_applications": 0.0}
@@ -270,7 +195,7 @@ class AdaptivePath(GivenPath):
                 return attempt, solved, verdict
 
     def _tried(self, target: LoadStep, begun: Mapping[str, float], end: float) -> _Solved | None:
-        """Solve a load step as a whole and in halves, the window growing as needed; None: not converged."""
+        """Solve a load step as a whole and in halves on a growing window; None without convergence."""
         while True:
             try:
                 return self._solved(target, begun, end)
@@ -287,7 +212,7 @@ class AdaptivePath(GivenPath):
         if whole is None:
             return None
         if self._whole is None and is_shear_free(start) and is_shear_free(whole):
-            return _Solved(whole, whole, Change())  # no history, so that no halves are needed
+            return _Solved(whole, whole, NO_CHANGE)  # no history, so that no halves are needed
         half = self._advanced(start, target, begun, 0.5 * (self.fraction + end))
         halves = None if half is None else self._advanced(half, target, begun, end)
         if half is None or halves is None:

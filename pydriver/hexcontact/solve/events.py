@@ -1,4 +1,4 @@
-"""Events of a run and the listeners that follow it: a bar or lines on a terminal, the log, callbacks."""
+"""Events of a run, with the base class of their listeners."""
 
 from __future__ import annotations
 
@@ -16,46 +16,16 @@ class Listener:
     """Follows a run; a listener overrides the events that it needs."""
 
     def begun(self, title: str, steps: int) -> None:
-        """Note that a run begins.
-
-        Parameters
-        ----------
-        title : str
-            Title of the case.
-        steps : int
-            Number of load steps; 0 if it is open.
-        """
+        """Note that a run of `steps` load steps begins; 0 if their number is open."""
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
-        """Note that the load history begins again on another lattice.
-
-        Parameters
-        ----------
-        name : str
-            Its name: "lattice 3".
-        lattice : Lattice
-            Its first window.
-        shifted : bool
-            Whether it is a shifted copy, which only serves to estimate errors.
-        """
+        """Note the start on another lattice; a `shifted` copy only serves to estimate errors."""
 
     def step(self, step: Step) -> None:
-        """Note a finished load step, which is recorded by then."""
+        """Note a finished load step, after it was recorded."""
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Note any other event.
-
-        Parameters
-        ----------
-        event : str
-            Its name.
-        text : str
-            A sentence for the terminal; empty if it is for the log alone.
-        level : int
-            Severity, as in `logging`.
-        **values
-            Values of the event, SI.
-        """
+        """Note any other event: a sentence for the terminal (empty: for the log alone), values in SI."""
 
     def ended(self, error: BaseException | None) -> None:
         """Note the end of the run, by an error or without."""
@@ -94,14 +64,10 @@ class Stopped(Exception):
 
 
 class Callback(Listener):
-    """Calls a function of a script with each finished load step; the function may end the run.
+    """Calls a function of a script with each finished load step.
 
-    Parameters
-    ----------
-    on_step : callable
-        The function. If it returns something true, or raises `StopRun`, the run ends.
-    refines : bool
-        Whether other lattices may follow the last load step.
+    If the function returns a true value, or raises `StopRun`, the run ends. `refines`: other lattices may
+    follow the last load step.
     """
 
     def __init__(self, on_step: Callable[[Step], object], refines: bool = False) -> None:

@@ -52,21 +52,8 @@ def in_background(
 ) -> None:
     """Call `work` in a second thread while this one waits for it and for signals.
 
-    A signal cannot interrupt the compiled core, but it can interrupt a thread that waits.
-
-    Parameters
-    ----------
-    work : callable
-        The function.
-    pipe : tuple of int
-        The pipe of `signal_pipe`.
-    ends : callable
-        Tests whether a signal ends the work.
-
-    Raises
-    ------
-    Interrupted
-        If a signal ends the work; the thread may go on for a while.
+    A signal cannot interrupt the compiled core, but it can interrupt a waiting thread. A signal that `ends`
+    the work raises Interrupted; the thread may continue for a while.
     """
     reader, writer = pipe
     raised: list[BaseException] = []
@@ -77,7 +64,7 @@ def in_background(
             work()
         except BaseException as error:
             raised.append(error)
-        with contextlib.suppress(OSError):  # nobody waits any more
+        with contextlib.suppress(OSError):  # the waiting thread has ended
             os.write(own, bytes([0]))  # is the number of no signal
         os.close(own)
 

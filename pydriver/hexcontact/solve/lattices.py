@@ -1,4 +1,4 @@
-"""Refines the lattice of a case until its result reaches the target accuracy.
+"""Refinement of the lattice of a case until its result reaches the target accuracy.
 
 Lattices that get finer by the square root of two are solved one after the other, each with the whole load
 history, until the last two agree to the target. Then four shifted copies of the lattice two levels below,
@@ -29,7 +29,7 @@ from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener
-from .frictionless import require_memory
+from .memory_needed import require_memory
 from .steps import check_step, steps
 
 _SAME = 1e-12  # relative difference of equal spacings
@@ -37,27 +37,13 @@ _SAME = 1e-12  # relative difference of equal spacings
 
 @dataclass(frozen=True)
 class Refinement:
-    """A case on all its lattices, with the estimated errors.
-
-    Parameters
-    ----------
-    solutions : sequence of Solution
-        On all lattices, in the order of solution.
-    errors : sequence of mapping
-        Estimated error of each scalar by load step.
-    relative : mapping of str to float
-        Largest error of the quantities that have the target, over their largest value.
-    target : float
-        The target.
-    limit : str
-        Reason why the lattice was not refined further; empty if the target was reached.
-    """
+    """Solutions of a case on all its lattices, with the estimated errors."""
 
     solutions: Sequence[Solution]
-    errors: Sequence[Mapping[str, float]]
-    relative: Mapping[str, float]
+    errors: Sequence[Mapping[str, float]]  # of each scalar by load step
+    relative: Mapping[str, float]  # largest errors of the judged quantities over their largest values
     target: float
-    limit: str
+    limit: str  # reason why the lattice was not refined further; empty if the target was reached
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -101,20 +87,7 @@ class Refinement:
 
 
 def refine(case: Problem, solver: InMemory | OnDisk) -> Refinement:
-    """Solve a case on finer and finer lattices up to its accuracy or a limit.
-
-    Parameters
-    ----------
-    case : Problem
-        The case, with a target accuracy.
-    solver : InMemory or OnDisk
-        Solves it on a lattice, and records the load steps.
-
-    Raises
-    ------
-    DeckError, ConvergenceError, ResourceError
-        If a load step cannot be solved on one of the lattices.
-    """
+    """Solve a case on finer and finer lattices up to its accuracy or a limit."""
     assert case.accuracy is not None
     target = case.accuracy.target
     levels: list[Solution] = []
@@ -196,15 +169,7 @@ def _solved(
 
 
 class InMemory:
-    """Keeps the load steps of the finest lattice.
-
-    Parameters
-    ----------
-    steps : list of Step
-        The list for them.
-    listener : Listener
-        Follows the run, and may end it.
-    """
+    """Keeps the load steps of the finest lattice in a list."""
 
     in_memory = True
 
@@ -220,24 +185,16 @@ class InMemory:
 
 
 class OnDisk:
-    """Keeps finished lattices, and the load steps of the present one, in the journal of an output.
-
-    Parameters
-    ----------
-    store : Store
-        The output.
-    listener : Listener
-        Follows the run, and may end it.
-    """
+    """Keeps finished lattices, and the load steps of the present one, in the journal of an output."""
 
     in_memory = False
 
     def __init__(self, store: Store, listener: Listener) -> None:
         self._store, self.listener = store, listener
         self._trials = TrialFolder(store.folder)
-        self._solutions = self._trials.read()[1] if self._trials else []
+        self._solutions = self._trials.solutions if self._trials else []
         with store.writing("the journal"):
-            self._trials.write(store.metadata, self._solutions)
+            self._trials.begin(store.metadata)
 
     def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice, or its missing steps."""
@@ -254,13 +211,8 @@ class OnDisk:
                 check_step(case, last, found)
             before = [*store.heads[:-1], last] if last is not None else []
             solution = _solved(trial, case, self.listener, store.append, before)
-        self._solutions.append(solution)
         with self._store.writing(f"{trial.name}"):
-            self._trials.write(self._store.metadata, self._solutions)
-            if trial.copy:
-                self._trials.drop(trial.level, trial.copy)
-            elif trial.level:
-                self._trials.drop(trial.level - 1)
+            self._trials.add(solution)
         return solution
 
     @contextlib.contextmanager
@@ -269,7 +221,7 @@ class OnDisk:
         path, last = self._trials.path(trial.level, trial.copy), None
         if Journal(journal_of(path)):
             store, last = Store.reopened(path)
-            self._trials.check(self._store.metadata, store.metadata)
+            self._trials.check(self._store.metadata.run, store.metadata.run)
         else:
             store = Store(path, self._store.metadata, overwrite=True)
         store.interim = False

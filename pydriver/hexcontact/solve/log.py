@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from ..core.lattice import Lattice
 from ..errors import DeckError, HexcontactError
-from ..result.history import worth_showing
+from ..result.history_words import worth_showing
 from ..result.step import Step
 from ..text import visible
 from ..variables import RESIDUALS, label_of
@@ -142,21 +142,9 @@ class _Stream(logging.StreamHandler[IO[str]]):
 
 @contextlib.contextmanager
 def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> Iterator[None]:
-    """Write the log to a file, or if only a level is given to standard error; also an error that is raised.
+    """Write the log to a file, else with a level to standard error; also an error that is raised.
 
-    Parameters
-    ----------
-    file : Path or None
-        The file, to which the log is appended.
-    level : str or None
-        One of `LEVELS`; "info" if a file but no level is given.
-    spare : sequence of Path
-        Files that the log must not change: decks, results.
-
-    Raises
-    ------
-    DeckError
-        If the file cannot be written, or is one of `spare`.
+    The log is appended; `spare` are decks and results, which the log must not change.
     """
     if file is None and level is None:
         yield

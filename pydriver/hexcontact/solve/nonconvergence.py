@@ -45,21 +45,7 @@ class Worst(NamedTuple):
 def error(
     case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
 ) -> ConvergenceError:
-    """Return the error of a step that did not converge, or of gross sliding.
-
-    Parameters
-    ----------
-    case : Problem
-        The case.
-    lattice : Lattice
-        The window.
-    solution : NormalSolution or ContactState
-        The failed attempt.
-    target : LoadStep
-        The step.
-    values : tuple of float
-        Prescribed values for z, x, y and the twist.
-    """
+    """Return the error of a step that did not converge, or of gross sliding."""
     residuals = _residuals(case, solution, target)
     worst = _worst(case, lattice, solution, residuals, values)
     details = {

@@ -8,20 +8,14 @@ import sys
 from typing import IO, Any
 
 from ..core.lattice import Lattice
-from ..result.history import describe
+from ..result.history_words import describe
 from ..result.step import Step
 from ..text import cut, quantity, visible
 from .events import Listener
 
 
 class Lines(Listener):
-    """One line for each step, for files and pipes.
-
-    Parameters
-    ----------
-    stream : text file
-        Destination of the lines.
-    """
+    """Prints a line for each step, to files and pipes."""
 
     def __init__(self, stream: IO[str]) -> None:
         self.stream = stream
@@ -55,7 +49,7 @@ class Lines(Listener):
         self._print(f"step {number}  {describe(step.history)}")
 
     def _print(self, line: str) -> None:
-        with contextlib.suppress(OSError):  # the reader is gone; the run goes on
+        with contextlib.suppress(OSError):  # the reader has closed; the run continues
             print(visible(line), file=self.stream, flush=True)
 
 

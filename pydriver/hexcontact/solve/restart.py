@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,6 @@ from ..deck.recorded import recorded
 from ..errors import DeckError, HexcontactError, PlausibilityWarning, warn
 from ..problem import plausibility
 from ..problem.problem import Problem
-from ..result.check import PHYSICS, physics
 from ..result.journal import journal_of
 from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
@@ -28,27 +28,18 @@ from .run import checked, listeners, metadata_of, run_into, write_stresses
 from .steps import check_step
 from .wear import lacks_ends
 
+_PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
+_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
+
 
 @dataclass
 class Restart:
-    """An unfinished run that was reopened.
-
-    Attributes
-    ----------
-    case : Problem
-        The problem.
-    store : Store
-        The store of its steps.
-    before : list of Step
-        The finished steps: heads, the last one with all its fields.
-    warning : str
-        Reason why the result may differ from that of an uninterrupted run; may be empty.
-    """
+    """A run that is resumed: with all solved steps, the last one with its fields, and its warning."""
 
     case: Problem
     store: Store
     before: list[Step]
-    warning: str = ""
+    warning: str = ""  # reason why the result may differ from that of an uninterrupted run
 
 
 def resume(
@@ -117,13 +108,7 @@ def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
 def reopened(
     path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
 ) -> Iterator[Restart | None]:
-    """Open a run to resume it, and close it at the end; arguments and errors as `resume`.
-
-    Yields
-    ------
-    Restart or None
-        None if the run is finished.
-    """
+    """Open a run to resume it, and close it at the end; None if it is finished; arguments as of `resume`."""
     store, last = _found(output_of(Path(path)))
     refines = store is not None and bool(TrialFolder(store.folder))
     if store is None or (last is None and not refines):
@@ -148,11 +133,18 @@ def reopened(
         doubts = [older] * (store.metadata.version != __version__)
         if last is not None and lacks_ends(last):
             doubts.append(
-                f"step {last.number} has lost what the next cycle of wear starts from, which the last two "
-                "steps of a run keep; the further cycles are solved to the same tolerances after a new pair "
-                "of jumps, but are not those of an unbroken run"
+                f"the restart data of step {last.number} are missing, since only the last two steps of a run "
+                "keep them; the further cycles of wear are solved to the same tolerances after a new pair of "
+                "jumps, but differ from those of an uninterrupted run"
             )
         yield Restart(case, store, before, "; ".join(doubts))
+
+
+def physics(deck: str) -> dict[str, Any]:
+    """Return the tables of a deck that belong to the problem, without those of solution and output."""
+    tables = tomllib.loads(deck)
+    solver = {key: value for key, value in tables.get("solver", {}).items() if key in _PHYSICS}
+    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
 def output_of(path: Path) -> Path:
@@ -186,7 +178,7 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
     """Return the case of the run."""
     for key in overrides:
         table, _, name = key.partition(".")
-        if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
+        if table != "solver" or name.partition(".")[0] in ("", *_PHYSICS):
             raise DeckError(
                 f"{key}: a resumed run may only change how it is solved, such as solver.tolerance"
             )
@@ -235,7 +227,7 @@ def _continued(store: Store, case: Problem) -> Metadata:
     ]
     done = f"step {len(store.heads)}"
     if trials := TrialFolder(store.folder):
-        done = f"{len(trials.read()[1])} lattices"
+        done = f"{len(trials.solutions)} lattices"
     line = f"{now()} resumed after {done} by hexcontact {__version__}"
     return dataclasses.replace(
         old, deck=new.deck, parameters=new.parameters, resumed=(*old.resumed, ", ".join([line, *changed]))

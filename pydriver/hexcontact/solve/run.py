@@ -1,4 +1,4 @@
-"""Runs a case from its first load step to the result, in memory or into a file."""
+"""Running of a case from its first load step to the result, in memory or into a file."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.preview import parameters_of
 from ..problem.problem import Problem
 from ..problem.refinement import coarser
-from ..result.history import limited_steps
+from ..result.history_words import limited_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import quantity, visible
 from .events import Callback, Listener, Listeners, Stopped
-from .frictionless import require_memory
 from .log import Log
+from .memory_needed import require_memory
 from .progress import reporter
 from .steps import steps
 
@@ -60,45 +60,10 @@ def run(
     on_step: Callable[[Step], object] | None = None,
     progress: Listener | bool | None = None,
 ) -> Result:
-    """Solve a case.
+    """Solve a case, with an output into a file; arguments and exceptions as of `hexcontact.Case.run`.
 
-    Parameters
-    ----------
-    case : Problem
-        The checked problem.
-    output : path, optional
-        netCDF file to write; each step is on the disk before the next begins. Without it the
-        result is in memory only, whatever the deck says.
-    overwrite : bool
-        Replace an output that is there already.
-    on_step : callable, optional
-        Called with each finished `Step`, after it was written; of every lattice, if the case has a target
-        accuracy. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
-        exception ends it, too, and is raised.
-    progress : Listener or bool, optional
-        Follows the run; True: a bar on a terminal, lines otherwise.
-
-    Returns
-    -------
-    Result
-        All load steps, or those up to where `on_step` ended the run. With an output, the run can be resumed
-        from there (`hexcontact.resume`).
-
-    Warns
-    -----
-    AccuracyWarning
-        If the lattice could not be refined to the accuracy of the case.
-    PathWarning
-        If a static load step, or one that begins without contact, was solved in parts.
-
-    Raises
-    ------
-    DeckError
-        If the output cannot be written, or the contact outgrows a fixed window.
-    ConvergenceError
-        If a load step misses its tolerance; with an output, the steps before it are recorded.
-    ResourceError
-        If there is not enough memory or disk.
+    `on_step` is called after a step was written; with a target accuracy, with those of every lattice. With an
+    output a run that it ends can be resumed.
     """
     listener = listeners(case, progress, on_step)
     if output is None:
@@ -145,23 +110,10 @@ def _in_memory(case: Problem, listener: Listener) -> Result:
 
 
 def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:
-    """Solve a case into a store, up to the finished output.
+    """Solve a case into a store, up to the finished output with its tables.
 
-    Parameters
-    ----------
-    case : Problem
-        The checked problem.
-    store : Store
-        Takes the steps; finished lattices of a refinement in it are not solved again.
-    listener : Listener
-        Follows the run, and may end it.
-    before : sequence of Step
-        The steps in the store, as for `steps`.
-
-    Raises
-    ------
-    DeckError, ConvergenceError, ResourceError
-        As `run`.
+    `before` are the steps in the store, as of `steps`. Finished lattices of a refinement in it are not solved
+    again.
     """
     solve_into(case, store, listener, before)
     if store.finished:
@@ -206,7 +158,8 @@ def write_stresses(
     if not missing:
         return
     from ..interior.extremes import with_errors
-    from ..interior.files import computed, tables_of, write_netcdf
+    from ..interior.files import tables_of, write_netcdf
+    from ..result.below import computed
     from ..result.export import kept_steps
 
     result = open_result(output)
@@ -228,7 +181,7 @@ def _on_coarser(
     result: Result, case: Problem | None, names: list[str], listener: Listener
 ) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
-    from ..interior.files import computed
+    from ..result.below import computed
     from ..result.export import kept_steps
     from ..result.result import Result
 

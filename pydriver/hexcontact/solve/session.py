@@ -119,7 +119,6 @@ class Session:
         self._log.begun(case.title, case.planned_steps)
         self._loads: list[dict[str, Any]] = []  # entries of [[load]] that `advance` applied
         self._resting = _AT_REST  # those that were zero in all steps
-        self._length = self._end = 0  # characters of the deck before `advance`, and in the last record
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
         self._closed = False
@@ -163,7 +162,7 @@ class Session:
 
         _ = self.step
         if self._store is None:
-            about = self._described(self._loads, len(self._steps)) if self._by_hand else self._about
+            about = self._about_loads(self._loads) if self._by_hand else self._about
             return Result(functools.partial(assemble, about, self.steps, self._whole))
         return open_result(self._store.path)
 
@@ -259,6 +258,8 @@ class Session:
         history = self._unrolled(before, entry)
         if not self._by_hand:
             self._by_hand, self._loads, self._solving = True, before, None
+            if self._store is not None:
+                self._store.describe(self._about_loads([]), list(map(load_as_toml, before)))
             self._log.begun(self.case.title, 0)
         self._driven.load_steps = history.steps
         segment = int(self._steps[-1].history["segment"]) if self._steps else 0
@@ -274,13 +275,9 @@ class Session:
             except BaseException:
                 self._queue.clear()
                 self._loads += self._resolved(self._steps[done:])
-                # what the deck gained is no entry of these: the next record has all of it
-                self._length = self._end = 0
-                if self._store is not None:
-                    self._store.metadata = self._described(self._loads, len(self._steps))
                 raise
         self._loads.append(entry)
-        self._length, self._history = self._end, history
+        self._history = history
         return self.step
 
     @_one_at_a_time
@@ -312,27 +309,21 @@ class Session:
     def _next_step(self, done: int = 0, load: dict[str, Any] | None = None) -> Step:
         """Solve the next load step and record it; after a failure the last finished step is the start again.
 
-        Parameters
-        ----------
-        done : int
-            Number of steps before `advance` was called.
-        load : dict, optional
-            Entry of [[load]] for all steps from there, after the last one; default: one for each step.
+        `advance` was called after `done` steps; `load` is its entry of [[load]] after its last step, else
+        there is one by step.
         """
         assert self._solving is not None
         try:
             step = next(self._solving)
             resting = self._resting_in(step)
             if self._store is not None:
-                growth = self._grown(step, done, load) if self._by_hand else {}
-                self._store.append(step, **growth)
-                self._end = growth.get("kept", 0) + len(growth.get("added", ""))
+                self._store.append(step, self._added(step, done, load) if self._by_hand else ())
                 self._steps[-1:] = [before.head for before in self._steps[-1:]]
             self._resting = resting
         except BaseException:
             self._solving = None
             raise
-        if self.case.deck.wear:  # a cycle only starts from the one before, after `back` as the first one
+        if self.case.deck.wear:  # a cycle starts from the last one alone, after `back` without restart data
             self._steps[-1:] = [without_ends(before) for before in self._steps[-1:]]
         self._steps.append(step)
         self._log.step(step)
@@ -365,20 +356,16 @@ class Session:
             for step in steps
         ]
 
-    def _grown(self, step: Step, done: int, load: dict[str, Any] | None) -> dict[str, Any]:
-        """Return how the deck in the record of a step differs from that before; arguments as `_next_step`."""
-        assert self._store is not None
-        if not self._length:
-            self._store.metadata = self._described(self._loads, step.number)
-            self._length = self._end = len(self._store.metadata.deck)
+    def _added(self, step: Step, done: int, load: dict[str, Any] | None) -> tuple[int | str, ...]:
+        """Return how many loads of the deck remain in the record of a step, and those that it adds."""
+        kept = len(self._loads)
         if load is not None:
-            kept, loads = self._length, [load]
+            loads = [load]
         elif self._resting_in(step) == self._resting:
-            kept, loads = self._end, self._resolved([step])
+            kept, loads = kept + len(self._steps) - done, self._resolved([step])
         else:  # entries of earlier steps name the loads that are no longer zero
-            kept, loads = self._length, self._resolved([*self._steps[done:], step])
-        added = "".join(map(load_as_toml, loads))
-        return {"added": added, "kept": kept, "planned_steps": step.number}
+            loads = self._resolved([*self._steps[done:], step])
+        return kept, *map(load_as_toml, loads)
 
     def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> History:
         """Return the history with a new entry; DeckError for a wrong one."""
@@ -394,8 +381,8 @@ class Session:
             raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], NOWHERE)
         return history
 
-    def _described(self, loads: Sequence[dict[str, Any]], count: int) -> Metadata:
-        """Return the metadata of the result with a deck of these loads, and the number of their steps."""
+    def _about_loads(self, loads: Sequence[dict[str, Any]]) -> Metadata:
+        """Return the metadata of the result with a deck of these loads, as many as the finished steps."""
         tables = self.case.deck_tables
         lattice = self._steps[-1].lattice if self._steps else self.case.lattice
         # the same nodes, whatever the largest load is
@@ -407,7 +394,7 @@ class Session:
         # on this lattice only
         others = {key: table for key, table in tables.items() if key not in ("accuracy", "load")}
         deck = "".join([as_toml({**others, "grid": grid}), *map(load_as_toml, loads)])
-        return dataclasses.replace(self._about, deck=deck, planned_steps=count)
+        return dataclasses.replace(self._about, deck=deck, planned_steps=len(self._steps))
 
     # --- end ------------------------------------------------------------------------------------------------
 

@@ -16,14 +16,13 @@ from ..problem import plausibility
 from ..problem.loads import LoadStep
 from ..problem.preview import machine
 from ..problem.problem import Problem
-from ..result.history import unasked_path
+from ..result.history_words import unasked_path
 from ..result.step import Step
 from ..variables import LOADS
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
-from .frictional import FrictionWindow
-from .frictionless import NormalWindow, Window
 from .log import Log
+from .window import FrictionWindow, NormalWindow, Window
 
 _SAME = 1e-9  # relative difference of equal initial gaps
 
@@ -52,35 +51,13 @@ def steps(
     targets: Iterable[LoadStep] | None = None,
     listener: Listener | None = None,
 ) -> Iterator[Step]:
-    """Solve a case step by step.
+    """Solve a case step by step, and yield each load step when it is finished.
 
-    Parameters
-    ----------
-    case : Problem
-        The checked problem.
-    in_memory : bool
-        Whether the fields of all steps stay in memory, which is checked for them.
-    before : sequence of Step
-        The first steps, if they are solved: heads, the last one with all its fields. The further steps are
-        bit-identical to those of an uninterrupted run.
-    targets : iterable of LoadStep, optional
-        Further load steps in place of the rest of the case; each is taken after the one before is solved.
-    listener : Listener, optional
-        Follows the run, but for its finished steps; default: the log.
-
-    Yields
-    ------
-    Step
-        Each load step when it is finished.
-
-    Raises
-    ------
-    DeckError
-        If the contact outgrows a fixed window.
-    ConvergenceError
-        If a load step misses its tolerance, or the bodies slide.
-    ResourceError
-        If there is not enough memory.
+    `before` are the first steps, if they are solved: heads, the last one with all its fields; the others are
+    bit-identical to those of an uninterrupted run. `targets` replace the remaining load steps of the case,
+    and each is taken after the step before is solved. The listener follows all but the finished steps.
+    `in_memory`: the fields of all steps stay in memory, which is checked for them. Exceptions as of
+    `hexcontact.Case.run`.
     """
     listener = listener or Log()
     lattice = before[-1].lattice if before else case.lattice
@@ -104,7 +81,7 @@ def steps(
 
 
 def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) -> None:
-    """Report the beginning of the load history, or that it goes on after `done` steps."""
+    """Report the start of the load history, or its continuation after `done` steps."""
     solver = case.solver
     values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": machine()}
     values |= {"steps": case.planned_steps or "auto"} | ({"done": done} if done else {})

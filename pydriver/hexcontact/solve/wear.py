@@ -1,8 +1,8 @@
 """A path through the load history, and then through cycles that wear the surfaces: ``[wear]``.
 
-Of many cycles alike one is solved, with the gap as it is worn by then, and recorded as one load step: its
-end. What friction dissipates in it is worn off as many times as the jump to the next cycle says; see
-docs/theory/wear.md.
+Of many equal cycles one is solved on the worn gap, and its end is recorded as a load step. The dissipated
+energy of the cycle, by its Archard wear and the number of cycles in the jump, gives the wear up to the next
+solved cycle; see docs/theory/wear.md.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from ..core.steps import (
 from ..errors import ConvergenceError, DeckError, PathWarning
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
-from ..result.history import unclosed_cycle
+from ..result.history_words import unclosed_cycle
 from ..result.step import Step
 from ..variables import LOADS, RESIDUALS, WORN
 from .adaptive import GivenPath
-from .frictional import FrictionWindow, state_of
+from .window import FrictionWindow, state_of
 
 LABEL = "wear"  # of the cycles that wear, which are no part of the load history
 MOST_UNWORN = 50  # cycles on unworn surfaces, until they close
@@ -51,11 +51,11 @@ _LEAST = 1e-12  # smallest jump, as a share of all cycles
 
 @dataclass(frozen=True)
 class _Cycle:
-    """A cycle that was solved, and how it was reached.
+    """A solved cycle, and the jump to it.
 
-    `state` is its end, with all that was slipped and dissipated before it; `energy` (J/m2), `path` (m) and
-    `spent` (J) are of the cycle alone. `change` is by how much jumps of half the size differ so far (m).
-    A cycle between two jumps knows until when the second one lasts, and the energy by which that wears.
+    `state` is its end, with the slip and dissipation of all cycles before it; `energy` (J/m2), `path` (m) and
+    `spent` (J) are of the cycle alone. `change` (m) is the sum of the changes of the depth by jumps of half
+    the size. Between two jumps, `until` is the end of the second jump and `ahead` its wear energy.
     """
 
     lattice: Lattice
@@ -84,33 +84,25 @@ class _Cycle:
 
 
 class _Ends:
-    """How the load steps of the cycle ended when they were last solved, and what a cycle changes of it.
+    """Last solution of each load step of the cycle and its rate per cycle, used as initial guess.
 
-    The next cycle starts from there; in single precision, which a start needs no more than. The first load
-    step is the one onto the worn gap.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        The window.
-    count : int
-        Number of load steps.
+    Single precision is enough for an initial guess. The first load step is the one onto the worn gap.
     """
 
     def __init__(self, lattice: Lattice, count: int) -> None:
         self.lattice = lattice
-        # tractions and their rates by cycle; motions and theirs; cycles by then, none yet
+        # tractions and their rates per cycle; motions and their rates; cycles at that time, none yet
         self.fields = np.zeros((count, 2, 3, *lattice.shape), dtype=np.float32)
         self.numbers = np.zeros((count, 2, len(MOTION)))
         self.cycles = np.full(count, -1.0)
         self.before: tuple[Array, Array] | None = None  # pressure and motions expected of the last load step
 
     def guess(self, step: int, cycles: float, state: ContactState) -> tuple[Array, Array] | None:
-        """Return tractions and motions to start a load step from, after one whose end `state` was found.
+        """Return the initial guess (tractions, motions) of a load step from `state`; None at first.
 
-        The motions, as the pressure, are those of that end, and what is expected to change between the two:
-        so what the expectation misses at both of them is right, above all where the pressure stays as it is.
-        The shear traction, which turns round in a cycle, is the expected one.
+        Pressure and motions are those of `state` plus the change between the two extrapolations, so an error
+        common to both extrapolations cancels. The shear traction, which turns round in a cycle, is
+        extrapolated.
         """
         before, self.before = self.before, None
         if self.cycles[step] < 0.0:
@@ -126,7 +118,7 @@ class _Ends:
         return tractions, _motions(state) + (motions - before[1])
 
     def found(self, step: int, cycles: float, state: ContactState) -> None:
-        """Remember the end of a load step, in the place of the one before: records are written by then."""
+        """Store the end of a load step, and its rate per cycle."""
         passed = cycles - self.cycles[step] if self.cycles[step] >= 0.0 else 0.0
         remember_end(state, passed, self.fields[step])
         known, motions = self.numbers[step], _motions(state)
@@ -148,17 +140,7 @@ class _Ends:
 
 
 class WearPath(GivenPath):
-    """A path through load steps that are given, and cycles that wear the surfaces.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem.
-    window : FrictionWindow
-        Window to start with.
-    before : sequence of Step
-        The steps that are solved already: heads, the last one with all its fields.
-    """
+    """A path through given load steps, and cycles that wear the surfaces."""
 
     window: FrictionWindow
 
@@ -180,18 +162,7 @@ class WearPath(GivenPath):
             yield self._placed(step, 0.0), reached
 
     def after(self, state: Any) -> Iterator[Step]:
-        """Solve the cycles that wear the surfaces.
-
-        Parameters
-        ----------
-        state : ContactState
-            End of the load history, or of the last cycle.
-
-        Yields
-        ------
-        Step
-            Each cycle that was solved, at its end.
-        """
+        """Solve the cycles that wear the surfaces, from the end of the load history or of the last cycle."""
         self._started = time.perf_counter()
         if self._last is None:
             zero = np.zeros(self.window.lattice.shape)
@@ -209,7 +180,7 @@ class WearPath(GivenPath):
     # --- jumps --------------------------------------------------------------------------------------------
 
     def _next(self, cycle: _Cycle) -> _Cycle:
-        """Return the next cycle that is solved: after a jump that is given, or one that is small enough."""
+        """Return the next solved cycle: after a given jump, or after one that is small enough."""
         if cycle.ahead is not None:
             return self._solved(cycle, cycle.until, cycle.ahead)
         total = float(self._wear.cycles)
@@ -235,7 +206,7 @@ class WearPath(GivenPath):
         return dataclasses.replace(after, about=after.about | about)
 
     def _halfway(self, cycle: _Cycle, until: float) -> tuple[Change, _Cycle]:
-        """Return the cycle between two jumps, which knows the second one, and what their size changes."""
+        """Return the change by the size of the jumps, and the cycle between two jumps with the second one."""
         jump, cycle = 0.5 * (until - cycle.cycles), cycle.on(self.window)
         first, both = (self._ahead(cycle, times * jump) for times in (1.0, 2.0))
         after = self._solved(cycle, cycle.cycles + jump, first)
@@ -245,7 +216,7 @@ class WearPath(GivenPath):
         return change, dataclasses.replace(after, change=after.change + slower, until=until, ahead=second)
 
     def _ahead(self, cycle: _Cycle, jump: float) -> Array:
-        """Return the energy by which a jump wears, with the pressure after it."""
+        """Return the wear energy of a jump, with the pressure at its end."""
         cycle, window = cycle.on(self.window), self.window
         given = window.lattice, self.case.solved_pair, self.case.interface, window.candidate
         by_load = self.case.load_steps[-1].z.control == "force"
@@ -255,12 +226,12 @@ class WearPath(GivenPath):
     def _change(
         self, cycle: _Cycle, energies: tuple[Array, Array, Array], path: Array, jump: float
     ) -> tuple[Change, Array, Array]:
-        """Compare two jumps with one of both."""
+        """Compare two jumps with one of double length (Richardson)."""
         given = self.window.lattice, self.case.pair, self.window.friction, self._wear.coefficient
         return change_by_jump(*given, energies, path, jump, float(cycle.state.pressure.max()))
 
     def _begin_size(self, cycle: _Cycle) -> None:
-        """Choose the first jump: both halves wear as much as the largest pressure indents a node."""
+        """Choose the first jump: each half wears as much as the largest pressure indents a node."""
         none = 0.0 * cycle.energy
         change, *_ = self._change(cycle, (none, cycle.energy, none), cycle.path, 1.0)
         self._size.begin_with(min(1.0, 1.0 / max(change.added * self._wear.cycles, 1e-300)))
@@ -268,7 +239,7 @@ class WearPath(GivenPath):
     # --- cycles -------------------------------------------------------------------------------------------
 
     def _closed(self, start: _Cycle) -> _Cycle:
-        """Return the unworn cycle, repeated until its wear is known to the tolerance."""
+        """Return the unworn cycle, repeated until its wear is converged."""
         energies, tolerance = list[Array](), self._wear.tolerance
         # residuals are those of the load history: larger ones would decide whether it is closed
         usual, self._tolerance = self._tolerance, self.case.solver.tolerance
@@ -294,7 +265,7 @@ class WearPath(GivenPath):
         return start
 
     def _solved(self, cycle: _Cycle, until: float, worn_by: Array) -> _Cycle:
-        """Wear the surfaces by an energy a cycle until some cycles are done, and solve the cycle then."""
+        """Wear the surfaces by an energy per cycle until `until` cycles, and solve the cycle there."""
         cycle, jump = cycle.on(self.window), until - cycle.cycles
         depth, *_ = self._worn(cycle, worn_by, jump)
         window = self.window
@@ -305,7 +276,7 @@ class WearPath(GivenPath):
         missed = cycle.state.dissipated_energy_path_error
         state = self._unspent(cycle.state)
         *_, last = self.case.load_steps
-        # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
+        # the loads at the end of the cycle on the new gap; this slip is no part of the cycle
         state = self._unspent(self._through(state, [last], until)[0])
         state, about = self._through(state, self.case.cycle, until, first=1)
         energy, path = state.dissipation_density, state.accumulated_slip
@@ -329,7 +300,7 @@ class WearPath(GivenPath):
         )
 
     def _worn(self, cycle: _Cycle, energy: Array, jump: float) -> tuple[Array, float, float]:
-        """Return depth, volume and largest depth after a jump that wears by an energy a cycle."""
+        """Return depth, volume and largest depth after a jump with an energy per cycle."""
         window = self.window
         return worn(window.lattice, window.friction, self._wear.coefficient, energy, jump, cycle.worn)
 
@@ -355,7 +326,7 @@ class WearPath(GivenPath):
 
     @staticmethod
     def _unspent(state: ContactState) -> ContactState:
-        """Return a state from which slip and dissipated energy count anew."""
+        """Return a state with zero slip path and dissipated energy."""
         zero = np.zeros(state.pressure.shape)
         return dataclasses.replace(
             state,
@@ -396,7 +367,7 @@ class WearPath(GivenPath):
         return self._placed(step, cycle.cycles / self._wear.cycles, cycle)
 
     def _placed(self, step: Step, done: float, cycle: _Cycle | None = None) -> Step:
-        """Return a load step with all that the next cycle needs to be chosen and solved."""
+        """Return a load step with the restart data of the next cycle."""
         count = len(self.case.load_steps)
         known = np.flatnonzero(self._ends.cycles >= 0.0)
         beside = {f"end_{place}": self._ends.fields[place] for place in known}
@@ -415,7 +386,7 @@ class WearPath(GivenPath):
         return dataclasses.replace(step, control=control, companion=beside, load_fraction=done)
 
     def _restored(self, step: Step) -> _Cycle:
-        """Return the last cycle of a run that goes on."""
+        """Return the last cycle of a resumed run."""
         self._size = StepControl.from_record(step.control["chooser"], _LEAST)
         self._ends = _Ends.from_record(step, 1 + len(self.case.cycle))
         self._unworn = int(step.history["unworn_cycles"])
@@ -436,13 +407,13 @@ class WearPath(GivenPath):
 
 
 def without_ends(step: Step) -> Step:
-    """Return a cycle without what the next one starts from."""
+    """Return a step without restart data."""
     control = {name: value for name, value in step.control.items() if name != "end_cycles"}
     return dataclasses.replace(step, companion={}, control=control)
 
 
 def lacks_ends(step: Step) -> bool:
-    """Test whether a record has lost what the next cycle starts from, which the last two of a run keep."""
+    """Test whether a record has lost its restart data, which the last two of a run keep."""
     return max(step.control.get("end_cycles", [-1.0])) >= 0.0 and not step.companion
 
 

@@ -15,49 +15,25 @@ from ..deck.interface import FrictionKind, NodalCoefficient, TwoCoefficients
 from ..deck.kinds import Kind, OrShare, Quantity, Share, Whole, WordOr
 from ..deck.table_base import Table, kind_of
 from ..deck.units import NUMBER, UnitError, to_si
-from ..errors import DeckError
+from ..errors import DeckError, Fault
 from ..text import shown
-from .tables import Parameter, StudyFile
+from .study_file import Parameter, StudyFile
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter of a study, with unit, description and kind of its deck keys.
+    """Hold a parameter of a study, with unit, description and kind of its deck keys."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        Dotted keys of the deck, which share one value.
-    name : str
-        Name in the result.
-    units : str
-        SI unit; empty if it is no quantity.
-    long_name : str
-        Description.
-    kind : Kind or None
-        Kind of the values in the deck.
-    values : tuple
-        The values as in a deck; empty for a range in a Latin hypercube.
-    bounds : (float, float) or None
-        Ends of a range, SI.
-    scale : str
-        Spacing of the values in a range: linear or log.
-    dims : tuple of str
-        Dimensions of the result along which it varies.
-    formula : Formula or None
-        Expression that gives its value in each case.
-    """
-
-    keys: tuple[str, ...]
-    name: str
-    units: str
+    keys: tuple[str, ...]  # dotted, of the deck, which share one value
+    name: str  # in the result
+    units: str  # SI; empty if it is no quantity
     long_name: str
-    kind: Kind | None
-    values: tuple[Any, ...]
-    bounds: tuple[float, float] | None = None
-    scale: str = "linear"
-    dims: tuple[str, ...] = ()
-    formula: Formula | None = None
+    kind: Kind | None  # of the values in the deck
+    values: tuple[Any, ...]  # as in a deck; empty for a range in a Latin hypercube
+    bounds: tuple[float, float] | None = None  # ends of a range, SI
+    scale: str = "linear"  # spacing of the values in a range: linear or log
+    dims: tuple[str, ...] = ()  # of the result, along which it varies
+    formula: Formula | None = None  # its value in each case
 
     @property
     def key(self) -> str:
@@ -92,6 +68,12 @@ class Axis:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return float(value)
         return value if isinstance(value, str) else shown(value)
+
+
+def wrong(study: str, key: str, problem: str, value: str = "") -> DeckError:
+    """Return the error of a parameter of a study, a fault of its key."""
+    message = f"{study}: parameter {key}{value and ' = '}{value}: {problem}"
+    return DeckError(message, [Fault(message, key, value, sentence=problem)])
 
 
 def _field(deck: Table, key: str) -> tuple[Any, Any]:
@@ -139,7 +121,7 @@ def axis_of(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     units = _unit(kind)
     for key in entry.key[1:]:
         if _unit(_kind(_field(deck, key)[0], values)) != units:
-            raise DeckError(f"{study}: parameter {key}: expected a key with the unit of {entry.key[0]}")
+            raise wrong(study, key, f"expected a key with the unit of {entry.key[0]}")
     long_name = (info.description or "").partition(";")[0] if info else ""
     axis = Axis(entry.key, entry.label, units, long_name, kind, values)
     if entry.expression is not None:
@@ -155,26 +137,24 @@ def axis_of(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
 def _require_number(axis: Axis, source: str, study: str) -> Kind:
     if isinstance(axis.kind, Quantity | Whole):
         return axis.kind
-    problem = f"{source} needs a key that is a number; expected values instead"
-    raise DeckError(f"{study}: parameter {axis.key}: {problem}")
+    raise wrong(study, axis.key, f"{source} needs a key that is a number; expected values instead")
 
 
 def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
     """Return the ends of a range in SI."""
     assert entry.range is not None
-    where = f"{study}: parameter {axis.key}"
     kind = _require_number(axis, "a range", study)
     ends = []
     for value in entry.range:
         try:
             ends.append(float(kind.parse(value)))
         except PydanticCustomError as error:
-            raise DeckError(f"{where} = {shown(value)}: {error.message()}") from None
+            raise wrong(study, axis.key, error.message(), shown(value)) from None
     low, high = ends
     if not (math.isfinite(low) and math.isfinite(high)) or low == high:
-        raise DeckError(f"{where} = {shown(entry.range)}: expected two different, finite bounds")
+        raise wrong(study, axis.key, "expected two different, finite bounds", shown(entry.range))
     if entry.scale == "log" and not (low > 0 and high > 0):
-        raise DeckError(f"{where} = {shown(entry.range)}: a logarithmic scale needs bounds above 0")
+        raise wrong(study, axis.key, "a logarithmic scale needs bounds above 0", shown(entry.range))
     return low, high
 
 
@@ -199,7 +179,7 @@ def dimensions(
                 elif source is not None and source.name not in placed:
                     problem = f"{name} has an expression itself; expected one above this parameter"
                 if problem:
-                    raise DeckError(f"{study}: parameter {axis.key}: expression: {problem}")
+                    raise wrong(study, axis.key, f"expression: {problem}")
                 used |= set(placed[source.name].dims if source else ())
             placed[axis.name] = replace(axis, dims=tuple(dim for dim in together if dim in used))
     if file.combine == "lhs":
@@ -232,7 +212,7 @@ def _is_number(deck: Table, key: str) -> bool:
 def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str, Any], study: str) -> Any:
     """Return the value of a formula in a case, as its deck holds it."""
     assert axis.formula is not None
-    numbers, where = {}, f"{study}: parameter {axis.key}: expression"
+    numbers = {}
     for name in axis.formula.names:
         key, _ = _key_of(name, axes)
         info, default = _field(deck, key)
@@ -243,11 +223,12 @@ def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str
         try:
             numbers[name] = default if value == {} or kind is None else float(kind.parse(value))
         except PydanticCustomError as error:
-            raise DeckError(f"{where}: {key} = {shown(value)}: {error.message()}") from None
+            problem = f"expression: {key} = {shown(value)}: {error.message()}"
+            raise wrong(study, axis.key, problem) from None
     try:
         found = axis.formula.value(numbers)
     except ValueError as error:
-        raise DeckError(f"{where}: {error}") from None
+        raise wrong(study, axis.key, f"expression: {error}") from None
     return axis.in_deck(found)
 
 
@@ -272,8 +253,7 @@ def refuse_namesakes(axes: Sequence[Axis], groups: Sequence[str | None], study: 
         taken = [name for name in (axis.name, group) if name in VARIABLES or name in _TAKEN]
         taken += [axis.name] * (names.count(axis.name) > 1) + [str(group)] * (group in names)
         if taken:
-            problem = f"the name {taken[0]} is taken; choose another with name"
-            raise DeckError(f"{study}: parameter {axis.key}: {problem}")
+            raise wrong(study, axis.key, f"the name {taken[0]} is taken; choose another with name")
 
 
 def refuse_twins(axes: Sequence[Axis], study: str) -> None:
@@ -283,4 +263,4 @@ def refuse_twins(axes: Sequence[Axis], study: str) -> None:
             continue
         entries = [axis.coordinate(value) for value in axis.values]
         if twins := [value for value in entries if entries.count(value) > 1]:
-            raise DeckError(f"{study}: parameter {axis.key}: has the value {shown(twins[0])} twice")
+            raise wrong(study, axis.key, f"has the value {shown(twins[0])} twice")

@@ -1,19 +1,19 @@
-"""Backends, which run the cases of a study: their interface, their registration, their keys in study files.
+"""Backends, which run the cases of a study: executors of `concurrent.futures` with a key in study files.
 
 Each module in `backends` registers one; no other module names them.
 """
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ..deck.kinds import Kind, refuse
-from .job import Job, Outcome
+from .job import Job, Outcome, solve_case
 
 T = TypeVar("T", bound=type)
 
@@ -53,16 +53,13 @@ def backend(word: str, annotation: Any = None, default: Any = None) -> Callable[
     return register
 
 
-class Backend:
-    """A backend: it runs cases, several at a time.
+class Backend(Executor):
+    """Run cases, several at a time, with the settings of the backend in a study file.
 
-    Parameters
-    ----------
-    settings : object
-        Value of the key of the backend in a study file.
-    cases : int
-        Number of cases to run, at least 1.
+    Leaving its context cancels jobs that have not begun, and ends processes started here.
     """
+
+    apart = False  # whether an earlier attempt at a case may still run when another begins
 
     def __init__(self, settings: Any, cases: int) -> None:
         raise NotImplementedError
@@ -71,23 +68,22 @@ class Backend:
     def load(settings: Any) -> None:
         """Import the packages that it needs; called in the main thread."""
 
-    def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
-        """Run the jobs and yield the outcome of each when it ends, until `cancel` is set."""
-        raise NotImplementedError
-
-    def stop(self) -> None:
-        """Cancel jobs that have not begun, and end processes started here."""
-        raise NotImplementedError
+    def outcome(self, future: Future[Outcome], job: Job) -> Outcome:
+        """Return the outcome of a job that has ended; errors that are not those of a worker are raised."""
+        return future.result()
 
 
-def arrived(
-    outcomes: queue.Queue[Outcome | BaseException], count: int, cancel: threading.Event
-) -> Iterator[Outcome]:
-    """Yield `count` outcomes from a queue, fewer if `cancel` is set; raise exceptions in it."""
-    while count and not cancel.is_set():
-        with contextlib.suppress(queue.Empty):
-            outcome = outcomes.get(timeout=_POLL)
-            if isinstance(outcome, BaseException):
-                raise outcome
-            count -= 1
-            yield outcome
+def outcomes(pool: Backend, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
+    """Run jobs and yield the outcome of each when it ends, until `cancel` is set."""
+    ended: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
+    running: dict[Future[Outcome], Job] = {}
+    for job in jobs:
+        future = pool.submit(solve_case, job, pool.apart)
+        running[future] = job
+        future.add_done_callback(ended.put)
+    while running and not cancel.is_set():
+        try:
+            future = ended.get(timeout=_POLL)
+        except queue.Empty:
+            continue
+        yield pool.outcome(future, running.pop(future))

@@ -30,18 +30,7 @@ _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fail
 
 
 class StudyFolder:
-    """The files of a study.
-
-    Parameters
-    ----------
-    output : Path
-        The netCDF file of the study; the folder has its name without the ending.
-
-    Raises
-    ------
-    DeckError
-        If the folder or the file cannot be those of a study.
-    """
+    """Keep the files of a study in the folder named as its netCDF file, without the ending."""
 
     def __init__(self, output: Path) -> None:
         if output.suffix != ".nc":

@@ -64,21 +64,9 @@ class Outcome:
 
 
 def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
-    """Run one case and write its file.
+    """Run one case, write its file, and return the outcome, also of a failure.
 
-    Parameters
-    ----------
-    job : Job
-        The case.
-    apart : bool
-        Write to a file of this attempt first, since another attempt may still run.
-    listener : Listener, optional
-        Receives the progress, besides the log.
-
-    Returns
-    -------
-    Outcome
-        Also of a failure, which is not raised.
+    An attempt `apart` writes to a file of its own first, since another attempt may still run.
     """
     from ..problem.problem import Problem
     from ..result.store import Store

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -13,13 +13,13 @@ from ..deck.keys import Deck
 from ..deck.read import assemble
 from ..deck.toml import with_overrides
 from ..deck.write import as_toml
-from ..errors import DeckError
+from ..errors import DeckError, Fault
 from ..problem.checks import checked
 from ..problem.problem import Problem
 from ..text import shown
-from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins
+from .axes import Axis, axis_of, dimensions, evaluated, refuse_namesakes, refuse_twins, wrong
 from .job import MOST_CASES, hash_of
-from .tables import StudyFile
+from .study_file import StudyFile
 
 CheckLevel = Literal["windows", "decks", "nothing"]
 """What is checked when cases are planned."""
@@ -57,7 +57,8 @@ class PlannedCase:
         return hash_of(self.deck)
 
     def __str__(self) -> str:
-        return described(self.settings, self.names)
+        named = {self.names.get(key, key): value for key, value in self.settings.items()}
+        return ", ".join(f"{name} = {in_short(value)}" for name, value in named.items())
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,6 @@ class Plan:
     axes: tuple[Axis, ...]
     cases: tuple[PlannedCase, ...]
     dims: Mapping[str, int]
-
-
-def described(settings: Mapping[str, Any], names: Mapping[str, str]) -> str:
-    """Write the parameters of a case on one line, by the names of those keys that have one."""
-    named = {names.get(key, key): value for key, value in settings.items()}
-    return ", ".join(f"{name} = {in_short(value)}" for name, value in named.items())
 
 
 def in_short(value: object) -> str:
@@ -88,28 +83,11 @@ def plan(
     check: CheckLevel,
     skip_invalid: bool,
 ) -> Plan:
-    """Build and check all cases of a study.
+    """Build and check all cases of a study; raise a DeckError with a sentence for each fault.
 
-    Parameters
-    ----------
-    file : StudyFile
-        The study.
-    base : mapping
-        Its base deck, whose output file is ignored.
-    source : Source
-        Source of the base deck, for messages.
-    study : str
-        Name of the study in messages.
-    check : str
-        windows: also find the window of every case by a coarse solution; decks: only decks and loads;
-        nothing: only build the decks.
-    skip_invalid : bool
-        Mark wrong cases instead of raising an error, unless all are wrong.
-
-    Raises
-    ------
-    DeckError
-        With a sentence for each fault, which names the parameter.
+    Of `base` the output file is ignored. Check "windows" finds the window of every case by a coarse solution,
+    "decks" tests decks and loads, "nothing" builds the decks alone. With `skip_invalid` wrong cases are
+    marked, unless all are wrong.
     """
     tolerant = skip_invalid or check == "nothing"
     base = {key: value for key, value in base.items() if key != "output"} | _output(base)
@@ -118,9 +96,9 @@ def plan(
     about = replace(source, overrides=frozenset(keys), of_override=mark)
     for key in keys:
         if key == "output" or key.startswith("output.file"):
-            raise DeckError(f"{mark}{key}: a study names the files of its cases itself")
+            raise wrong(study, key, "a study names the files of its cases itself")
         if keys.count(key) > 1:
-            raise DeckError(f"{mark}{key}: expected each key only once")
+            raise wrong(study, key, "expected each key only once")
     names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
     deck = _first_deck(file, base, about, mark, tolerant, names)
     given = [axis_of(entry, deck, file.combine, study) for entry in file.parameter]
@@ -128,11 +106,13 @@ def plan(
     axes, dims = dimensions(file, given, deck, study)
     if (count := math.prod(map(len, dims.values()))) > MOST_CASES:
         raise DeckError(f"{study}: {count} cases; expected at most {MOST_CASES}")
-    cases = []
+    cases: list[PlannedCase] = []
+    lines: dict[str, str] = {}  # about wrong cases, by their messages
     for position, choices in enumerate(itertools.product(*dims.values())):
         values = {key: value for choice in choices for key, value in choice.items()}
-        merged, fault = with_overrides(base, values), ""
+        merged, faults = {}, []
         try:
+            merged = _merged(base, values, mark)
             for axis in axes:
                 if axis.formula is not None:
                     found = dict.fromkeys(axis.keys, evaluated(axis, axes, deck, merged, study))
@@ -143,18 +123,16 @@ def plan(
             elif check == "decks":
                 checked(assemble(merged, source=about), False)
         except DeckError as error:
-            fault = _message_of(error)
-        cases.append(PlannedCase(position, values, as_toml(merged), fault, names))
-    wrong = [case for case in cases if case.fault]
-    if wrong and not (tolerant and len(wrong) < len(cases)):
-        lines = _each_once([
-            line
-            for case in wrong
-            for line in _with_case(case.fault, mark, case.position + 1, case.settings, names).splitlines()
-        ])  # fmt: skip
-        if (more := len(lines) - _MOST_LINES) > 0:
-            lines = [*lines[:_MOST_LINES], f"... and {more} more"]
-        raise DeckError("\n".join(lines))
+            faults = _shared_by_segments(error)
+            of_case = _lines(faults, keys, PlannedCase(position, values, "", names=names))
+            lines |= {message: line for message, line in of_case.items() if message not in lines}
+        messages = "\n".join(fault.message for fault in faults)
+        cases.append(PlannedCase(position, values, as_toml(merged), messages, names))
+    invalid = sum(bool(case.fault) for case in cases)
+    if invalid and not (tolerant and invalid < len(cases)):
+        more = f"... and {len(lines) - _MOST_LINES} more"
+        shown_lines = [*lines.values()][:_MOST_LINES] + [more] * (len(lines) > _MOST_LINES)
+        raise DeckError("\n".join(shown_lines))
     refuse_twins(axes, study)
     return Plan(axes, tuple(cases), {name: len(choices) for name, choices in dims.items()})
 
@@ -173,10 +151,10 @@ def _first_deck(
     for place in range(max(map(len, given.values())) if tolerant else 1):
         values = {key: entries[min(place, len(entries) - 1)] for key, entries in given.items() if entries}
         try:
-            return Deck.parse(with_overrides(base, values), about)
+            return Deck.parse(_merged(base, values, mark), about)
         except DeckError as found:
-            message = _with_case(_message_of(found), mark, place + 1, values, names)
-            error = error or DeckError(message, found.faults)
+            lines = _lines(_shared_by_segments(found), given, PlannedCase(place, values, "", names=names))
+            error = error or DeckError("\n".join(lines.values()), found.faults)
     assert error is not None
     raise error
 
@@ -189,41 +167,35 @@ def _output(base: Mapping[str, Any]) -> dict[str, Any]:
     return {"output": others} if others else {}
 
 
-def _with_case(
-    error: str, mark: str, number: int, settings: Mapping[str, Any], names: Mapping[str, str]
-) -> str:
-    """Return a message with the parameters of the case, on lines whose key is none of them."""
-    named = f" (in case {number}: {described(settings, names)})"
-    keys = tuple(settings)
-    lines = []
-    for line in error.splitlines():
-        if line.startswith(mark):
-            lines.append(line)
-        elif line.startswith(keys):  # from merging the key into the deck
-            lines.append(mark + line)
-        else:
-            lines.append(line + named)
-    return "\n".join(lines)
+def _merged(base: Mapping[str, Any], values: Mapping[str, Any], mark: str) -> dict[str, Any]:
+    """Return a deck with the values of parameters; an error names the parameter."""
+    try:
+        return with_overrides(base, values)
+    except DeckError as error:
+        message = f"{mark}{error}"
+        raise DeckError(message, [Fault(message, next(iter(values)))]) from None
 
 
-def _each_once(lines: Sequence[str]) -> list[str]:
-    """Return one line of those that differ only in the case they name."""
-    first: dict[str, str] = {}
-    for line in lines:
-        first.setdefault(line.partition(" (in case ")[0], line)
-    return list(first.values())
-
-
-def _message_of(error: DeckError) -> str:
-    """Return the message of an error, with one line for a fault that several load segments share."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for fault in error.faults:
+def _shared_by_segments(error: DeckError) -> list[Fault]:
+    """Return the faults of an error, one for those that several load segments share."""
+    found: dict[tuple[str, str], list[Fault]] = {}
+    for fault in error.faults or [Fault(str(error))]:
         name = fault.key
         if name.startswith("load."):
             name = next(part for part in reversed(name.split(".")) if not part.isdecimal())
-        sentence = fault.message.rpartition(f"{fault.key}{fault.value and ' = '}{fault.value}: ")[2]
-        found.setdefault((name, sentence), []).append(fault.message)
-    lines = [
-        first + f" (likewise in {len(more)} more segments)" * bool(more) for first, *more in found.values()
+        found.setdefault((name, fault.sentence or fault.message), []).append(fault)
+    likewise = " (likewise in {} more segments)"
+    return [
+        first._replace(message=first.message + likewise.format(len(more)) * bool(more))
+        for first, *more in found.values()
     ]
-    return "\n".join(lines) or str(error)
+
+
+def _lines(faults: Sequence[Fault], keys: Iterable[str], case: PlannedCase) -> dict[str, str]:
+    """Return a line for each fault by its message; parameters of the case are named if it is of none."""
+    found = {}
+    for fault in faults:
+        of_parameter = any(fault.key == key or fault.key.startswith(f"{key}.") for key in keys)
+        about = "" if of_parameter else f" (in case {case.position + 1}: {case})"
+        found[fault.message] = fault.message + about
+    return found

@@ -2,7 +2,7 @@
 
 Examples
 --------
->>> from hexcontact.study import Study, run_study
+>>> from hexcontact import run_study
 >>> dataset = run_study("study_friction.toml")  # doctest: +SKIP
 >>> dataset.stick_area_fit.sel(friction_coefficient=0.3)  # doctest: +SKIP
 """
@@ -25,14 +25,14 @@ from ..errors import DeckError
 from ..solve.events import Listener, Listeners
 from ..solve.log import Log
 from ..text import quantity
-from .backend import BACKENDS, Backend
+from .backend import BACKENDS, Backend, outcomes
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
-from .collect import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
+from .dataset import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
 from .folder import StudyFolder
 from .job import Job, Outcome, solve_case
 from .plan import CheckLevel, Plan, PlannedCase, plan
-from .tables import StudyFile
+from .study_file import StudyFile
 
 if TYPE_CHECKING:
     import xarray
@@ -236,13 +236,11 @@ class Study:
         self, pool: Backend, missing: Sequence[PlannedCase], listener: Listener, cancel: threading.Event
     ) -> None:
         by_hash = {case.hash: case for case in missing}
-        try:
-            for outcome in pool.outcomes([self._job(case) for case in missing], cancel):
+        with pool:
+            for outcome in outcomes(pool, [self._job(case) for case in missing], cancel):
                 case = by_hash[outcome.hash]
                 self.folder.note(case, outcome)
                 self._report(case, outcome, listener)
-        finally:
-            pool.stop()
 
     def _job(self, case: PlannedCase) -> Job:
         return Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))

@@ -7,18 +7,17 @@ assigns its case to another worker, up to `distributed.scheduler.allowed-failure
 from __future__ import annotations
 
 import importlib
-import queue
 import signal
-import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Annotated, Any
 
 from ...deck.kinds import Text, Whole, Word
 from ...deck.table_base import Table, meaning
 from ...errors import DeckError, ResourceError
-from ..backend import Backend, OptionTable, arrived, backend
-from ..job import MOST_CASES, Job, Outcome, solve_case
+from ..backend import Backend, OptionTable, backend
+from ..job import MOST_CASES, Job, Outcome
 
 _CLASSES = {
     "slurm": "SLURMCluster",
@@ -67,13 +66,9 @@ def _package(name: str, install: str) -> Any:
 
 @backend("dask", Dask | None)
 class DaskPool(Backend):
-    """Workers of a Dask cluster that is joined or started.
+    """Run cases on the workers of a Dask cluster that is joined or started."""
 
-    Raises
-    ------
-    DeckError
-        If Dask is not installed, no scheduler answers, or the cluster refuses its options.
-    """
+    apart = True
 
     def __init__(self, settings: Dask, cases: int) -> None:
         distributed = _package("distributed", "distributed")
@@ -85,7 +80,8 @@ class DaskPool(Backend):
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise DeckError(f"no Dask scheduler answers at {settings.address}: {reason}") from None
-        self._futures: list[Any] = []
+        # A task of which a worker has died is repeated: the result of a pure one would be remembered.
+        self._executor = self._client.get_executor(pure=False)
 
     @staticmethod
     def load(settings: Dask) -> None:
@@ -94,18 +90,29 @@ class DaskPool(Backend):
         if settings.cluster not in (None, "local"):
             _package("dask_jobqueue", "dask-jobqueue")
 
-    def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
-        """Run the jobs and yield the outcome of each when it ends, until `cancel` is set."""
-        outcomes: queue.Queue[Outcome | BaseException] = queue.Queue()
-        for job in jobs:
-            future = self._client.submit(solve_case, job, apart=True, pure=False)
-            self._futures.append(future)
-            future.add_done_callback(lambda done, job=job: outcomes.put(_outcome(done, job)))
-        yield from arrived(outcomes, len(jobs), cancel)
+    def submit(self, work: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """Run a job on a worker that is free."""
+        future: Future[Any] = self._executor.submit(work, *args, **options)
+        return future
 
-    def stop(self) -> None:
+    def outcome(self, future: Future[Outcome], job: Job) -> Outcome:
+        """Return the outcome of a task, also of one that Dask has given up."""
+        try:
+            outcome = future.result()
+        except CancelledError:
+            words, seconds = "Dask canceled it", 0.0
+        except Exception as error:  # of a type that depends on what has happened to the worker
+            words, seconds = f"Dask gave it up: {type(error).__name__}: {error}".splitlines()[0], 0.0
+        else:
+            if outcome.exit_code or Path(job.path).exists():
+                return outcome
+            words = f"a worker has finished it, but {job.path} is not here; do the workers share this folder?"
+            seconds = outcome.seconds
+        return Outcome(job.hash, ResourceError.exit_code, words, seconds, False)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Cancel jobs that have not begun, and leave the cluster; end it if it was started here."""
-        self._client.cancel(self._futures)
+        self._executor.shutdown(wait=False)
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
@@ -130,16 +137,3 @@ def _started(settings: Dask) -> Any:
             f"dask.cluster = {settings.cluster}: cannot be started with these options ({words})"
         ) from None
     return cluster
-
-
-def _outcome(future: Any, job: Job) -> Outcome:
-    """Return the outcome of a task."""
-    if future.status == "finished":
-        outcome: Outcome = future.result()
-        if not outcome.exit_code and not Path(job.path).exists():
-            words = f"a worker has finished it, but {job.path} is not here; do the workers share this folder?"
-            return Outcome(job.hash, ResourceError.exit_code, words, outcome.seconds, False)
-        return outcome
-    error = None if future.status == "cancelled" else future.exception()
-    words = f"Dask gave it up: {type(error).__name__}: {error}" if error else "Dask canceled it"
-    return Outcome(job.hash, ResourceError.exit_code, words.splitlines()[0], 0.0, False)

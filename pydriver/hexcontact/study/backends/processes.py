@@ -1,25 +1,25 @@
 """Backend that runs the cases of a study in processes of this machine.
 
-Each worker has its own executor, so that a process that dies (mostly out of memory) loses one known case.
-Workers block signals; the parent process ends them.
+Each thread has a process of its own, so that a process that dies (mostly out of memory) loses one known case.
+Processes block signals; the parent ends them.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-import queue
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from typing import Any
 
 from ...core.memory import cores
 from ...errors import DeckError, ResourceError
-from ..backend import Backend, arrived, backend
-from ..job import Job, Outcome, solve_case
+from ..backend import Backend, backend
+from ..job import Job, Outcome
 
 _BLOCKED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 
@@ -44,80 +44,62 @@ class LocalPool(Backend):
     """Worker processes on this machine; settings: their number, None for one for each core."""
 
     def __init__(self, settings: int | None, cases: int) -> None:
+        from multiprocessing import resource_tracker
+
         if settings is not None and settings < 1:
             raise DeckError(f"jobs = {settings}: expected at least 1")
         self.workers = min(settings or cores(), cases)
         threads = os.environ.get("OMP_NUM_THREADS", "")
         self.threads = int(threads) if threads.isdecimal() else max(1, cores() // self.workers)
-        self._stopped = threading.Event()
-        self._outcomes: queue.Queue[Outcome | BaseException] = queue.Queue()
-        self._executors: dict[int, ProcessPoolExecutor] = {}
-        self._mutex = threading.Lock()
-        self._attendants: list[threading.Thread] = []
-
-    def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
-        """Run the jobs and yield the outcome of each when it ends, until `cancel` is set."""
-        from multiprocessing import resource_tracker
-
         # Started from a thread, the tracker would unblock the signals of that thread.
         resource_tracker.ensure_running()
-        waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
-        for job in jobs:
-            waiting.put(job)
-        for number in range(self.workers):
-            thread = threading.Thread(target=self._attend, args=(number, waiting), daemon=True)
-            self._attendants.append(thread)
-            thread.start()
-        yield from arrived(self._outcomes, len(jobs), cancel)
+        # The processes inherit the signals that their threads block.
+        blocked = (signal.SIG_BLOCK, _BLOCKED)
+        self._attendants = ThreadPoolExecutor(
+            self.workers, initializer=signal.pthread_sigmask, initargs=blocked
+        )
+        self._own = threading.local()
+        self._processes: list[ProcessPoolExecutor] = []
+        self._busy: set[int] = set()
+        self._mutex, self._stopped = threading.Lock(), False
 
-    def _attend(self, number: int, waiting: queue.SimpleQueue[Job]) -> None:
-        """Run waiting jobs in one worker."""
-        signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)  # inherited by the worker
-        try:
-            while not self._stopped.is_set():
-                try:
-                    job = waiting.get_nowait()
-                except queue.Empty:
-                    break
-                if (outcome := self._solved(number, job)) is not None:
-                    self._outcomes.put(outcome)
-        except BaseException as error:
-            self._outcomes.put(error)
-        finally:
-            self._end(number)
+    def submit(self, work: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """Run a job as soon as a process is free."""
+        return self._attendants.submit(self._solved, work, *args, **options)
 
-    def _solved(self, number: int, job: Job) -> Outcome | None:
-        """Return the outcome of a job; None if the pool was stopped."""
-        started = time.perf_counter()
+    def _solved(self, work: Callable[..., Outcome], job: Job, *more: Any) -> Outcome:
+        """Run a job in the process of this thread."""
+        started, process = time.perf_counter(), 0
         try:
+            if not hasattr(self._own, "pool"):
+                self._own.pool = self._new_process()
+            process = self._own.pool.submit(os.getpid).result()
             with self._mutex:
-                if self._stopped.is_set():
-                    return None
-                if number not in self._executors:
-                    context, threads = multiprocessing.get_context("spawn"), (self.threads,)
-                    pool = ProcessPoolExecutor(1, context, initializer=prepare_worker, initargs=threads)
-                    self._executors[number] = pool
-                future = self._executors[number].submit(solve_case, job)
-            return future.result()
+                if self._stopped:
+                    raise CancelledError
+                self._busy.add(process)
+            outcome: Outcome = self._own.pool.submit(work, job, *more).result()
+            return outcome
         except BrokenProcessPool:
-            self._end(number)
-            if self._stopped.is_set():
-                return None
+            del self._own.pool
             words = "its process died; was it killed, or out of memory?"
             return Outcome(job.hash, ResourceError.exit_code, words, time.perf_counter() - started, False)
+        finally:
+            self._busy.discard(process)
 
-    def _end(self, number: int) -> None:
-        with self._mutex:
-            executor = self._executors.pop(number, None)
-        if executor is not None:
-            executor.shutdown(wait=True, cancel_futures=True)
+    def _new_process(self) -> ProcessPoolExecutor:
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(1, context, initializer=prepare_worker, initargs=(self.threads,))
+        self._processes.append(pool)
+        return pool
 
-    def stop(self) -> None:
-        """Kill the workers; finished load steps are on the disk."""
-        self._stopped.set()
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Kill the processes that run a case; finished load steps are on the disk."""
         with self._mutex:
-            for executor in self._executors.values():
-                for process in list((executor._processes or {}).values()):
-                    process.kill()
-        for thread in self._attendants:
-            thread.join()
+            self._stopped = True
+        for child in multiprocessing.active_children():
+            if child.pid in self._busy:
+                child.kill()
+        self._attendants.shutdown(wait=True, cancel_futures=True)
+        for pool in self._processes:
+            pool.shutdown(wait=True, cancel_futures=True)

@@ -13,10 +13,12 @@ from typing import Annotated, Any
 
 from ...deck.table_base import meaning, refuse_key
 from ...errors import DeckError
+from ...text import listed
 from ..backend import OptionTable, backend
 
 _BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
 _CASES = "cases_per_task"
+_EXPORTS = ("ALL", "NIL", "NONE")
 _MOST_TASKS = 1000  # Slurm refuses indices from MaxArraySize on, which is 1001 by default
 
 
@@ -42,8 +44,8 @@ class BatchOptions(OptionTable):
                 refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
             if isinstance(entry, str) and _text(entry) is None:
                 refuse_key(key, entry, 'expected text on one line, without " and \\')
-            if isinstance(entry, str) and "," in entry:  # such as variables of the environment for `export`
-                refuse_key(key, entry, "expected one value, without commas")
+            if key == "export" and entry not in _EXPORTS:  # values of variables, such as LD_PRELOAD
+                refuse_key(key, entry, f"expected {listed(_EXPORTS, 'or')}")
             if not isinstance(entry, str | int | float | datetime.time):
                 refuse_key(key, entry, "expected text, a number, or true or false")
         return options
@@ -62,17 +64,7 @@ class JobArray:
         self.in_a_task = self.options.pop(_CASES, None)
 
     def script(self, numbers: Sequence[int], path: Path, output: Path, retry: bool) -> str:
-        """Return the script.
-
-        Parameters
-        ----------
-        numbers : sequence of int
-            The cases to run.
-        path, output : Path
-            The study file, and the file of its result.
-        retry : bool
-            Also run cases that would fail again.
-        """
+        """Return the script that runs some cases; `retry` includes those that would fail again."""
         if not numbers:
             return "#!/bin/sh\n# no case is missing"
         files = [str(path.resolve()), os.path.abspath(output)]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
-from ..result.history import extent_of
+from ..result.history_words import extent_of
 from ..result.netcdf import missing_stresses
 from ..result.store import open_result
 from ..solve import log
@@ -21,13 +21,13 @@ from ..solve import run as solving
 from ..solve.interruption import Interrupted, in_background
 from ..solve.progress import reporter
 from ..text import listed, visible
-from . import json_output, tables
-from .guard import print_error, print_output
+from . import printed
+from .frame import Report, print_error, print_output, write_json
 from .options import LogLevel
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
-    from ..result.history import Extent
+    from ..result.history_words import Extent
     from ..result.step import Step
     from ..result.store import Store
     from ..solve.events import Listener
@@ -35,21 +35,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Messages:
-    """The messages of a command that solves, from its options.
+    """Print the messages of a command that solves, as its options say."""
 
-    Attributes
-    ----------
-    command : str
-        Name of the command.
-    quiet, as_json : bool
-        Print errors only; print an object instead of tables at the end.
-    log_file, log_level : Path, LogLevel or None
-        Options of the log.
-    """
-
-    command: str
-    quiet: bool = False
-    as_json: bool = False
+    command: str  # its name
+    quiet: bool = False  # print errors only
+    as_json: bool = False  # print an object instead of tables at the end
     log_file: Path | None = None
     log_level: LogLevel | None = None
 
@@ -74,7 +64,7 @@ class Messages:
             log.logger.disabled = True  # for threads that still run
             print_error(message)
             if self.as_json:
-                json_output.write(self.command, json_output.error(message, signaled.exit_code))
+                write_json(self.command, Report(message, signaled.exit_code).content())
             sys.stdout.flush()
             sys.stderr.flush()
         os._exit(signaled.exit_code)
@@ -90,7 +80,7 @@ class Messages:
     ) -> dict[str, Any] | None:
         """Print or return the result of a run, with a message on an accuracy that was not reached."""
         refined = open_result(target) if case.accuracy else None
-        summary = tables.Summary.of_run(case, histories, refined, extent)
+        summary = printed.Summary.of_run(case, histories, refined, extent)
         shortfall = refined.shortfall if refined is not None else ""
         if shortfall:
             print_error(shortfall)
@@ -102,7 +92,7 @@ class Messages:
         if not self.quiet:
             summary.print()
             files = f"{target}, {picture}" if picture else f"{target}"
-            tables.console().print(visible(f"written: {files}"), soft_wrap=True)
+            printed.console().print(visible(f"written: {files}"), soft_wrap=True)
         if shortfall:
             raise SystemExit(AccuracyWarning.exit_code)
         return None
@@ -110,7 +100,7 @@ class Messages:
     def was_finished(self, file: Path, picture: Path | None) -> dict[str, Any] | None:
         """Print or return that all load steps were finished before."""
         if self.as_json:
-            summary = tables.Summary.of_result(open_result(file))
+            summary = printed.Summary.of_result(open_result(file))
             written = {"output": file, "picture": picture, "warnings": summary.remarks}
             return written | summary.as_run()
         if not self.quiet:

@@ -1,4 +1,4 @@
-"""Words and tables for the history of a load step or of a run."""
+"""The history of a run in words."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _MOST_NAMED = 8  # load steps named in a sentence
 
 
 def _scale(name: str, history: History) -> float:
-    """Return the quantity beside which a load or motion of a step may be noise."""
+    """Return the quantity to which the noise of a load or motion of a step is relative."""
     beside, power = VARIABLES[name].scale
     if not beside:
         return 0.0
@@ -61,7 +61,7 @@ def _scale(name: str, history: History) -> float:
 
 
 def worth_showing(histories: Iterable[History]) -> list[str]:
-    """Return the normal ones of `LOADS_AND_MOTIONS`, and others that are more than noise."""
+    """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise."""
     histories = list(histories)
 
     def shown(name: str) -> bool:
@@ -72,13 +72,13 @@ def worth_showing(histories: Iterable[History]) -> list[str]:
 
 
 def load_or_motion(name: str, history: History) -> str:
-    """Write one of `LOADS_AND_MOTIONS`, noise as zero."""
+    """Write one of `LOADS_AND_MOTIONS`; noise is written as zero."""
     value = float(history[name])
     return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].units)
 
 
 def fitted(name: str, history: History) -> float:
-    """Return an area or radius to the edge between the nodes; that of its nodes without a fit."""
+    """Return an area or radius to the edge between the nodes; without a fit, that of the nodes."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
 
@@ -110,7 +110,7 @@ def extent_of(step: Any) -> Extent | None:
 
 
 def _moments(history: History, extent: Extent | None) -> str:
-    """Name the ellipse of the half-axes of a contact that is none, and the extent of the contact."""
+    """Name the ellipse of equal moments if the contact is not elliptic, and the extent of the contact."""
     axes, area = half_axes(history), fitted("contact_area", history)
     if axes is None or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
         return ""
@@ -136,13 +136,13 @@ def stick_share(history: History) -> str:
 
 
 def step_error_share(history: History) -> float | None:
-    """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
+    """Return the bound on the error of the stick area due to load steps, over the contact area."""
     error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
     return None if math.isnan(error) or not area else error / area
 
 
 def path_error_share(history: History) -> float:
-    """Return the bound on the error of the dissipated energy by load steps, as a share; 0 of noise."""
+    """Return the bound on the error of the dissipated energy due to load steps, over that energy."""
     spent = float(history.get("dissipated_energy", 0.0))
     noise = _NOTICED * _scale("dissipated_energy", history) if spent else 0.0
     return float(history.get("dissipated_energy_path_error", 0.0)) / spent if spent > noise else 0.0
@@ -257,9 +257,9 @@ def ends_of_segments(histories: Sequence[History]) -> list[int]:
 
 
 def some_steps(histories: Sequence[History], most: int) -> list[int]:
-    """Return the indices of some steps of a long history: ends of segments, then peaks, then others.
+    """Select some steps of a long history: ends of segments, then peaks, then others.
 
-    Of each kind that exceeds the places left, evenly chosen ones.
+    If a kind has more steps than places are left, its steps are evenly selected.
     """
     names = [*worth_showing(histories), "max_pressure"]
     turns = {place for name in names for place in turning_points(_rounded(_column(histories, name)))}
@@ -273,7 +273,7 @@ def some_steps(histories: Sequence[History], most: int) -> list[int]:
 
 
 def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Return the histories of motion and load of each kind of loading that is more than noise, shear first.
+    """Return the histories of motion and load of each kind of loading above the noise, shear first.
 
     Shear is along the direction of the largest tangential load.
     """
@@ -303,7 +303,7 @@ def _loop_along(
 
 
 def _other_work(histories: Sequence[History], kind: str, first: int, last: int) -> list[str]:
-    """Return what does work between two steps besides the load of a loop: other loads, the bulk stress."""
+    """Return the other loads, and the bulk stress, that do work between two steps of a loop."""
     words = {
         "shear": "tangential load",
         "torsion": "torque",
@@ -347,9 +347,9 @@ def stages(histories: Sequence[History]) -> list[Stage]:
 def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     """Return the closed cycles of a load history with friction, of the first of `loops` that has any.
 
-    A cycle goes from one turning point of the motion to the next but one. Besides number, kind of loading,
-    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion,
-    and what else does work in it. Cycles of wear, of which only the end is recorded, are left out.
+    A cycle goes from one turning point of the motion to the next but one. `loop_area` (J) is the area of the
+    load over its motion; `other_work` names other loads that do work in the cycle. Wear cycles are left out,
+    since only their ends are recorded.
     """
     histories = [history for history in histories if not _of_wear(history)]
     for kind, (motion, load) in loops(histories).items() if is_frictional(histories[-1]) else ():
@@ -384,7 +384,7 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
 
 
 def _of_wear(history: History) -> bool:
-    """Test whether a step is the end of a cycle of wear, which represents many."""
+    """Test whether a step is the end of a wear cycle, which represents many cycles."""
     return float(history.get("wear_cycles", math.nan)) >= 0.0
 
 
@@ -408,7 +408,7 @@ def _column(histories: Sequence[History], name: str) -> NDArray[np.float64]:
 
 
 def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values without what the solver leaves open: to a millionth of the largest."""
+    """Round values to a millionth of the largest, the accuracy of the solver."""
     unit = _LEFT_OPEN * float(np.abs(values).max())
     return np.round(values / unit) if unit else values
 
@@ -417,15 +417,7 @@ def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def remarks(histories: Sequence[History], parameters: History) -> list[str]:
-    """Return sentences on the solution of the load steps of a run.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each load step, from the first on.
-    parameters : mapping
-        Parameters of the run, `hexcontact.problem.preview.parameters_of`, or attributes of the result.
-    """
+    """Return sentences on the load steps of a run; `parameters` are attributes of its result."""
     tolerance = float(parameters.get("tolerance", 0.0))
     static = parameters.get("algorithm") == "static"
     cold = [
@@ -448,7 +440,7 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
 
 
 def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:
-    """Describe the path to halved steps that begin without contact, or are static; empty without any."""
+    """Describe the path to halved steps that begin without contact, or are static."""
     if not numbers:
         return ""
     several, steps = len(numbers) > 1, _steps(list(map(str, numbers)))
@@ -476,14 +468,14 @@ def halved_steps(histories: Sequence[History], tolerance: float) -> str:
 
 
 def adaptive_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Describe the records of adaptive load steps; empty if these fulfil the conditions."""
+    """Describe the records of adaptive load steps; empty if these meet the conditions."""
     in_two = [history for history in histories if in_halves(history)]
     record = _of_whole_steps(in_two, tolerance)
     return record and f"{len(in_two)} of {len(histories)} load steps were solved in two halves; {record}"
 
 
 def _of_whole_steps(histories: Iterable[History], tolerance: float) -> str:
-    """Describe R_t of steps that were solved in parts; empty if it is within the tolerance."""
+    """Describe R_t of steps that were solved in parts; empty within the tolerance."""
     largest = max((float(history["residual_tangential"]) for history in histories), default=0.0)
     if largest <= tolerance:
         return ""
@@ -502,19 +494,25 @@ def limited_steps(histories: Sequence[History], tolerance: float) -> str:
 
 
 def uncertain_energy(histories: Sequence[History]) -> str:
-    """Describe a dissipated energy that the size of the load steps leaves uncertain; empty if it is not."""
+    """Describe a dissipated energy that the size of the load steps leaves uncertain."""
     share = path_error_share(histories[-1])
     if share <= _UNCERTAIN:
         return ""
+    chosen = step_error_share(histories[-1]) is not None
+    more = (
+        'steps = "auto" resolves stick area, tractions and loads that turn: give numbers of steps, of which '
+        if chosen
+        else ""
+    )
     return (
         f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since "
-        "nodes slip in directions that turn or under a pressure that changes; twice as many steps leave half "
-        "of it"
+        f"nodes slip in directions that turn or under a pressure that changes; {more}twice as many "
+        f"{'' if chosen else 'steps '}leave half of it"
     )
 
 
 def unclosed_cycle(history: History, tolerance: float) -> str:
-    """Describe a cycle of wear that does not close on unworn surfaces; empty of one that does."""
+    """Describe a wear cycle that does not close on unworn surfaces; empty if it closes."""
     left = float(history.get("unworn_cycle_change", 0.0))
     if not left > tolerance:
         return ""
@@ -533,9 +531,10 @@ def _steps(names: Sequence[str]) -> str:
 def worn_by_cycle(
     coefficient: float, steps: Iterable[Mapping[str, NDArray[Any]]], plane: xarray.Dataset, cell: float
 ) -> xarray.Dataset:
-    """Return what a cycle wears off the nodes, see `hexcontact.Result.wear`.
+    """Return the wear of a cycle at the nodes, see `hexcontact.Result.wear`.
 
-    `steps` have the fields `WEARING`; `plane` has the coordinates of the nodes, each with a cell (m2).
+    `steps` have the fields `WEARING`; `plane` has the coordinates of the nodes; `cell` is the area of a node
+    (m2).
     """
     import xarray
 

@@ -1,4 +1,4 @@
-"""Figures of the influence functions: pyramid (Figure 5.6), elements (5.2, 5.5), load shapes (7.3, 7.4)."""
+"""Draw the influence functions for `make.py`: pyramid (5.6), elements (5.2, 5.5), load shapes (7.3, 7.4)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..arrays import Array
-from ..core.influence import (
+from hexcontact.arrays import Array
+from hexcontact.core.influence import (
     displacement_errors,
     linear_load_displacement,
     load_potential,
     pressure_errors,
     pyramid_functions,
 )
-from .registry import figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
+from hexcontact.plotting.registry import styled
+from hexcontact.plotting.style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 
 Shape = Callable[[Array, Array], Array]
 
@@ -34,19 +34,9 @@ _TABLE_8_1 = (
 )
 
 
-@figure("pyramid", "displacements by one pyramid (Figure 5.6)")
+@styled
 def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
-    """Draw the nine functions C ... K of Table 8.1, the displacements of unit pyramid loads (Figure 5.6).
-
-    Parameters
-    ----------
-    poisson_ratio : float
-        nu of the body; G and K depend on it through nu_0 = nu/(1-nu).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the nine functions C ... K of Table 8.1, the displacements of unit pyramid loads (Figure 5.6)."""
     fine = np.linspace(-2.2, 2.2, 221)
     x, y = np.meshgrid(fine, fine)
     functions = iter(pyramid_functions(x, y, poisson_ratio))
@@ -96,19 +86,9 @@ def _element(number: int) -> Array:
     return np.vstack([np.zeros(2), np.stack([np.cos(angles), np.sin(angles)], axis=1)])
 
 
-@figure("elements", "tetrahedra and pyramids of load (Figures 4.5, 5.2, 5.5)")
+@styled
 def load_elements(poisson_ratio: float = 0.3) -> Figure:
-    """Draw a tetrahedral element, pyramids of six (Figures 4.5, 5.2, 5.4, 5.5), displacements by elements.
-
-    Parameters
-    ----------
-    poisson_ratio : float
-        nu of the body.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a tetrahedral element, pyramids of six (Figures 4.5, 5.2, 5.4, 5.5), displacements by elements."""
     canvas = new_figure(9.6, 4.5)
     solid = (True, False, True, True, False, False, False, False)
     panels = [canvas.add_subplot(2, 4, k + 1, projection="3d" if solid[k] else None) for k in range(8)]
@@ -169,19 +149,9 @@ def _draw_solid(axes: Any, numbers: tuple[int, ...], along: str) -> None:
 # --- load shapes ----------------------------------------------------------------------------------
 
 
-@figure("load-models", "a load in two dimensions (Figures 7.3, 7.4)")
+@styled
 def load_models(nodes: int = 9) -> Figure:
-    """Draw a surface load in two dimensions (Figure 7.3) and overlapping triangles (Figure 7.4).
-
-    Parameters
-    ----------
-    nodes : int
-        Nodes across the contact.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a surface load in two dimensions (Figure 7.3) and overlapping triangles (Figure 7.4)."""
     canvas = new_figure(7.6, 4.6)
     panels = canvas.subplots(2, 2, sharex=True, sharey=True).ravel()
     fine = np.linspace(-1.0, 1.0, 801)
@@ -220,18 +190,11 @@ LOOKS: dict[str, dict[str, Any]] = {
 """Line styles of the shapes of a nodal load."""
 
 
-@figure("load-shapes", "pyramid, point force, constant load compared (Figure 7.3)")
+@styled
 def load_shapes(nodes_in_radius: int = 10) -> Figure:
     """Compare a point force, a constant load on the hexagonal cell and the pyramid (Figure 7.3).
 
-    Parameters
-    ----------
-    nodes_in_radius : int
-        a/l_e of the Hertz contact in the panels (b) and (c).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    The Hertz contact in the panels (b) and (c) has `nodes_in_radius` spacings in its radius.
     """
     a = nodes_in_radius
     canvas = new_figure(7.2, 5.6)
@@ -294,3 +257,12 @@ def _draw_convergence(axes: Axes) -> None:
     axes.set_xticks(meshes, [str(mesh) for mesh in meshes])
     axes.minorticks_off()
     axes.grid(color="0.9", lw=0.5)
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "pyramid": pyramid_displacements,
+    "elements": load_elements,
+    "load_models": load_models,
+    "load_shapes": load_shapes,
+}
+"""The figures by the names of their pictures."""

@@ -1,4 +1,4 @@
-"""The result of a study: one dataset over its parameters, from the histories of its cases."""
+"""The result of a study: one dataset over its parameters, its file, and a table with a row for each case."""
 
 from __future__ import annotations
 
@@ -10,16 +10,20 @@ import numpy as np
 
 from .. import netcdf_library
 from ..errors import DeckError, ResourceError
-from ..files import reading, replacing, require_ordinary
+from ..files import reading, replacing, require_ordinary, require_utf8
 from ..netcdf_library import attributes
 from ..result.netcdf import check_seal
-from ..variables import CONVENTIONS, VARIABLES
+from ..result.view import last_steps
+from ..text import quantity, text_table, visible
+from ..variables import CONVENTIONS, SUMMARY, VARIABLES
 from .axes import Axis
-from .folder import StudyFolder
+from .folder import INDEX, StudyFolder
 from .plan import Plan, PlannedCase
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     import xarray
+
 
 DONE, FAILED, MISSING, INVALID = range(4)
 STATES = {DONE: "done", FAILED: "failed", MISSING: "missing", INVALID: "invalid"}
@@ -40,23 +44,9 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
 
 
 def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> xarray.Dataset:
-    """Combine the finished cases in one dataset.
+    """Combine the finished cases in one dataset: the last load step of each, or all along ``step``.
 
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    folder : StudyFolder
-        Folder of its cases.
-    steps : str
-        last: values of the last load step; all: the whole history, with the dimension ``step``.
-    attributes : dict
-        Attributes of the dataset.
-
-    Returns
-    -------
-    xarray.Dataset
-        NaN where a case is not done, for the reason in ``status``, ``exit_code`` and ``message``.
+    Values of other cases are NaN, for the reason in ``status``, ``exit_code`` and ``message``.
     """
     import xarray
 
@@ -136,7 +126,7 @@ def is_study(path: Path) -> bool:
 def refuse_foreign(path: Path) -> None:
     """Raise a DeckError if a file exists that is not the result of a study."""
     if path.exists() and not is_study(path):
-        raise DeckError(f"{path} is there and not the result of a study; choose another output")
+        raise DeckError(f"{path} exists and is not the result of a study; choose another output")
 
 
 def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
@@ -144,13 +134,6 @@ def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
 
     The texts `about` are attributes of the group ``study``: xarray does not combine datasets whose own
     attributes differ.
-
-    Raises
-    ------
-    DeckError
-        If the path holds another file.
-    ResourceError
-        If the file cannot be written.
     """
     refuse_foreign(path)
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
@@ -163,3 +146,105 @@ def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
             netcdf_library.write(xarray.Dataset(attrs=about), temporary, mode="a", group="study")
     except (OSError, RuntimeError) as error:
         raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+_MOST_ROWS = 100  # in a terminal
+_STATE = ("status", "exit_code", "message")
+
+
+def study_of(path: Path) -> Path | None:
+    """Return the result of a study by its file or the folder of its cases; None for other files."""
+    if path.is_dir():
+        if not (path / INDEX).is_file():
+            return None
+        folder = path.resolve() if path.name in ("", "..") else path
+        found = study_of(folder.with_name(f"{folder.name}.nc"))
+        if found is None:
+            raise DeckError(f"{path} holds the cases of a study; hexcontact study STUDY.toml combines them")
+        return found
+    require_utf8(path, "a netCDF file")
+    return path if "study_version" in netcdf_library.attributes(path) else None
+
+
+def read_study(path: Path) -> xarray.Dataset:
+    """Read the result of a study, with its title among the attributes."""
+    with reading(path), netcdf_library.opened_by_xarray(path) as found:
+        found.load()
+    with reading(path), netcdf_library.opened_by_xarray(path, group="study") as about:
+        return found.assign_attrs(title=about.attrs.get("title", ""))
+
+
+def parameters_of(study: xarray.Dataset) -> list[str]:
+    """Return the names of the parameters of a study."""
+    return [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
+
+
+def table_of(study: xarray.Dataset) -> pandas.DataFrame:
+    """Return a row for each case, or for each load step of each case."""
+    words = np.vectorize(STATES.get, otypes=[object])(study["status"].values)
+    study = study.assign(status=(study["status"].dims, words))
+    numbers = ["case_number", *parameters_of(study), *(["step"] if "step" in study.dims else [])]
+    rest = [str(name) for name in study.data_vars if name not in (*numbers, *_STATE)]
+    table = study.to_dataframe().reset_index()
+    if "step" in study.dims:  # shorter cases end with NaN
+        done = table["status"] == STATES[DONE]
+        table = table[np.where(done, table[rest].notna().any(axis=1), table["step"] == 1)]
+    return table[[*numbers, *rest, *_STATE]]
+
+
+def with_units(study: xarray.Dataset) -> dict[str, str]:
+    """Return the headers of the columns of a table."""
+    units = {str(name): str(values.attrs.get("units", "1")) for name, values in study.variables.items()}
+    return {name: f"{name} [{unit}]" for name, unit in units.items() if unit not in ("1", "")}
+
+
+def lines_of(study: xarray.Dataset) -> str:
+    """Return title, size and table of a study for a terminal."""
+    table, names = table_of(last_steps(study)), parameters_of(study)
+    whole = (table["status"] == STATES[DONE]).all()
+    columns = ["case_number", *names, *(name for name in ("approach", *SUMMARY) if name in table)]
+    columns += [] if whole else ["status"]
+    units = {name: str(study[name].attrs.get("units", "1")).removesuffix("1") for name in columns}
+    rows = [
+        tuple(_cell(row[name], units[name]) for name in columns)
+        for row in table.head(_MOST_ROWS).to_dict("records")
+    ]
+    sizes = " x ".join(f"{size} {name}" for name, size in study.sizes.items() if name in names)
+    states = table["status"].value_counts(sort=False)
+    counts = ", ".join(f"{count} {state}" for state, count in states.items())
+    lines = [
+        *([study.attrs["title"]] if study.attrs["title"] else []),
+        f"study of {len(table)} cases{f' ({sizes})' if sizes else ''}: {counts}"
+        + ("; the last load step of each" if "step" in study.dims else ""),
+        text_table(("case", *columns[1:]), rows),
+    ]
+    if len(table) > _MOST_ROWS:
+        lines.append(f"... and {len(table) - _MOST_ROWS} more cases; hexcontact export --csv writes all")
+    return visible_lines([*lines, str(study.attrs["source"])])
+
+
+def visible_lines(lines: Sequence[str]) -> str:
+    """Return lines without control characters."""
+    return "\n".join(visible(line) for text in lines for line in text.split("\n"))
+
+
+def _cell(value: Any, unit: str) -> str:
+    if isinstance(value, str):
+        return value
+    return quantity(float(value), unit) if unit else f"{value:g}"
+
+
+def content_of(study: xarray.Dataset, path: Path) -> dict[str, Any]:
+    """Return a study as the object that ``info --json`` prints."""
+    parameters = {
+        name: {key: study[name].attrs.get(key, "") for key in ("deck_key", "units")}
+        for name in parameters_of(study)
+    }
+    about = {str(name): value for name, value in study.attrs.items()}
+    return {
+        "file": path,
+        **about,
+        "parameters": parameters,
+        "sizes": {str(name): size for name, size in study.sizes.items()},
+        "cases": table_of(study).to_dict("records"),
+    }

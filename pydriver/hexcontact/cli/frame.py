@@ -1,4 +1,4 @@
-"""The frame of every sub-command: registration, messages, exit codes, standard streams."""
+"""The frame of every sub-command: the command line, errors, JSON, standard streams."""
 
 from __future__ import annotations
 
@@ -6,16 +6,30 @@ import contextlib
 import errno
 import functools
 import io
+import json
+import math
 import os
 import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
 
-from ..errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
+import typer
+from typer.core import TyperGroup
+
+from .._version import __version__
+from ..errors import (
+    LACKING,
+    ConvergenceError,
+    DeckError,
+    HexcontactError,
+    KernelFolderWarning,
+    PathWarning,
+    ResourceError,
+)
 from ..text import visible
-from . import json_output
 
 if TYPE_CHECKING:
     from ..errors import Fault
@@ -24,8 +38,16 @@ P = ParamSpec("P")
 # of the loader, of threads and of the netCDF library
 _NO_MEMORY = ("failed to map segment", "can't start new thread", "Memory allocation (malloc) failure")
 _NO_FILE = f": Error {errno.EMFILE}"  # of the loader
+_KINDS = {
+    DeckError.exit_code: "input",
+    ConvergenceError.exit_code: "convergence",
+    ResourceError.exit_code: "resources",
+}
+_SIGNAL = 128  # plus the number of a signal
 Content = Mapping[str, Any] | None
 """The object that a command prints with ``--json``; None without it."""
+
+_EXAMPLE = "hexcontact new sphere, then hexcontact run sphere.toml --plot"
 
 
 class Failure(HexcontactError):
@@ -44,9 +66,19 @@ class Report(NamedTuple):
     faults: Sequence[Fault] = ()
     details: Mapping[str, Any] | None = None
 
-    def print_json(self, name: str) -> None:
-        """Print the object of a command that failed."""
-        json_output.write(name, json_output.error(*self))
+    def content(self) -> dict[str, Any]:
+        """Return the object of a failure, with the faults of a deck and further entries."""
+        found = {
+            "kind": "interrupted" if self.exit_code > _SIGNAL else _KINDS.get(self.exit_code, "other"),
+            "message": seen_from_here(self.message),
+            "exit_code": self.exit_code,
+            "faults": [
+                {name: part or None for name, part in fault._asdict().items() if name != "sentence"}
+                for fault in self.faults
+            ],
+            **(self.details or {}),
+        }
+        return {"exit_code": self.exit_code, "error": found}
 
 
 def guarded(command: Callable[P, Content]) -> Callable[P, None]:
@@ -61,14 +93,14 @@ def guarded(command: Callable[P, Content]) -> Callable[P, None]:
         try:
             content = command(*args, **kwargs)
             if name:
-                json_output.write(name, content or {})
+                write_json(name, content or {})
         except (Exception, KeyboardInterrupt) as error:
             report = None if os.environ.get("HEXCONTACT_DEBUG") else _report_of(error)
             if report is not None:
                 print_error(report.message)
             if name:
                 unforeseen = Report(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
-                (report or unforeseen).print_json(name)
+                write_json(name, (report or unforeseen).content())
             if report is None:
                 raise
             raise SystemExit(report.exit_code) from None
@@ -83,11 +115,9 @@ def _report_of(error: BaseException) -> Report | None:
     if isinstance(error, KeyboardInterrupt):
         return Report("interrupted", 130)
     if isinstance(error, HexcontactError):
-        message, faults = (
-            "\n".join([str(error), *getattr(error, "__notes__", ())]),
-            getattr(error, "faults", ()),
-        )
-        return Report(message, error.exit_code, faults, getattr(error, "details", None))
+        message = "\n".join([str(error), *getattr(error, "__notes__", ())])
+        faults, details = getattr(error, "faults", ()), getattr(error, "details", None)
+        return Report(message, error.exit_code, faults, details)
     if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
         return Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
@@ -103,7 +133,7 @@ def _report_of(error: BaseException) -> Report | None:
     return None
 
 
-# --- standard streams ---------------------------------------------------------------------------------------
+# --- standard streams ---------------------------------------------------------------------------------
 
 
 class _Outlet(io.FileIO):
@@ -134,11 +164,8 @@ class _Unpadded(io.TextIOWrapper):
 def standard_streams() -> Iterator[None]:
     """Let a command end normally although its standard streams are closed, full or no longer read.
 
-    Raises
-    ------
-    SystemExit
-        With the exit code of lacking resources if the command succeeded but its output is lost, unless the
-        reader has closed the pipe.
+    If the command succeeded but its output is lost, exit with the code of lacking resources, unless the
+    reader has closed the pipe.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass  # otherwise the next files would get the numbers of closed streams, and the output of libraries
@@ -168,7 +195,7 @@ def standard_streams() -> Iterator[None]:
 
 def print_error(message: str) -> None:
     """Print a message on standard error, each line marked; files of this folder without its name."""
-    for line in json_output.seen_from_here(message).splitlines() or [""]:
+    for line in seen_from_here(message).splitlines() or [""]:
         print(f"hexcontact: {visible(line)}", file=sys.stderr)
 
 
@@ -190,47 +217,90 @@ def warn_plainly() -> None:
     warnings.showwarning = show
 
 
-# --- the sub-commands ---------------------------------------------------------------------------------------
+# --- JSON ---------------------------------------------------------------------------------------------
 
 
-class Command(NamedTuple):
-    """A sub-command.
-
-    Attributes
-    ----------
-    function : callable
-        What it does, guarded.
-    example : str
-        Example in its help.
-    short_help : str or None
-        Its line in the list of commands; None: the first sentence of its help.
-    help : callable or None
-        Writes its help; None: the docstring of the function.
-    """
-
-    function: Callable[..., None]
-    example: str
-    short_help: str | None = None
-    help: Callable[[], str] | None = None
+def write_json(command: str, content: Mapping[str, Any]) -> None:
+    """Print the object of a command: its name, its exit code and its content, see docs/running.md."""
+    whole = {"hexcontact": __version__, "command": command, "exit_code": 0, **content}
+    print(visible(json.dumps(jsonable(whole), ensure_ascii=False, allow_nan=False)), flush=True)
 
 
-COMMANDS: dict[str, Command] = {}
-"""The sub-commands of the modules that are imported."""
+def jsonable(value: Any) -> Any:
+    """Return a value for JSON: null for NaN; text for infinity, paths and objects of other types."""
+    if isinstance(value, Mapping):
+        return {str(key): jsonable(entry) for key, entry in value.items()}
+    if isinstance(value, str | bool | int | None):
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # of numpy
+        return jsonable(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None if math.isnan(value) else str(value)
+    if isinstance(value, Sequence):
+        return [jsonable(entry) for entry in value]
+    return str(value)
+
+
+def seen_from_here(message: str) -> str:
+    """Return a message with the files of the current folder named without it."""
+    with contextlib.suppress(OSError):  # the folder was deleted
+        return message.replace(os.path.join(os.getcwd(), ""), "")
+    return message
+
+
+# --- the command line ---------------------------------------------------------------------------------
+
+
+class _Commands(TyperGroup):
+    """The sub-commands; with ``--json`` wrong options and arguments give an object, too."""
+
+    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
+        """Run the command that the arguments name."""
+        given = sys.argv[1:] if args is None else list(args)
+        try:
+            return super().main(args, *more, **options)
+        except SystemExit as ending:
+            usage = getattr(ending.__context__, "format_message", None)  # printed by typer before
+            if "--json" in given and usage is not None:
+                name = next((word for word in given if word in self.commands), "")
+                write_json(name, Report(usage(), DeckError.exit_code).content())
+            raise
+
+
+app = typer.Typer(
+    name="hexcontact",
+    cls=_Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+"""The command, with the sub-commands of the modules that are imported."""
 
 
 def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
-    """Register a function as the sub-command of its name, guarded, with its options as arguments.
-
-    Parameters
-    ----------
-    example : str
-        Example in the help.
-    **options
-        Further attributes of `Command`.
-    """
+    """Register a function, guarded, as the sub-command of its name; options as of `typer.Typer.command`."""
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:
-        COMMANDS[function.__name__] = Command(guarded(function), example, **options)
-        return COMMANDS[function.__name__].function
+        return app.command(epilog=f"Example: {example}", **options)(guarded(function))
 
     return register
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"hexcontact {__version__}")
+        raise typer.Exit()
+
+
+@app.callback(epilog=f"Example: {_EXAMPLE}")
+def _hexcontact(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.
+
+    Exit codes: 0 done, 2 wrong input, 3 no convergence or accuracy, 4 memory or disk; 130, 138, 143 stopped.
+    """

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DeckError
-from ..result.history import (
+from ..result.history_words import (
     contact_size,
     cycles,
     energy_table,
@@ -35,42 +34,26 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..problem.problem import Problem
-    from ..result.history import Extent
+    from ..result.history_words import Extent
     from ..result.result import Result
 
 History = Mapping[str, Any]
 Row = tuple[str, ...]
 
+Table = tuple[Sequence[str], Sequence[Row]]  # headers and rows
+
+_LAST = "Last load step"
+_TRIALS = ("", "first lattice", "last but one", "last", "largest error")
 _MOST_ROWS = 24  # steps shown of a long history
 _PIPE = 130  # characters of a line where there is no terminal
 
 
-def console() -> Console | Pipe:
-    """Return what prints tables: with colors on a terminal or by FORCE_COLOR, else plain wide text."""
-    colored = sys.stdout.isatty() or os.environ.get("FORCE_COLOR")
-    return rich_console() if colored else Pipe()
-
-
-def rich_console() -> Console:
-    """Return the console of `rich` on standard output."""
+def console() -> Console:
+    """Return the console on standard output: with colors on a terminal or by FORCE_COLOR, else wide."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else _PIPE
     return Console(highlight=False, markup=False, emoji=False, width=width)
-
-
-class Pipe:
-    """Prints as `rich` does where there is no terminal, without `rich` if tables are not too wide for it."""
-
-    width = _PIPE
-
-    def print(self, shown: TextTable | str, *, soft_wrap: bool = False) -> None:
-        """Print a table, or a line of text."""
-        text = shown.plain(self.width) if isinstance(shown, TextTable) else shown
-        if text is None:
-            rich_console().print(shown, soft_wrap=soft_wrap)
-        else:
-            print(text)
 
 
 def pairs(title: str, rows: Iterable[Row]) -> TextTable:
@@ -82,27 +65,13 @@ def pairs(title: str, rows: Iterable[Row]) -> TextTable:
 
 
 class Summary(NamedTuple):
-    """The load steps of a run or a file.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case.
-    histories : sequence of mapping
-        History of each load step.
-    parameters : mapping
-        Parameters of the case, or attributes of the result.
-    deck : str
-        The deck; without it there is no comparison with Hertz.
-    result : Result or None
-        The result, if it was read from a file.
-    """
+    """Present the load steps of a run or a file as tables and as objects."""
 
     title: str
     histories: Sequence[History]
-    parameters: Mapping[str, Any]
-    deck: str
-    result: Result | None = None
+    parameters: Mapping[str, Any]  # of the case, or attributes of the result
+    deck: str  # without it there is no comparison with Hertz
+    result: Result | None = None  # if it was read from a file
     extent: Extent | None = None
 
     @classmethod
@@ -148,33 +117,33 @@ class Summary(NamedTuple):
             return []
 
     def print(self, whole_file: bool = False) -> None:
-        """Print the history, the last step, its comparison with Hertz, lattices and errors.
-
-        Parameters
-        ----------
-        whole_file : bool
-            Also print the origin of the result.
-        """
-        shown, last, named = console(), self.histories[-1], ""
+        """Print the history, the last step, its comparison with Hertz, lattices; origin of a file."""
+        shown, named = console(), ""
         if whole_file and self.result is not None:
             shown.print(pairs(self.title, file_rows(self.result)))
         elif self.title:
             named = f" of {self.title!r}"
         if whole_file or len(self.histories) > 1:
             shown.print(history_table(self.histories, shown))
-        headers, energies = energy_table(self.histories, _MOST_ROWS)
-        if energies:
-            shown.print(TextTable("Dissipated energy", headers, energies))
-        shown.print(pairs(f"Last load step{named}", step_rows(last, self.extent)))
-        if rows := hertz_rows(self.hertz, last):
-            shown.print(TextTable("Against Hertz", HERTZ_HEADERS, rows))
-        if self.result is not None and (rows := trial_rows(self.result)):
-            shown.print(TextTable("Accuracy", TRIAL_HEADERS, rows))
+        for title, (headers, rows) in self.tables(_MOST_ROWS).items():
+            if rows:
+                words = f"{title}{named}" if title == _LAST else title
+                shown.print(TextTable(words, headers, rows))
         before = () if whole_file else ("warnings", "notes")  # printed before the run
         printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
             if remark not in printed:
                 shown.print(f"note: {remark}", soft_wrap=True)
+
+    def tables(self, most: int) -> dict[str, Table]:
+        """Return the tables that terminal and page share, by title; `most` rows of energies."""
+        last = self.histories[-1]
+        return {
+            "Dissipated energy": energy_table(self.histories, most),
+            _LAST: (("", ""), step_rows(last, self.extent)),
+            "Against Hertz": (("", "Hertz", "computed", "difference"), hertz_rows(self.hertz, last)),
+            "Accuracy": (_TRIALS, [] if self.result is None else trial_rows(self.result)),
+        }
 
     def steps(self) -> list[dict[str, Any]]:
         """Return the histories, each with the number of its step."""
@@ -229,7 +198,7 @@ def fields_of(result: Result) -> list[str]:
 # --- the history ----------------------------------------------------------------------------------
 
 
-def history_table(histories: Sequence[History], console: Console | Pipe) -> TextTable:
+def history_table(histories: Sequence[History], console: Console) -> TextTable:
     """Return a table of the load steps; of a long history only ends of segments, peaks and the last step.
 
     The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
@@ -248,12 +217,8 @@ def history_table(histories: Sequence[History], console: Console | Pipe) -> Text
     return shown
 
 
-def _fits(table: TextTable, console: Console | Pipe) -> bool:
+def _fits(table: TextTable, console: Console) -> bool:
     """Return whether a table needs no more width than a console has."""
-    if isinstance(console, Pipe):
-        if table.plain(console.width) is not None:
-            return True
-        console = rich_console()
     return console.measure(table, options=console.options.update_width(1000)).maximum <= console.width
 
 
@@ -320,28 +285,13 @@ def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: Histo
     return rows
 
 
-HERTZ_HEADERS = ("", "Hertz", "computed", "difference")
-
-
 # --- accuracy -------------------------------------------------------------------------------------
-
-
-TRIAL_HEADERS = ("", "first lattice", "last but one", "last", "largest error")
 
 
 def trial_rows(result: Result) -> list[Row]:
     """Return the quantities that decide about the accuracy of a refined result, at the last load step.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-
-    Returns
-    -------
-    list of rows
-        Quantity, its values on three of the lattices, largest error of all load steps over its largest value;
-        empty if the lattice was not refined.
+    A row has the values on three of the lattices, and the largest error of all steps over the largest value.
     """
     from ..solve.accuracy import JUDGED, relative_errors
 

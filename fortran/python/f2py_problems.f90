@@ -1,0 +1,249 @@
+!> Operators, contact problems and states for Python: set-up, with checks of memory, and fields of states.
+module hc_f2py_problems
+  use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_memory, only: require_memory
+  use hc_f2py_handles, only: slot_t, take_slot, free_object, hold, kernel_cache
+  use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t, space_over, most_threads
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: check_operator
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
+  use hc_friction_law, only: friction_law_t
+  use hc_normal_law, only: normal_law_t
+  use hc_contact_state, only: contact_state_t, n_load
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
+  use hc_direct_contact, only: direct_contact_t, new_direct_contact
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
+  use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  implicit none
+  private
+
+  public :: new_operator, new_pressed, new_sheared, secure_entry, new_held_state, find_field
+
+  !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
+  integer, parameter :: fft_based = 1, as_written = 2
+  !> Bytes by node of fields of the direct method; its matrices are checked where they are allocated
+  integer(c_int64_t), parameter :: dense_fields = 500
+  !> Fields that the entry of nodes takes
+  integer(c_int64_t), parameter :: entry_fields = 45
+
+contains
+
+  !> Take a slot with its window, and refuse a problem for which there is no memory.
+  subroutine take_window(lattice, bytes, threads, slot, handle, error)
+    type(lattice_t), intent(in) :: lattice
+    !> Memory of the problem, that of solving it included
+    integer(c_int64_t), intent(in) :: bytes
+    integer, intent(in) :: threads
+    type(slot_t), pointer, intent(out) :: slot
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+
+    call take_slot(slot, handle, error)
+    if (allocated(error)) return
+    slot%lattice = lattice
+    slot%space = field_space_t()
+    ! the constructors refuse another number
+    if (threads < 0 .or. threads > most_threads) return
+    slot%space = space_over(lattice%extent, threads)
+    ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
+    slot%working = 4*bytes/5
+    call require_memory(bytes, error, slot%space%threads)
+  end subroutine take_window
+
+  !> Create a flexibility operator over a window.
+  subroutine new_operator(method, lattice, pair, threads, handle, error)
+    integer, intent(in) :: method, threads
+    type(lattice_t), intent(in) :: lattice
+    type(elastic_pair_t), intent(in) :: pair
+    !> Handle of the operator
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+    type(field_space_t) :: space
+    type(dense_flexibility_t), pointer :: dense
+    type(fft_flexibility_t), pointer :: fft
+    integer(c_int64_t) :: bytes
+
+    space = space_over(lattice%extent, threads)
+    bytes = dense_fields*lattice%size()
+    if (method == fft_based) bytes = fft_memory(lattice%extent, .false., space%threads) + fft_setup_memory(lattice%extent)
+    call take_window(lattice, bytes, threads, slot, handle, error)
+    if (.not. allocated(error)) call check_operator(lattice, pair, error, threads)
+    if (.not. allocated(error)) then
+      if (method == fft_based) then
+        allocate (fft)
+        slot%operator => fft
+        call new_fft_flexibility(fft, slot%lattice, pair, error, space=slot%space, cache=kernel_cache)
+      else
+        allocate (dense)
+        slot%operator => dense
+        call new_dense_flexibility(dense, slot%lattice, pair, error)
+      end if
+    end if
+    if (allocated(error)) call free_object(handle)
+  end subroutine new_operator
+
+  !> Create a frictionless contact problem.
+  subroutine new_pressed(method, lattice, pair, gap, candidate, law, threads, handle, error)
+    integer, intent(in) :: method, threads
+    type(lattice_t), intent(in) :: lattice
+    type(elastic_pair_t), intent(in) :: pair
+    !> Gap before loading [m]
+    real(wp), intent(in) :: gap(:, :)
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    class(normal_law_t), intent(in) :: law
+    !> Handle of the problem
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+    type(field_space_t) :: space
+    type(direct_contact_t), pointer :: dense
+    type(normal_contact_t), pointer :: fft
+    integer(c_int64_t) :: bytes
+
+    space = space_over(lattice%extent, threads)
+    bytes = dense_fields*lattice%size()
+    if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads)
+    call take_window(lattice, bytes, threads, slot, handle, error)
+    if (.not. allocated(error)) then
+      if (method == fft_based) then
+        allocate (fft)
+        slot%pressed => fft
+        call new_normal_contact(fft, slot%lattice, pair, gap, candidate, error, threads, kernel_cache, law=law)
+      else
+        allocate (dense)
+        slot%pressed => dense
+        call new_direct_contact(dense, slot%lattice, pair, gap, candidate, error, law=law)
+      end if
+    end if
+    if (allocated(error)) call free_object(handle)
+  end subroutine new_pressed
+
+  !> Create a contact problem with friction.
+  subroutine new_sheared(method, lattice, pair, gap, candidate, friction, law, goodman, threads, handle, error)
+    integer, intent(in) :: method, threads
+    type(lattice_t), intent(in) :: lattice
+    type(elastic_pair_t), intent(in) :: pair
+    !> Gap before loading [m]
+    real(wp), intent(in) :: gap(:, :)
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    class(friction_law_t), intent(in) :: friction
+    class(normal_law_t), intent(in) :: law
+    !> Shear tractions do not move the pressure
+    logical, intent(in) :: goodman
+    !> Handle of the problem
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+    type(field_space_t) :: space
+    type(friction_problem_t) :: problem
+    type(windowed_friction_t), pointer :: fft
+    type(direct_friction_t), pointer :: dense
+    integer(c_int64_t) :: bytes
+
+    space = space_over(lattice%extent, threads)
+    bytes = dense_fields*lattice%size()
+    ! of the largest contact there can be, with all loads prescribed
+    if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
+                                                              space%threads, abs(pair%lambda_2) > 0.0_wp)
+    call take_window(lattice, bytes, threads, slot, handle, error)
+    if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, pair, gap, candidate, friction, goodman, &
+                                                          error, law)
+    if (.not. allocated(error)) then
+      if (method == fft_based) then
+        allocate (fft)
+        slot%sheared => fft
+        call new_windowed_friction(fft, problem, error, threads, kernel_cache)
+      else
+        allocate (dense)
+        slot%sheared => dense
+        problem%options%direct%as_written = method == as_written
+        call new_direct_friction(dense, problem, error)
+      end if
+    end if
+    if (allocated(error)) call free_object(handle)
+  end subroutine new_sheared
+
+  !> Refuse the entry of nodes if there is no memory for its fields.
+  subroutine secure_entry(slot, error)
+    type(slot_t), intent(in) :: slot
+    type(error_t), allocatable, intent(out) :: error
+
+    call require_memory(slot%working + entry_fields*8*slot%lattice%size(), error, slot%space%threads)
+  end subroutine secure_entry
+
+  !> Make a state with some numbers, and fields that are not set.
+  subroutine new_held_state(numbers, extent, handle, error)
+    !> State without fields
+    type(contact_state_t), intent(in) :: numbers
+    integer, intent(in) :: extent(2)
+    !> Handle of the state
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t), pointer :: state
+    integer :: stat
+
+    allocate (state, source=numbers)
+    associate (n => extent(1), m => extent(2))
+      allocate (state%pressure(n, m), state%gap(n, m), state%zone(n, m), state%traction(n, m, 2), &
+                state%relative_displacement(n, m, 2), state%slip_increment(n, m, 2), state%accumulated_slip(n, m), &
+                state%dissipation_density(n, m), stat=stat)
+    end associate
+    if (stat /= 0) call raise(error, status%resources, &
+                              'not enough memory for the state of the contact: choose a smaller window')
+    call hold(state, handle, error)
+  end subroutine new_held_state
+
+  !> Return the address of a field of a state, by its name in hexcontact.variables.
+  subroutine find_field(state, name, place, error)
+    type(contact_state_t), intent(in), target :: state
+    character(len=*), intent(in) :: name
+    integer(c_int64_t), intent(out) :: place
+    type(error_t), allocatable, intent(out) :: error
+
+    place = 0
+    select case (name)
+    case ('pressure')
+      if (allocated(state%pressure)) place = address_of(state%pressure)
+    case ('gap')
+      if (allocated(state%gap)) place = address_of(state%gap)
+    case ('zone')
+      if (allocated(state%zone)) place = transfer(c_loc(state%zone), 0_c_intptr_t)
+    case ('traction_x', 'traction_y')
+      if (allocated(state%traction)) place = address_of(state%traction(:, :, component_of(name)))
+    case ('relative_displacement_x', 'relative_displacement_y')
+      if (allocated(state%relative_displacement)) place = address_of(state%relative_displacement(:, :, component_of(name)))
+    case ('slip_increment_x', 'slip_increment_y')
+      if (allocated(state%slip_increment)) place = address_of(state%slip_increment(:, :, component_of(name)))
+    case ('accumulated_slip')
+      if (allocated(state%accumulated_slip)) place = address_of(state%accumulated_slip)
+    case ('dissipation_density')
+      if (allocated(state%dissipation_density)) place = address_of(state%dissipation_density)
+    case default
+      place = 0
+    end select
+    if (place == 0) call raise(error, status%bad_handle, 'the state has no field '//name)
+  end subroutine find_field
+
+  !> Return the component that the name of a field ends with: 1 (x) or 2 (y).
+  pure integer function component_of(name)
+    character(len=*), intent(in) :: name
+
+    component_of = merge(1, 2, name(len(name):) == 'x')
+  end function component_of
+
+  !> Return the address of a field.
+  integer(c_int64_t) function address_of(field)
+    real(wp), intent(in), target, contiguous :: field(:, :)
+
+    address_of = transfer(c_loc(field), 0_c_intptr_t)
+  end function address_of
+
+end module hc_f2py_problems

@@ -1,0 +1,6 @@
+# Procedures of the core and their records, which fortran/python/generate.py writes from procedures.toml.
+from typing import Any
+
+LIBRARY: str
+
+def __getattr__(name: str) -> Any: ...

@@ -1,0 +1,154 @@
+"""Memory that a run needs: one table of fields by feature, compared with the memory that is available."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..core import contact, kernel_cache, memory
+from ..core.lattice import Lattice
+from ..deck.below import cycle_of
+from ..deck.units import readable
+from ..problem.checks import stage_of
+from ..problem.problem import Problem
+from ..text import listed
+from ..variables import DISPLACEMENTS, STATE, WORN
+
+_ITEM = 8  # bytes of a float
+# Measured by tests/bench/memory.py.
+_WRITING = 24 * 2**20  # bytes of netCDF and HDF5, which an interim output loads beside the solver
+_LOADED = 5 * 2**20  # bytes of modules that a run imports
+_LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
+_HOLES = 32 * 2**20  # bytes at most of freed arrays in the heap, by FFTs without friction: larger go back
+_PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
+
+
+def fields_held(case: Problem) -> int:
+    """Return the number of fields that Python and the core hold besides the solver, by feature."""
+    friction = case.frictional
+    entry = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
+    table = [
+        # initial gap, pressure, gap and zones, beside them those that the measures take in place of the
+        # iteration's; with friction the state before, which the core holds, and holes in the heap
+        (True, 14 if friction else 3),
+        (entry, 45),  # places of nodes when their gap closed
+        (case.adaptive, 40),  # the path in whole steps, and edges
+        (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts
+        (case.deck.wear, 42),  # cycles before and after a jump, their record, the pressure ahead
+        (case.deck.wear, 3 * (1 + len(case.cycle)) if case.deck.wear else 0),  # guesses of its load steps
+        (case.deck.interface, 6 if friction else 4),  # springs, and the symbol of bodies on them
+    ]
+    return sum(count for used, count in table if used)
+
+
+def peak_memory(case: Problem, lattice: Lattice) -> int:
+    """Return the largest memory (bytes) of a run on a window, with interpreter and libraries."""
+    solved = memory_needed(case, lattice, _parts(case, lattice))
+    return memory.resident() + max([solved, *_stress_needs(case, lattice, kept=True).values()])
+
+
+def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[str, int]:
+    """Return the memory (bytes) of each table [[stress]] and [[fatigue]] after the run, by its key."""
+    if not (case.deck.stress or case.deck.fatigue):
+        return {}
+    from ..interior import fatigue, stress
+    from ..interior.region import region
+
+    needs = {}
+    for number, table in enumerate(case.deck.stress, 1):
+        all_steps = math.ceil(len(case.load_steps) / case.output.every)
+        steps = all_steps if table.steps == "all" else len(table.steps or (1,))
+        below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
+        needs[f"stress.{number}"] = max(below, _tractions_memory(case, lattice, steps, table.source))
+    for number, cycle in enumerate(case.deck.fatigue, 1):
+        steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
+        points = region(lattice, **cycle.where)
+        below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
+        needs[f"fatigue.{number}"] = max(below, _tractions_memory(case, lattice, steps, None))
+    return {key: needed + _LOADED_AFTER for key, needed in needs.items()}
+
+
+def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
+    """Return the places of the load steps of a closed cycle, adaptive segments as one step each."""
+    first, last = cycle_of([stage_of(step) for step in case.load_steps], labels)
+    return range(first, last + 1)
+
+
+def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
+    """Return the memory (bytes) of the tractions of some steps, corrected at sharp edges."""
+    from ..interior import stress
+
+    mu = case.friction_coefficient  # nan where it varies
+    sheared = math.isnan(mu) or 0.0 < mu < math.inf
+    nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
+    used = "nodes" if case.deck.interface else source
+    needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)
+    # beside the spectra of the solver, which are kept
+    return needed + case.frictional * contact.memory_needed("fft", *lattice.shape, part="operator")
+
+
+def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
+    """Return the memory (bytes) to solve and write load steps on a window.
+
+    The size of the contact is the estimate at the largest load, else that of the window. `kept` are further,
+    dispensable bytes.
+    """
+    bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
+    operator, set_up = (
+        contact.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        for part in ("operator", "set-up of the operator")
+    )
+    needed = case.memory_needed(lattice) + fields_held(case) * _ITEM * lattice.size + kept
+    if case.deck.wear:
+        needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
+    if bodies:
+        # the set-up fits into the vectors of a solver with friction, which are free by then
+        needed += len(bodies) * operator + (0 if case.frictional else set_up)
+    if not case.frictional and case.method_for(lattice) == "fft":
+        needed += min(needed // 2, _HOLES)
+    return _LOADED + _WRITING + needed
+
+
+def _parts(case: Problem, lattice: Lattice) -> int:
+    """Return the bytes of operators on parts of the window around a growing contact, and of cached spectra.
+
+    Of n steps in which it grows, about log2(n) need a part that is larger by much.
+    """
+    if case.method_for(lattice) == "direct":
+        return 0
+    most, growing = 0.0, 0
+    for step in case.load_steps:
+        if step.z.value > most:
+            most, growing = step.z.value, growing + 1
+    doublings = min(math.log2(max(growing, 1)), 5.0) - case.frictional
+    kept = int(_PART[case.frictional] * max(doublings, 0.0) * case.contact_nodes(lattice))
+    return min(kept, kernel_cache.bound())
+
+
+def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
+    """Refuse a window, with the fields of some steps, or a table that does not fit into memory."""
+    kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
+    needed, there = memory_needed(case, lattice) + kept, memory.available()
+    fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
+    fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""
+    advice = ["a smaller window" if case.window_fixed else f"a larger grid.spacing{fits}"]
+    if (method := case.method_for(lattice)) == "direct":
+        advice.append('solver.method = "fft"')
+    if steps_held:
+        advice.append("an output file")
+    memory.require(
+        needed,
+        f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {method})",
+        f"choose {listed(advice, 'or')}",
+        there,
+    )
+    for key, below in _stress_needs(case, lattice).items():
+        if below + kept > needed:
+            fewer = "a smaller region, fewer points or steps, or a larger grid.spacing"
+            memory.require(below + kept, key, f"choose {fewer}", there)
+
+
+def fields_of(case: Problem) -> tuple[str, ...]:
+    """Return the fields of each step of a case: its whole state, and displacements that the deck names."""
+    worn = WORN if case.deck.wear else ()
+    return (*STATE[case.frictional], *worn, *(name for name in DISPLACEMENTS if name in case.output.fields))

@@ -1,0 +1,292 @@
+"""A case on one window of its lattice."""
+
+from __future__ import annotations
+
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, Generic, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
+from ..core.friction import ContactState, FrictionalContact
+from ..core.lattice import Lattice
+from ..core.measures import measures
+from ..errors import DeckError
+from ..problem.loads import MOTIONS, LoadStep
+from ..problem.problem import Problem
+from ..problem.window import grown, rim_sides
+from ..result.step import Step
+from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, STATE, names_where
+from .events import Listener
+from .memory_needed import fields_of, require_memory
+
+S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
+
+_STEPPED = names_where(lambda v: v.dims == ("step",))
+# numbers of a state that have the names of the history
+_NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
+_PATH_ERROR = "dissipated_energy_path_error"  # static steps have no path
+_ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contact
+
+
+class Window(ABC, Generic[S]):
+    """A case on one window, whose results hold the fields of `steps_held` load steps in memory."""
+
+    state: ClassVar[tuple[str, ...]]  # fields of every step
+    worn: Array | None = None  # depth by which the surfaces are worn, m
+
+    def __init__(
+        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
+    ) -> None:
+        require_memory(case, lattice, steps_held)
+        self.case, self.lattice, self.steps_held = case, lattice, steps_held
+        self.listener = listener or Listener()
+        gap, self.candidate = case.initial_gap(lattice)
+        self.initial_gap: Array = self._where_touching(gap)
+        self.friction = case.friction_law(lattice)
+        self._bodies: dict[int, FlexibilityOperator] = {}
+        self._contact: Any = self._solver(gap)
+
+    @abstractmethod
+    def _solver(self, gap: Array) -> Any:
+        """Return the solver for an initial gap (inf where nothing can touch)."""
+
+    def _without_friction(self, gap: Array) -> NormalContact:
+        """Return the solver of the contact without friction."""
+        method = self.case.method_for(self.lattice)
+        given = self.lattice, self.case.solved_pair, gap, self.candidate
+        return NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
+
+    @abstractmethod
+    def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
+        """Solve a load step from the state at its beginning, None before the first load.
+
+        `values` are the prescribed loads or motions of z, x, y and the twist.
+        """
+
+    def carried(self, state: S | None, lattice: Lattice) -> S | None:
+        """Return a state of a smaller window on this one."""
+        return state
+
+    def restored(self, step: Step) -> S | None:
+        """Return the state at the end of a step on this window, if the next one needs it."""
+        return None
+
+    def outgrown(self, solution: S) -> bool:
+        """Test whether the contact reached the rim of the window, also in a part of the step only."""
+        return solution.touches_rim and not self.case.full_contact
+
+    def grown(self, solution: S, target: LoadStep) -> Self:
+        """Return a larger window for a contact that reached the rim, unless the deck fixes the window."""
+        if self.case.window_fixed:
+            raise DeckError(
+                f"grid: in step {target.index + 1} the contact reaches the rim of the window of "
+                f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
+                'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
+            )
+        del self._contact  # its memory goes before that of the next comes
+        self._bodies.clear()
+        larger = grown(self.lattice, rim_sides(solution.zone > 0))
+        self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
+        return type(self)(self.case, larger, self.steps_held, self.listener)
+
+    def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
+        """Return a finished step from the states at its end and beginning; its time counts from `started`."""
+        fields = {"initial_gap": self.initial_gap}
+        fields |= {name: getattr(solution, name) for name in self.state}
+        fields["gap"] = self._where_touching(solution.gap)
+        if self.worn is not None:
+            fields["worn_depth"] = self.worn
+        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
+            fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
+        for body in (1, 2):
+            wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            if wanted:
+                moved = self._displacement(body, fields)
+                fields |= {name: moved[name[-1]] for name in wanted}
+        bulk: dict[str, float] = {}
+        if self.case.deck.bulk:
+            bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
+            bulk["bulk_body"] = self.case.deck.bulk.body
+        history: dict[str, float | int | str] = {
+            **self._history(solution, before),
+            **bulk,
+            "segment": target.segment + 1,
+            "label": target.label,
+            "seconds": time.perf_counter() - started,
+        }
+        return Step(
+            target.index,
+            self.lattice,
+            fields,
+            history,
+            prescribed=self._prescribed(target, history),
+            load_fraction=(target.index + 1) / len(self.case.load_steps),
+            ramp_done=target.fraction,
+            bodies=(self.case.body_1, self.case.body_2),
+            friction=self.case.friction_coefficient,
+            sharp=self.case.deck.interface is None,
+            shear_limit=self.friction.shear_limit,
+        )
+
+    def _where_touching(self, values: Array) -> Array:
+        """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
+        return values if self.candidate.all() else np.where(self.candidate, values, np.nan)
+
+    def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
+        """Return the prescribed loads and motions of a load step, by the keys of the deck."""
+        driven = {}
+        for motion, drive in zip(MOTIONS, target.targets, strict=True):
+            if motion == "z" or self.case.frictional:
+                name = LOADS[motion][drive.control == "displacement"]
+                # a ramp after the other control begins at the value that control led to
+                driven[name] = float(history[name] if drive.from_start else drive.value)
+        known = self.case.deck.bulk.components if self.case.deck.bulk else ()
+        stresses = zip(BULK_STRESS, target.bulk, strict=True)
+        return driven | {name: value for name, value in stresses if name in known}
+
+    def _history(self, solution: S, before: S | None) -> dict[str, float]:
+        """Return the numbers of a state: those of the solver, and its measures."""
+        known = solution.__dict__
+        given = {name: known[name] for name in _STEPPED if name in known}
+        gap = self.initial_gap if self.worn is None else self.initial_gap + self.worn
+        return given | measures(self.lattice, self.friction, gap, self.candidate, solution)
+
+    def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+        """Return the surface displacement of one body, z into the body itself.
+
+        Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
+        """
+        body = self.case.body_1 if number == 1 else self.case.body_2
+        if body.rigid:
+            return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
+        if number not in self._bodies:
+            material, rigid = (body.young_modulus, body.poisson_ratio), (None, None)
+            pair = ElasticPair.from_materials(*(material + rigid if number == 1 else rigid + material))
+            self._bodies[number] = FlexibilityOperator(self.lattice, pair)
+        operator, pressure = self._bodies[number], fields["pressure"]
+        z, x, y = operator.apply(pressure, fields.get("traction_x"), fields.get("traction_y"))
+        if self.case.solver.coupling == "goodman" and "traction_x" in fields:
+            z = operator.apply(pressure)[0]  # in this approximation shear does not move the surfaces along z
+        sign = 1.0 if number == 1 else -1.0
+        return {"x": sign * x, "y": sign * y, "z": z}
+
+
+class NormalWindow(Window[NormalSolution]):
+    """Contact without friction, whose steps have no history."""
+
+    state = STATE[False]
+
+    _solver = Window._without_friction
+
+    def advance(
+        self, state: NormalSolution | None, target: LoadStep, values: tuple[float, ...]
+    ) -> NormalSolution:
+        """Press with a force or to an approach."""
+        driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
+        solution: NormalSolution = self._contact.solve(**driven, tolerance=self.case.solver.tolerance)
+        return solution
+
+
+class FrictionWindow(Window[ContactState]):
+    """Contact with friction; a step starts from the state at the end of the step before."""
+
+    state = STATE[True]
+    _contact: FrictionalContact
+
+    def _solver(self, gap: Array) -> FrictionalContact:
+        return FrictionalContact(
+            self.lattice,
+            self.case.solved_pair,
+            gap,
+            self.candidate,
+            friction_coefficient=self.friction,
+            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
+            method=self.case.method_for(self.lattice),
+            iteration="dissertation" if self.case.solver.iteration == "dissertation" else "newton",
+            interface=self.case.interface,
+            rim_warning=False,
+        )
+
+    def advance(
+        self,
+        state: ContactState | None,
+        target: LoadStep,
+        values: tuple[float, ...],
+        **how: Any,
+    ) -> ContactState:
+        """Advance a state to new loads and motions; `how` goes to the solver."""
+        return self._contact.advance(
+            self._contact.virgin() if state is None else state,
+            [motion.control for motion in target.targets],
+            values,
+            bulk_strain=self.case.bulk(target.bulk)[1],
+            static=self.case.solver.algorithm == "static",
+            entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
+            **{"tolerance": self.case.solver.tolerance} | how,
+        )
+
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        self.worn = depth
+        del self._contact  # frees the memory of the solver before that of the next
+        self._contact = self._solver(np.where(self.candidate, self.initial_gap + depth, np.inf))
+
+    def grown(self, solution: ContactState, target: LoadStep) -> Self:
+        """Return the problem on a larger window, with its worn depth."""
+        larger = super().grown(solution, target)
+        if self.worn is not None:
+            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0), dtype=float))
+        return larger
+
+    def joined(self, first: ContactState, last: ContactState) -> ContactState:
+        """Record two steps as one, with the slip of both and its residual."""
+        return self._contact.joined(first, last)
+
+    def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
+        """Return a state on this window; the history of the new nodes follows from it."""
+        return None if state is None else self._contact.extended(state, lattice)
+
+    def restored(self, step: Step) -> ContactState | None:
+        """Return the whole state, and set the worn depth of the step."""
+        if (worn := step.fields.get("worn_depth")) is not None:
+            self.wear(np.array(worn))
+        return state_of(step)
+
+    # --- history ------------------------------------------------------------------------------------------
+
+    def _history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
+        static = self.case.solver.algorithm == "static"  # nothing has gone before
+        spent_before = 0.0 if before is None or static else before.dissipated_energy
+        spent = solution.dissipated_energy - spent_before
+        history = {**super()._history(solution, before), "dissipated_energy_step": spent}
+        left_out = () if self.case.deck.bulk else BULK_STRAIN
+        left_out = (*left_out, _PATH_ERROR) if static else left_out
+        return {name: value for name, value in history.items() if name not in left_out}
+
+    def largest_contact_area(self) -> float:
+        """Return the contact area at the largest load of the history, without friction (m2)."""
+        solver, nodes = self._without_friction(self.initial_gap), 1
+        for drive in self.case.largest_drives:
+            known: dict[str, Any] = {**drive}
+            nodes = max(nodes, int((solver.solve(**known, tolerance=_ROUGHLY).zone > 0).sum()))
+        return self.lattice.cell_area * nodes
+
+
+def state_of(step: Step) -> ContactState:
+    """Return the state with friction at the end of a step with all its fields."""
+    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
+    if missing := needed - step.fields.keys() - step.history.keys():
+        raise DeckError(
+            f"step {step.number} holds no state of a contact with friction: it lacks "
+            f"{', '.join(sorted(missing))}"
+        )
+    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
+    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    return ContactState(**state)  # a finished step has converged, and away from the rim

@@ -194,7 +194,7 @@ contains
     call globalization%step_share(0.9_wp*options%newton%settled_residual, options%newton, settled)
     call check(error, settled, 1.0_wp, 0.0_wp, 'a settled residual')
     if (allocated(error)) return
-    do i = 1, 9
+    do i = 1, 20
       call globalization%cut(options%newton%cautious_share, options%newton)
     end do
     call check(error, globalization%share_of_r, options%newton%least_share_of_r, 0.0_wp, 'the least share')

@@ -970,7 +970,7 @@ NEEDS_FRICTION = {
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, entry in entries().items() if entry.needs and name != "study"]
+    "name", [name for name, entry in entries().items() if entry.needs and entry.of_a_result]
 )
 def test_what_needs_friction_says_so(name: str) -> None:
     without = frictionless()

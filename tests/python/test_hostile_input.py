@@ -329,7 +329,7 @@ def test_exports_go_through_no_link_and_into_no_pipe(folder: Path) -> None:
 
 def test_a_schema_replaces_schemas_only(folder: Path) -> None:
     Path("package.json").write_text('{"name": "mine"}')
-    assert "no schema of hexcontact" in sentence("schema", "-o", "package.json")
+    assert "not a hexcontact schema" in sentence("schema", "-o", "package.json")
     assert Path("package.json").read_text() == '{"name": "mine"}'
     for _ in range(2):
         assert command("schema", "-o", "deck.json").exit_code == 0

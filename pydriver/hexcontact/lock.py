@@ -17,7 +17,7 @@ from .errors import DeckError
 from .files import is_process
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
-_LONGEST = 1000  # bytes of a lock
+_LEAST, _LONGEST = 500, 1000  # bytes of a lock, which ends with blanks
 _TRIES = 1000  # to open a lock that its holder deletes at the same time
 
 
@@ -34,6 +34,8 @@ class Lock:
         Lock file.
     output : Path
         The output that it protects, for messages.
+    began : float or None
+        When the run began that a resumed one continues (s since 1970), see `begun`; None: now.
 
     Raises
     ------
@@ -41,7 +43,7 @@ class Lock:
         If another run holds it, or the file is no lock, which stays unchanged.
     """
 
-    def __init__(self, path: Path, output: Path) -> None:
+    def __init__(self, path: Path, output: Path, began: float | None = None) -> None:
         self.path = path
         for _ in range(_TRIES):
             self._descriptor = _opened(path)
@@ -71,15 +73,18 @@ class Lock:
                 f"{output} is being written by another run, process {holder.get('process', '?')} "
                 f"on {holder.get('host', '?')}{since}; {advice}"
             )
-        text = {
+        text: dict[str, Any] = {
             "process": os.getpid(),
             "host": os.uname().nodename,
             "since": time.strftime("%F %T"),
             "time": time.time(),
         }
+        if began is not None and math.isfinite(began):
+            text["began"] = began
         try:
-            os.ftruncate(self._descriptor, 0)
-            os.pwrite(self._descriptor, json.dumps(text).encode(), 0)
+            # one call, so that a process that dies here leaves the old text or the new one
+            os.pwrite(self._descriptor, json.dumps(text).encode().ljust(_LEAST), 0)
+            os.ftruncate(self._descriptor, _LEAST)
         except BaseException:  # a full disk
             self.release()
             raise
@@ -109,7 +114,8 @@ def begun(path: Path) -> float | None:
     """Return when the run that left a lock began (s since 1970), inf if it died at once; None without one."""
     if not names_a_run(path):
         return None
-    began = (holder_of(path.read_bytes()) or {}).get("time")
+    holder = holder_of(path.read_bytes()) or {}
+    began = holder.get("began", holder.get("time"))
     return float(began) if isinstance(began, int | float) else math.inf
 
 

@@ -27,7 +27,7 @@ import xarray  # noqa: F401
 import hexcontact
 from hexcontact.case import Case
 from hexcontact.cli import app as cli
-from hexcontact.cli import messages, run  # noqa: F401
+from hexcontact.cli import run, solving  # noqa: F401
 from hexcontact.result import store
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.step import Step

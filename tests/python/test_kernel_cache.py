@@ -294,7 +294,7 @@ def test_file_that_comes_and_goes_is_no_reason_to_warn(tmp_path: Path) -> None:
     kernel_cache.configure(memory=0, folder=tmp_path)
     operator(4)
     (path,) = tmp_path.iterdir()
-    kernel_cache._cache.use_kernel_folder(os.fsencode(tmp_path) + b"/", kernel_cache._maker(), "0", 0, False)
+    kernel_cache.flat.use_kernel_folder(os.fsencode(tmp_path) + b"/", kernel_cache._maker(), "0", 0, False)
     code = """
 import os, sys
 path, running = sys.argv[1:]

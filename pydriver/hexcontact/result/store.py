@@ -139,7 +139,7 @@ class Store:
         lock = store.folder / "lock"
         with store.writing("the journal", missing=True):
             began = begun(lock)
-            store._lock = Lock(lock, store.path)
+            store._lock = Lock(lock, store.path, began)
         try:
             return store, store._read_again(began)
         except BaseException:

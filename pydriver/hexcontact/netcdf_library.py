@@ -123,6 +123,14 @@ def opened(path: Path, mode: Literal["r", "w"] = "r", **options: Any) -> Iterato
             close(file)
 
 
+def created(path: Path, **options: Any) -> netCDF4.Dataset:
+    """Create a file of netCDF, which `close` closes."""
+    import netCDF4
+
+    with LOCK:
+        return netCDF4.Dataset(path, "w", **options)
+
+
 def attributes(path: Path) -> dict[str, Any]:
     """Return the attributes of a file; none if it is missing, damaged or another file."""
     if not path.is_file():  # a pipe would block

@@ -318,7 +318,7 @@ def test_plot_draws_what_is_asked(solved: Path) -> None:
     done = inside(solved, "plot", "sphere.nc", "--what", "all", "--step", "1")
     assert done.returncode == 0, done.stderr
     pictures = re.findall(r"written: (.*\.png)", done.stdout)
-    names = ["overview", "pressure", "section", "history", "stress", "trailing_edge", "boundary"]
+    names = ["overview", "pressure", "section", "boundary", "history", "stress", "trailing_edge"]
     assert [Path(picture).stem for picture in pictures] == [f"sphere_{name}" for name in names]
     result = open_result(solved / "sphere.nc")
     for name, chosen in (("section", [1]), ("history", [])):  # one with a step and one without

@@ -95,8 +95,8 @@ def test_nothing_is_worn_without_wear(result: Result) -> None:
 
 
 def test_tables_and_json_have_the_energies(folder: Path, result: Result) -> None:
-    printed = CliRunner().invoke(app, ["info", str(folder / "loop.nc")]).stdout
-    assert "Dissipated energy" in printed and "segment 6" in printed and "cycle 2" in printed
+    shown = CliRunner().invoke(app, ["info", str(folder / "loop.nc")]).stdout
+    assert "Dissipated energy" in shown and "segment 6" in shown and "cycle 2" in shown
     content = printed.file_content(result)
     assert [cycle["dissipated_energy"] for cycle in content["cycles"]] == result.cycles[
         "dissipated_energy"
@@ -140,7 +140,7 @@ def test_an_ellipse_has_half_axes(result: Result) -> None:
 def test_a_loop_of_chosen_cycles(result: Result) -> None:
     [axes] = plotting.loop(result).axes
     [filled] = axes.patches  # the last cycle
-    assert filled.get_label().startswith("cycle 2: ")
+    assert filled.get_label().startswith("cycle 2:\n")
     [axes] = plotting.loop(result, [1, -1]).axes
     names = [patch.get_label().split(":")[0] for patch in axes.patches]
     assert names == ["cycle 1", "cycle 2"] and "computed" not in drawn.by_label(axes)

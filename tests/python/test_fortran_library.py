@@ -48,4 +48,5 @@ def test_library_knows_nothing_of_python(prefix: Path) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
 def test_page_shows_the_program_that_is_tested(program: Path) -> None:
-    assert program.read_text() in PAGE
+    """As a listing or by a link."""
+    assert program.read_text() in PAGE or f"]({program.name})" in PAGE

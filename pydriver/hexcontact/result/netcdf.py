@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..errors import DeckError
 from ..files import reading
-from ..netcdf_library import LOCK, attributes, close, opened, opened_by_xarray
+from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_result
@@ -83,13 +83,10 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; at the end close it and add its checksum."""
-    import netCDF4
-
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
-        with LOCK:
-            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
+        file = created(path, format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:

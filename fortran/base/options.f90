@@ -103,8 +103,8 @@ module hc_options
     !> Compliance of the spring of a slipping node, over that of the node, below which its component across is left as a start
     real(wp) :: soft_spring = 8.0_wp
     !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
-    !> there the zones are far from those of the solution. 1 takes a little less work, 3 fails for beta = -0.3 and mu = 0.8
-    real(wp) :: cautious_share = 0.6_wp
+    !> there the zones are far from those of the solution
+    real(wp) :: cautious_share = 0.2_wp
     !> Sweeps after which the classification parameter is halved and a whole step taken again; how small its factor gets
     integer :: sweeps_per_cut = 10
     real(wp) :: least_share_of_r = 1.0e-3_wp

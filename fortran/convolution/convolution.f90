@@ -474,10 +474,10 @@ contains
     address = transfer(c_loc(self), address)
   end function address
 
-  !> Hold what another convolution holds.
+  !> Become a further user of plans, spectra and scratch.
   subroutine share(self, from)
     class(holdings_t), intent(inout) :: self
-    !> What the other one holds
+    !> Holder of the original
     type(holdings_t), intent(in) :: from
     integer :: stat
 

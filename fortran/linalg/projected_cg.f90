@@ -74,7 +74,7 @@ contains
     type(conjugate_gradient_t) :: recurrence
     real(wp) :: step, share, rz, largest
     real(wp) :: change(size(b, 2)), along(size(b, 2)), inverse(size(b, 2), size(b, 2))
-    integer :: m
+    integer :: i, m
     type(field_space_t) :: space
     logical :: independent, anew
 
@@ -85,7 +85,11 @@ contains
     call nodes%pack(rhs, r)
     deallocate (rhs)
     call nodes%pack(ax, z)
-    r = r - z
+    !$omp parallel do simd schedule(static) num_threads(space%threads)
+    do i = 1, size(r)
+      r(i) = r(i) - z(i)
+    end do
+    !$omp end parallel do simd
     allocate (onto(size(x)))
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0

@@ -37,8 +37,8 @@ def measure(program: Program, *, quick: bool, sizes: Sequence[int] | None = None
             *("CONTACT at 10⁻⁵ [s]", "ours [s]", "times faster", "goal", "stick, CONTACT", "ours"),
         ],
         remarks=[
-            "CONTACT: what a process with several repetitions of a history takes longer than one with a "
-            "single one, without output; ours: the best set-up and the best solution in a process. The "
+            "CONTACT: difference in time between a process with several repetitions of a history and a "
+            "process with one, without output; ours: the best set-up and the best solution in a process. The "
             "tolerance of CONTACT bounds the change of the tractions in an iteration, ours all residuals. "
             "Stick: its share of the contact after the last step.",
             f"CONTACT: {program.version}.",

@@ -14,6 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from hexcontact import case
+from hexcontact.core import influence
 from hexcontact.solve import session
 
 ROOT = Path(__file__).parents[2]
@@ -46,7 +47,7 @@ def test_programs_of_a_page_print_what_it_says(
         assert printed("\n" * (line - 1) + program, page, names) == output, f"{page}, line {line}"
 
 
-@pytest.mark.parametrize("module", [case, session])
+@pytest.mark.parametrize("module", [case, session, influence])
 def test_examples_in_the_sources_are_right(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0

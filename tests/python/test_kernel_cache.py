@@ -1,6 +1,7 @@
 """Spectra of kernels that are kept: the same answers to the bit, never a wrong one, and nobody is stopped."""
 
 import contextlib
+import doctest
 import os
 import re
 import resource
@@ -34,6 +35,10 @@ def as_before() -> Iterator[None]:
     kernel_cache.clear()
     yield
     kernel_cache.configure(memory="256 MB", folder=False, folder_size="2 GB", folder_shared=False)
+
+
+def test_examples_are_right() -> None:
+    assert doctest.testmod(kernel_cache) == (0, 4)
 
 
 def window(n_row: int = 47, n_col: int = 52, spacing: float = SPACING) -> Lattice:

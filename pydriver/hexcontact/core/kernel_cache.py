@@ -112,7 +112,7 @@ def configure(
     Examples
     --------
     >>> from hexcontact import kernel_cache
-    >>> kernelflat.configure(memory="1 GB")
+    >>> kernel_cache.configure(memory="1 GB")
     """
     bound = None if memory is None else _bytes(memory, "memory")
     size = None if folder_size is None else _bytes(folder_size, "folder_size")
@@ -151,7 +151,7 @@ def statistics() -> Statistics:
     Examples
     --------
     >>> from hexcontact import kernel_cache
-    >>> kernelflat.statistics().memory <= 256e6
+    >>> kernel_cache.statistics().memory <= 256e6
     True
     """
     return Statistics(*flat.kernel_statistics())

@@ -107,7 +107,7 @@ class Stress(Below):
 
     components: Annotated[
         tuple[str, ...], Several(Word(tuple(STRESSES)), "names", '["von_mises_stress", "stress_xx"]')
-    ] = meaning((), "what is computed; the six stresses and that of von Mises if absent")
+    ] = meaning((), "components to compute; by default the six stresses and the von Mises stress")
     source: Annotated[str, Word(SOURCES)] | None = meaning(
         None,
         "tractions it is computed from: edges, corrected at the edges of contact and stick; nodes, as they "

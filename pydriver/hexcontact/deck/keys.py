@@ -237,8 +237,8 @@ class Segment(_Driven):
 
     steps: Annotated[int | str, WordOr("auto", Whole(1, MOST_STEPS))] | None = meaning(
         None,
-        "number of load steps; auto: as many as `solver.step_tolerance` takes; "
-        "if absent 1, or as many as there are `values`",
+        "number of load steps; auto: chosen by `solver.step_tolerance`; "
+        "by default 1, or the number of `values`",
     )
     largest_step: Annotated[float, Quantity(NUMBER, above=0, at_most=1)] | None = meaning(
         None, 'largest part of the segment in one load step of steps = "auto"; 1 if absent', "0.1"
@@ -337,7 +337,7 @@ class Wear(Table):
         ..., "number of cycles that wear the surfaces", "10000"
     )
     jump: Annotated[int | str, WordOr("auto", Whole(1, 10**12))] = meaning(
-        "auto", "number of cycles for each solved cycle; auto: as many as `tolerance` allows", "50"
+        "auto", "number of cycles for each solved cycle; auto: chosen by `tolerance`", "50"
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-4, at_most=1)] = meaning(
         0.03,

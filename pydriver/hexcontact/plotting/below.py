@@ -219,7 +219,11 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     if field.name == "life":
         return 1.0, "cycles to a crack, up to $10^9$"
     largest = float(abs(field).max())
-    factor, unit = scaled(largest, units) if units in ("Pa", "m") else (1.0, units.replace("1", ""))
+    if units in ("", "1", "Pa", "m"):
+        factor, unit = scaled(largest, units)
+    else:
+        power = 3 * math.floor(math.log10(largest) / 3) if largest > 0.0 else 0
+        factor, unit = 10.0**-power, f"$10^{{{power}}}$ " * (power != 0) + units.replace("Pa2", "Pa²")
     return factor, titled(named, unit)
 
 

@@ -38,11 +38,12 @@ def table(table: xarray.Dataset) -> Figure:
     fields = [_worst(field) for field in table.data_vars.values() if field.attrs["units"] != "rad"]
     columns = min(_COLUMNS, len(fields))
     rows = -(-len(fields) // columns)
-    canvas = new_figure(3.6 * columns + 0.2, 3.9 * rows + 0.3)
+    places = [_places(field) for field in fields]
+    height = max(float(np.ptp(along) / np.ptp(across)) for across, along, _ in places)
+    canvas = new_figure(3.6 * columns + 0.2, (2.9 * height + 1.5) * rows + 0.4)
     panels = canvas.subplots(rows, columns, squeeze=False).ravel()
-    for axes, field in zip(panels, fields, strict=False):
+    for axes, field, (across, along, words) in zip(panels, fields, places, strict=False):
         values, _, scale = colored_values(field)
-        across, along, words = _places(field)
         drawn = axes.contourf(across, along, values, LEVELS, cmap=map_of(field))
         mark_worst(axes, across, along, field, values)
         axes.set(**words, aspect="equal", title=_place(field))

@@ -449,7 +449,7 @@ def test_life_is_drawn_beside_another_parameter(finished: Path) -> None:
     canvas = plotting.fatigue(result)
     drawn.assert_painted(canvas)
     scales = [axes.get_xlabel() for axes in canvas.axes if axes.get_label() == "<colorbar>"]
-    assert scales == ["second fretting parameter of Ruiz (Pa2 m)", "cycles to a crack, up to $10^9$"]
+    assert scales == ["second fretting parameter of Ruiz ($10^{9}$ Pa² m)", "cycles to a crack, up to $10^9$"]
     panel = drawn.visible(canvas)[1]
     x, y = drawn.si(panel, drawn.by_label(panel)["least life"])
     with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:

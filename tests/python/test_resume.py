@@ -442,7 +442,7 @@ def test_after_a_full_disk_the_run_goes_on(
 # --- killed -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("seed", "words"), [(7, []), (8, []), (3, ["wear"])])
+@pytest.mark.parametrize(("seed", "words"), [(7, []), (3, ["wear"])])
 def test_runs_killed_at_random_moments_go_on(tmp_path: Path, seed: int, words: list[str]) -> None:
     """6 runs, each killed up to three times, in the course of its time or of what it does to the disk.
 
@@ -538,7 +538,7 @@ def test_a_signal_ends_the_run_and_resume_goes_on(tmp_path: Path, sent: signal.S
     assert f"A sphere, after step {match[1]}: 60 load steps" in done.stderr
     assert f"step {int(match[1]) + 1:>2}/60" in done.stderr
     assert f"step {match[1]:>2}/60" not in done.stderr
-    assert "written: " in done.stdout
+    assert re.search(r"^written: a sphere\.nc$", done.stdout, re.MULTILINE)  # as the file was named
     assert done.stdout.count("press") >= 5  # the table has the steps from before, too
     same(tmp_path / "a sphere.nc", tmp_path / "whole.nc")
     again = hexcontact_(tmp_path, "resume", "a sphere.nc", "--plot")

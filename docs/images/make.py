@@ -13,6 +13,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import xarray
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -25,6 +26,7 @@ from hexcontact.cli.app import app
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"
 GALLERY = HERE.parent / "gallery.md"
+PATHS = HERE / "path_dependence.csv"
 
 
 @functools.cache
@@ -81,21 +83,26 @@ def stiffening_interface() -> Figure:
     return figure
 
 
-def path_dependence() -> Figure:
-    """Draw where incremental and static answers differ in the P-Q plane: cases/study_path.toml."""
+def solve_paths() -> None:
+    """Run cases/study_path.toml and keep the numbers of its picture in path_dependence.csv."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "study_path.nc"
         done = CliRunner().invoke(app, ["study", str(CASES / "study_path.toml"), "-o", str(target)])
         assert done.exit_code == 0, done.output
         with xarray.open_dataset(target) as study:
-            return ends_of_paths(study.load())
+            numbers = study[["shift_x", "stick_area", "contact_area", "tangential_load_x"]]
+            numbers.to_dataframe().to_csv(PATHS, float_format="%.9e", lineterminator="\n")
+
+
+def path_dependence() -> Figure:
+    """Draw where incremental and static answers differ in the P-Q plane."""
+    return ends_of_paths(pd.read_csv(PATHS, index_col=[0, 1, 2]).to_xarray())
 
 
 def ends_of_paths(study: xarray.Dataset) -> Figure:
     """Draw the differences at the ends of the paths of the study."""
     normal, sliding = 60.0, 18.0  # P1 and mu P1, N
-    last = study[["shift_x", "stick_area", "contact_area", "tangential_load_x"]]
-    incremental, static = (last.sel(algorithm=name) for name in ("incremental", "static"))
+    incremental, static = (study.sel(algorithm=name) for name in ("incremental", "static"))
     share = incremental.tangential_load_x / sliding
     load = (study.normal_load_2 / normal).broadcast_like(share)
     quantities = (
@@ -223,6 +230,7 @@ def main() -> None:
         picture = HERE / f"cases/{name}.png"
         draw_deck(name, picture)
         print(f"written: {picture}")
+    solve_paths()
     for name, draw in FIGURES.items():
         draw().savefig(HERE / f"{name}.png", dpi=150)
         print(f"written: {HERE / name}.png")

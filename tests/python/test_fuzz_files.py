@@ -16,7 +16,7 @@ from fuzz.file_scan import scan
 from hexcontact import Case
 from hexcontact.result.step import Step
 
-FILES, PARTS = 200, 2
+FILES, PARTS = 100, 1
 SCANNED = 250
 LONGEST = 400  # s without a line from the worker's process, on a machine that does other things, too
 WORKER = Path(fuzz.__path__[0]) / "file_worker.py"

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import drawn
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -51,6 +52,18 @@ IMAGES = MAKE["FIGURES"]
 def test_pictures_of_the_pages_are_those_that_the_program_draws(name: str) -> None:
     found = drawn.pixels(IMAGES[name](), dpi=150)
     assert drawn.apart(found, drawn.pixels(DOCS / f"images/{name}.png")) < SAME
+
+
+@pytest.mark.parametrize(
+    ("load", "share", "algorithm"),
+    [("36 N", "0.25 mu P", "incremental"), ("54 N", "0.65 mu P", "static"), ("84 N", "0.8 mu P", "incremental")],
+)
+def test_numbers_of_the_path_picture_are_those_of_its_study(load: str, share: str, algorithm: str) -> None:
+    kept = pd.read_csv(MAKE["PATHS"], index_col=[0, 1, 2]).loc[(float(load.split()[0]), share, algorithm)]
+    changes = {"load.3.normal_load": load, "load.3.tangential_load_x": share, "solver.algorithm": algorithm}
+    last = hexcontact.Case.from_toml(ROOT / "cases/path_dependence.toml", overrides=changes).run().dataset
+    for name, value in kept.items():
+        assert float(last[name][-1]) == pytest.approx(value, rel=1e-6), name
 
 
 def test_gallery_shows_every_deck() -> None:

@@ -85,7 +85,8 @@ contains
       new_test('entry_rim', test_entry_rim), &
       new_test('entry_oblique', test_entry_oblique), &
       new_test('entry_accurate', test_entry_accurate), &
-      new_test('entry_endless', test_entry_endless) &
+      new_test('entry_endless', test_entry_endless), &
+      new_test('few_nodes', test_few_nodes) &
     ]
   end subroutine collect_load_path
 
@@ -750,6 +751,24 @@ contains
     if (allocated(error)) return
     call check(error, next%sweeps, solver%sweeps, 'sweeps of all of them')
   end subroutine test_entry_endless
+
+  !> A contact of few nodes is solved by LAPACK only if the method fails: sweeps are those of the method alone.
+  subroutine test_few_nodes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(demanding_t) :: solver
+    type(contact_state_t) :: virgin, next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp
+
+    call new_sphere(solver%frictional_contact_t, 2, 0.3_wp, 0.1_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, solver%problem%lattice)
+    solver%loosest = 1.0_wp
+    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 60, 0, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged .and. count(next%pressure > 0.0_wp) <= 16, 'a few nodes')
+    if (allocated(error)) return
+    call check(error, next%sweeps, solver%sweeps, 'sweeps')
+  end subroutine test_few_nodes
 
   !> A load that full sliding does not carry is given up at once: smaller parts of the step lead nowhere.
   subroutine test_sliding(error)

@@ -32,8 +32,6 @@ module hc_normal_law
     procedure(law_check), deferred :: check
     !> Compliance of the layer under a pressure
     procedure(law_compliance), deferred :: compliance_under
-    !> Compliance beyond which a spring has no effect
-    procedure, non_overridable :: softest_spring
     !> Springs of the linearised law
     procedure(law_linearize), deferred :: linearize
     !> Find the nodes in contact by p - r g
@@ -112,15 +110,6 @@ module hc_normal_law
   end interface
 
 contains
-
-  !> Compute the compliance beyond which a spring has no effect [m/Pa].
-  pure real(wp) function softest_spring(self, softest_layer, compliance, p_max)
-    class(normal_law_t), intent(in) :: self
-    !> The spring over a node with the layer under the largest pressure; compliance of a node [m/Pa]; largest pressure [Pa]
-    real(wp), intent(in) :: softest_layer, compliance, p_max
-
-    softest_spring = softest_layer*(compliance + self%compliance_under(p_max))
-  end function softest_spring
 
   !> Return false: there is no layer.
   pure logical function unilateral_is_compliant(self) result(is_compliant)

@@ -19,12 +19,13 @@ module hc_direct_friction
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, slip, normal, &
     force_control, loads_not_carried
+  use hc_normal_problem, only: nearest_nodes
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state
   use hc_transfer, only: restrict_vector
   use hc_load_constraints, only: overloads, fix_in_stick
-  use hc_direct_contact, only: first_guess, exchange
+  use hc_direct_contact, only: exchange
   use hc_area_factors, only: area_factors_t
   use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
     linearize_law, evaluate, record
@@ -203,9 +204,7 @@ contains
       if (touching) then
         nodes = reshape(start%pressure > 0.0_wp, [problem%lattice%size()])
       else
-        nodes = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), &
-                            reshape(problem%initial_gap, [problem%lattice%size()]), &
-                            reshape(problem%candidate, [problem%lattice%size()]))
+        nodes = problem%first_guess(target)
       end if
       worth = count(nodes) >= 4*options%least_contact
     end associate
@@ -301,8 +300,7 @@ contains
     real(wp) :: weight(size(it%p)), mean
     integer :: i
 
-    it%contact = first_guess(self%problem%lattice, self%problem%pair, target%control(normal), target%value(normal), &
-                             it%initial_gap, it%candidate)
+    it%contact = self%problem%first_guess(target)
     where (it%contact)
       it%zone = slip
       it%compliance = infinite
@@ -377,7 +375,7 @@ contains
       if (.not. any(wrong)) return
       before = it%contact
       call exchange(wrong, self%problem%options%direct%stalled_exchanges, fewest, left, it%contact)
-      if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+      if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
       do i = 1, size(it%p)
         if (it%contact(i) .and. .not. before(i)) call enter(self%problem, it, i)
       end do

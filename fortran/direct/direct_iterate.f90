@@ -148,8 +148,8 @@ contains
                      > problem%friction%largest_bound(maxval(it%p))
   end function is_unsupported
 
-  !> Nodes in contact, and springs of a compliant law, that the present pressure and gap call for.
-  pure subroutine linearize_law(problem, it)
+  !> Find the nodes in contact, and the springs of a compliant law, that the present pressure and gap call for.
+  subroutine linearize_law(problem, it)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
@@ -159,11 +159,9 @@ contains
     integer :: i
 
     before = it%contact
-    r = problem%normal_classification_parameter(count(it%contact))
-    call problem%normal_law%find_contact(r, it%p, it%gap, it%candidate, it%contact)
-    if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
-    call problem%normal_law%linearize(1, r, problem%softest_spring(maxval(abs(it%p))), it%p, it%gap, it%contact, &
-                                      it%spring, it%offset)
+    r = problem%normal_classification_parameter(count(before))
+    call problem%find_contact(count(before), it%p, it%gap, it%candidate, it%contact)
+    call problem%linearize(r, it%p, it%gap, it%contact, it%spring, it%offset)
     do i = 1, size(it%p)
       if (it%contact(i) .and. .not. before(i)) call enter(problem, it, i)
     end do

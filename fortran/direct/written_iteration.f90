@@ -24,9 +24,9 @@ module hc_written_iteration
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, stick, slip, normal, no_progress, &
     sweeps_used_up, loads_not_carried
+  use hc_normal_problem, only: nearest_nodes
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
-  use hc_direct_contact, only: first_guess
   use hc_area_factors, only: area_factors_t
   use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, record
   use hc_direct_system, only: solve_area
@@ -84,8 +84,7 @@ contains
       it%p = reshape(start%pressure, [size(it%p)])
       it%q = reshape(start%traction, [size(it%p), 2])
     else
-      it%contact = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), it%initial_gap, &
-                               it%candidate)
+      it%contact = problem%first_guess(target)
     end if
     if (.not. any(it%contact)) it%contact = it%candidate
     where (it%contact) it%zone = stick
@@ -142,7 +141,7 @@ contains
       tension = it%contact .and. it%p < -negligible
       if (any(tension)) then
         it%contact = it%contact .and. .not. tension
-        if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+        if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
       else if (shrinks) then
         return
       else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then

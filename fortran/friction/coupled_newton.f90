@@ -24,7 +24,7 @@ module hc_coupled_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
@@ -64,7 +64,8 @@ contains
     options = now%problem%options%newton
     ! 1.
     call now%find_gap(gap)
-    call find_contact(now, gap, contact)
+    allocate (contact(n))
+    call now%problem%find_contact(now%operators%space%count(now%contact), now%p, gap, now%candidate, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
     call linearize_law(now, gap, .false.)

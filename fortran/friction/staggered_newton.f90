@@ -27,7 +27,7 @@ module hc_staggered_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
@@ -123,7 +123,8 @@ contains
       estimated = .false.
       changed = now%first .and. area == 1
       if (.not. (changed .and. now%without_start)) then
-        call find_contact(now, gap, contact)
+        allocate (contact(n))
+        call now%problem%find_contact(now%operators%space%count(now%contact), now%p, gap, now%candidate, contact)
         if (.not. changed) changed = now%pressure%space%count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if

@@ -45,6 +45,11 @@ module hc_normal_iterate
     real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
     !> Under a compliant law: the residual of the nodes that would enter or leave the set
     real(wp) :: residual_changed = huge(1.0_wp)
+    !> The normal load is prescribed, not the approach; the load [N] or the approach [m]
+    logical :: by_load = .false.
+    real(wp) :: target = 0.0_wp
+    !> Sum of the pressures under a prescribed load [Pa]
+    real(wp) :: pressures = 0.0_wp
     !> Active nodes, now and next
     integer :: n_active = 0, n_next = 0
   end type normal_iterate_t
@@ -139,8 +144,8 @@ contains
     logical :: finite
 
     ! r' of (N2)
-    r = level%options%contact%classification_parameter(level%pair%lambda_1, level%lattice%cell_area()*now%n_active)
-    stiffness = 1.0_wp/level%compliance
+    r = level%normal_classification_parameter(now%n_active)
+    stiffness = 1.0_wp/level%normal_compliance
     p_max = 0.0_wp
     worst = 0.0_wp
     worst_active = 0.0_wp
@@ -167,7 +172,7 @@ contains
     now%p_max = p_max
     now%residual = worst/p_max
     now%residual_changed = worst_changed/p_max
-    now%residual_active = worst_active/(level%compliance*p_max)
+    now%residual_active = worst_active/(level%normal_compliance*p_max)
     if (allocated(now%offset)) now%residual_active = worst_active/p_max
     changed = n_changed > 0 .and. n_next > 0
     now%n_next = n_next
@@ -201,12 +206,12 @@ contains
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
     finite = finite .and. all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
     if (.not. finite) return
-    call level%law%find_contact(r, now%p(:, row), gap, candidate, next)
-    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate, worst)
-    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate .and. (next .neqv. now%active(:, row)), &
-                             worst_changed)
+    call level%normal_law%find_contact(r, now%p(:, row), gap, candidate, next)
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, candidate, worst)
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, &
+                                    candidate .and. (next .neqv. now%active(:, row)), worst_changed)
     p_max = max(p_max, maxval(now%p(:, row)))
-    worst_active = max(worst_active, maxval(abs(left)/(level%compliance + now%compliance(:, row)), mask=now%active(:, row)))
+    worst_active = max(worst_active, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
     n_next = n_next + count(next)
     n_changed = n_changed + count(next .neqv. now%active(:, row))
   end subroutine classify_compliant_row
@@ -219,18 +224,17 @@ contains
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
-    real(wp) :: gap(size(now%p, 1)), softest
+    real(wp), allocatable :: gap(:, :)
     integer :: row
 
     call add_springs(level, now, -1)
-    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, level%space%max(abs(now%p)))
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(gap)
-    do row = 1, size(now%p, 2)
-      gap = level%initial_gap(:, row) + now%w(:, row) - now%approach
-      call level%law%linearize((row - 1)*size(gap) + 1, r, softest, now%p(:, row), gap, now%active(:, row), &
-                               now%compliance(:, row), now%offset(:, row))
+    allocate (gap, mold=now%w)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(gap, 2)
+      gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
     end do
     !$omp end parallel do
+    call level%linearize(r, now%p, gap, now%active, now%compliance, now%offset)
     call add_springs(level, now, 1)
     associate (n => size(now%p))
       call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
@@ -330,15 +334,15 @@ contains
   !> Update p <- p + share d, w <- w + share (K + C) d, C the springs of a compliant law.
   !>
   !> Without springs the approach moves along, so that under a prescribed load it is still that of `find_approach`.
-  subroutine advance(level, now, share, by_load)
+  subroutine advance(level, now, share, follows)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Share of the direction that is added
     real(wp), intent(in) :: share
-    !> The normal load is prescribed, not the approach
-    logical, intent(in) :: by_load
+    !> The approach follows a prescribed load
+    logical, intent(in) :: follows
     real(wp) :: step, closing, moment(size(now%p, 2))
     real(sp) :: largest
     integer :: row
@@ -349,7 +353,7 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
-        if (by_load) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
+        if (follows) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
         ! springs may be many times softer than the bodies: theirs is computed in double precision
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              - now%compliance(from:to, row)*now%p(from:to, row)
@@ -364,7 +368,7 @@ contains
     end do
     !$omp end parallel do
     now%closing_error = now%closing_error + single_error*abs(closing)*largest
-    if (by_load) now%approach = now%approach + closing*sum(moment)/now%punch_sum
+    if (follows) now%approach = now%approach + closing*sum(moment)/now%punch_sum
   end subroutine advance
 
   !> Set tension to zero: it is within the tolerance.
@@ -388,33 +392,29 @@ contains
     !$omp end parallel do
   end subroutine remove_tension
 
-  !> Compute what the sum of the pressures lacks because of rounding.
-  real(wp) function missing_load(level, now, pressures)
+  !> Compute the difference between the prescribed load and the sum of the pressures, which is rounding error.
+  real(wp) function missing_load(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
-    !> What it should be
-    real(wp), intent(in) :: pressures
 
-    missing_load = pressures - level%space%sum(now%p)
+    missing_load = now%pressures - level%space%sum(now%p)
   end function missing_load
 
   !> Scale the pressures to the prescribed load.
-  subroutine fit_load(level, now, pressures)
+  subroutine fit_load(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> Sum of the pressures under the prescribed load [Pa]
-    real(wp), intent(in) :: pressures
     real(wp) :: lack
 
-    lack = missing_load(level, now, pressures)
+    lack = missing_load(level, now)
     if (allocated(now%punch)) then
       now%p = now%p + lack/now%punch_sum*now%punch
     else
-      now%p = pressures/(pressures - lack)*now%p
+      now%p = now%pressures/(now%pressures - lack)*now%p
     end if
   end subroutine fit_load
 

@@ -17,15 +17,11 @@ module hc_normal_start
 contains
 
   !> Set the pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
-  subroutine set_start(level, now, by_load, target, candidate, error)
+  subroutine set_start(level, now, candidate, error)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate, whose pressure is the one to start from, up to a factor
     type(normal_iterate_t), intent(inout) :: now
-    !> The normal load is prescribed, not the approach
-    logical, intent(in) :: by_load
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
     !> Allocated on failure: not enough memory
@@ -47,7 +43,7 @@ contains
                 now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
     end if
     if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
-    if (stat == 0 .and. level%law%is_compliant()) then
+    if (stat == 0 .and. level%normal_law%is_compliant()) then
       allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
     end if
     if (stat /= 0) then
@@ -68,10 +64,10 @@ contains
     !$omp end parallel do
     now%n_active = level%space%count(now%active)
     largest = level%space%max(now%p)
-    now%approach = target
+    now%approach = now%target
     now%closing_error = 0.0_wp
     scale = 1.0_wp
-    if (by_load) scale = target/(level%lattice%cell_area()*level%space%sum(now%p))
+    if (now%by_load) scale = now%target/(level%lattice%cell_area()*level%space%sum(now%p))
     now%span(1, :) = n(1) + 1
     now%span(2, :) = 0
     call find_span(now, level%space)
@@ -87,10 +83,10 @@ contains
     call advance(level, now, 1.0_wp, .false.)
     do try = 1, merge(start_steps, 0, allocated(now%offset))
       call linearize_law(level, now, 0.0_wp)
-      if (by_load) exit
+      if (now%by_load) exit
       call rescale(level, now)
     end do
-    if (.not. by_load) then
+    if (.not. now%by_load) then
       call rescale(level, now)
       now%p_unit = level%space%max(now%p)
       now%w_unit = now%p_unit*level%preconditioner%unit

@@ -14,9 +14,10 @@ module hc_wear_ahead
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_contact_state, only: contact_state_t, load_target_t, force_control, displacement_control
   use hc_normal_law, only: normal_law_t
   use hc_nodal_springs, only: nodal_springs_t
+  use hc_normal_problem, only: new_normal_problem
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
@@ -139,20 +140,20 @@ contains
     type(normal_iterate_t) :: iterate
     type(normal_kernel_t), target :: kernel
     type(contact_state_t) :: state
+    type(load_target_t) :: target
     real(wp), allocatable :: closing(:, :), layer(:, :)
     real(wp) :: lift
     integer :: col, row
 
-    level%lattice = lattice
-    level%pair = pair
-    level%candidate = now%candidate
     allocate (layer, mold=before)
     do row = 1, size(layer, 2)
       do col = 1, size(layer, 1)
         layer(col, row) = law%compliance_under(before(col, row))
       end do
     end do
-    allocate (level%law, source=nodal_springs_t(reshape(spring + layer, [size(spring)])))
+    call new_normal_problem(level, lattice, pair, merge(now%gap, 0.0_wp, now%candidate), now%candidate, error, &
+                            nodal_springs_t(reshape(spring + layer, [size(spring)])))
+    if (allocated(error)) return
     call level%prepare(kernel, .true., .true., space, error, cache)
     if (allocated(error)) return
     allocate (closing, mold=before)
@@ -161,7 +162,7 @@ contains
     closing = closing + layer*before
     ! the gap under `before` is that of the cycle, 0 where nodes carry
     lift = maxval(closing, mask=now%candidate)
-    allocate (level%initial_gap, source=lift - closing)
+    level%initial_gap = lift - closing
     do row = 1, size(before, 2)
       do col = 1, size(before, 1)
         if (.not. now%candidate(col, row)) then
@@ -172,10 +173,9 @@ contains
       end do
     end do
     allocate (state%pressure, source=merge(before, 0.0_wp, now%candidate))
-    associate (control => merge(force_control, displacement_control, now%by_load), &
-               target => merge(lattice%cell_area()*sum(state%pressure), lift, now%by_load))
-      call solve_on_normal_lattice(level, iterate, control, target, tolerance, max_sweeps, state, error)
-    end associate
+    target = load_target_t([merge(force_control, displacement_control, now%by_load)], &
+                           [merge(lattice%cell_area()*sum(state%pressure), lift, now%by_load)])
+    call solve_on_normal_lattice(level, iterate, target, tolerance, max_sweeps, state, error)
     if (allocated(error)) return
     if (.not. state%converged) then
       call raise(error, status%no_convergence, 'the pressure after a jump of wear was not found')

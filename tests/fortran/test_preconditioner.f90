@@ -21,6 +21,7 @@ module test_preconditioner
   use hc_lattice_solver, only: solve_on_lattice
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_problem, only: new_normal_problem
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_pressure_kernel, only: normal_kernel_t
   use test_friction, only: new_sphere, precondition_shear
@@ -324,11 +325,10 @@ contains
     call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.0_wp), error, n_threads=1)
     if (allocated(error)) return
     do k = 1, 2
-      level(k)%lattice = contact%problem%lattice
-      level(k)%initial_gap = contact%problem%initial_gap
-      level(k)%candidate = contact%problem%candidate
-      allocate (level(k)%law, source=contact%problem%normal_law)
-      level(k)%pair = contact%problem%pair
+      associate (problem => contact%problem)
+        call new_normal_problem(level(k), problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+      end associate
+      if (allocated(error)) return
       call level(k)%prepare(kernel, .true., .true., field_space_t(), error)
       if (allocated(error)) return
       if (k == 2) then
@@ -340,7 +340,7 @@ contains
       end if
       allocate (state(k)%pressure, mold=level(k)%initial_gap)
       state(k)%pressure = merge(1.0_wp, 0.0_wp, level(k)%candidate)
-      call solve_on_normal_lattice(level(k), now(k), force_control, 1.0_wp, 1.0e-10_wp, 400, state(k), error)
+      call solve_on_normal_lattice(level(k), now(k), load_target_t([force_control], [1.0_wp]), 1.0e-10_wp, 400, state(k), error)
       if (allocated(error)) return
       call check_true(error, state(k)%converged, 'converged')
       if (allocated(error)) return

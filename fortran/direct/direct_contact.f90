@@ -83,7 +83,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps

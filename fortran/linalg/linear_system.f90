@@ -19,7 +19,7 @@ module hc_linear_system
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, precondition_constraints, satisfy_constraints, invert_gram, step_ahead
+  public :: linear_system_t, constraints_t, iteration_t, precondition_constraints, satisfy_constraints, step_ahead
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
@@ -40,6 +40,39 @@ module hc_linear_system
     !> Free what products keep for the next one
     procedure :: release
   end type linear_system_t
+
+  !> Linear constraints on the unknowns; at the active nodes (n_active, number of constraints, may be 0).
+  type :: constraints_t
+    !> B, along which the multipliers act, and M B
+    real(wp), allocatable :: columns(:, :), mb(:, :)
+    !> C, if it is not B
+    real(wp), allocatable :: rows(:, :)
+    !> Multipliers m
+    real(wp), allocatable :: multiplier(:)
+  contains
+    !> (C^T M B)^-1
+    procedure :: invert
+    !> C^T x
+    procedure :: resultants
+  end type constraints_t
+
+  !> An iteration: how far it may go, and how it ended.
+  type :: iteration_t
+    !> Norm of the residual that is allowed, and the one that is left
+    real(wp) :: tolerance = 0.0_wp, residual = huge(1.0_wp)
+    !> Iterations allowed, and made
+    integer :: most = 0, made = 0
+    !> GMRES: directions that are stored; after as many the iteration begins anew with the residual that is left
+    integer :: most_directions = 0
+    !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
+    real(wp), allocatable :: weight(:)
+    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer :: outcome = solution_broke_off
+    !> False where the constraints depend on each other: nothing was done
+    logical :: independent = .true.
+    !> Bound of the rounding errors in the product A x, which is carried along
+    real(wp) :: drift = 0.0_wp
+  end type iteration_t
 
   abstract interface
     !> Apply a linear map to a vector.
@@ -156,18 +189,16 @@ contains
   end subroutine satisfy_constraints
 
   !> Take a step along the preconditioned residual, projected on the constraints, before the product A x is known: that of the
-  !> unknowns before small changes serves for the residual, and the product that follows is that of changes and step together.
-  subroutine step_ahead(system, nodes, columns, mb, rows, rhs, ax, multiplier, length, x, error)
+  !> unknowns before small changes serves for the residual, and one product serves for changes and step together.
+  subroutine step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns
     type(active_set_t), intent(in) :: nodes
-    !> B, M B and C at these nodes (n_active, number of constraints)
-    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
+    !> Constraints, with multipliers that are nearly right
+    type(constraints_t), intent(in) :: constraints
     !> Right-hand side, and nearly A x (n)
     real(wp), intent(in), contiguous :: rhs(:), ax(:)
-    !> Multipliers of the constraints, nearly
-    real(wp), intent(in) :: multiplier(:)
     !> Share of the preconditioned residual
     real(wp), intent(in) :: length
     !> Unknowns (n), whose C^T x stays
@@ -175,24 +206,58 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: r(:), z(:)
-    real(wp) :: inverse(size(multiplier), size(multiplier)), share(size(multiplier))
+    real(wp), dimension(size(constraints%multiplier)) :: share
+    real(wp) :: inverse(size(share), size(share))
     logical :: independent
 
-    call invert_gram(rows, mb, inverse, independent, system%space)
+    call constraints%invert(system%space, inverse, independent)
     if (.not. independent) return
     allocate (r(nodes%n_active), z(nodes%n_active))
     call nodes%pack(rhs, r)
     call nodes%pack(ax, z)
     r = r - z
-    call system%space%add_columns(columns, multiplier, r)
+    call system%space%add_columns(constraints%columns, constraints%multiplier, r)
     call system%precondition_packed(nodes, size(x), r, z, error)
     if (allocated(error)) return
-    share = -matmul(inverse, system%space%dots(rows, z))
-    call system%space%add_columns(mb, share, z)
+    share = -matmul(inverse, constraints%resultants(system%space, z))
+    call system%space%add_columns(constraints%mb, share, z)
     call nodes%pack(x, r)
     r = r + length*z
     call nodes%unpack(r, x)
   end subroutine step_ahead
+
+  !> Compute (C^T M B)^-1.
+  subroutine invert(self, space, inverse, independent)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> The inverse; zero if the constraints depend on each other
+    real(wp), intent(out) :: inverse(:, :)
+    !> The matrix can be inverted
+    logical, intent(out) :: independent
+
+    if (allocated(self%rows)) then
+      call invert_gram(self%rows, self%mb, inverse, independent, space)
+    else
+      call invert_gram(self%columns, self%mb, inverse, independent, space)
+    end if
+  end subroutine invert
+
+  !> Compute C^T x of values at the active nodes.
+  function resultants(self, space, x)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> The values
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp) :: resultants(size(self%columns, 2))
+
+    if (allocated(self%rows)) then
+      resultants = space%dots(self%rows, x)
+    else
+      resultants = space%dots(self%columns, x)
+    end if
+  end function resultants
 
   !> Compute (C^T M B)^-1, zero if the constraints depend on each other.
   subroutine invert_gram(rows, mb, inverse, independent, space)

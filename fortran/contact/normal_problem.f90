@@ -14,7 +14,7 @@ module hc_normal_problem
   use hc_contact_state, only: contact_state_t, load_target_t, check_problem, touches_rim, separated, slip, normal, force_control, &
     within_tolerance, not_finite
   use hc_contact_residuals, only: normal_self_compliance, normal_residual, force_residual
-  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_normal_law, only: normal_law_t, unilateral_t, tangent_t
   implicit none
   private
 
@@ -174,13 +174,13 @@ contains
     logical, intent(in) :: contact(self%lattice%extent(1), self%lattice%extent(2))
     !> Compliance [m/Pa] and offset [m] of the spring of each node, 0 off the contact
     real(wp), intent(out), dimension(self%lattice%extent(1), self%lattice%extent(2)) :: compliance, offset
-    real(wp) :: softest
+    type(tangent_t) :: tangent
     integer :: row
 
-    softest = self%softest_spring(self%space%max(abs(p)))
+    tangent = tangent_t(r, self%softest_spring(self%space%max(abs(p))))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(p, 2)
-      call self%normal_law%linearize((row - 1)*size(p, 1) + 1, r, softest, p(:, row), gap(:, row), contact(:, row), &
+      call self%normal_law%linearize((row - 1)*size(p, 1) + 1, tangent, p(:, row), gap(:, row), contact(:, row), &
                                      compliance(:, row), offset(:, row))
     end do
     !$omp end parallel do

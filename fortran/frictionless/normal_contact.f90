@@ -21,7 +21,7 @@ module hc_normal_contact
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal
   use hc_contact_solver, only: contact_solver_t
-  use hc_normal_law, only: normal_law_t
+  use hc_normal_law, only: normal_law_t, tangent_t
   use hc_normal_problem, only: new_normal_problem
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_normal_lattice, only: normal_lattice_t
@@ -231,7 +231,8 @@ contains
     real(wp), intent(inout) :: pressure(:, :)
     real(wp), dimension(size(pressure, 1)) :: compliance, offset
     real(wp), allocatable :: contact(:, :)
-    real(wp) :: r, softest, p_max
+    type(tangent_t) :: tangent
+    real(wp) :: p_max
     integer :: row
 
     p_max = coarser%space%max(coarse%pressure)
@@ -239,16 +240,16 @@ contains
       call prolong_edge(coarser%lattice, coarse%pressure, level%lattice, pressure, level%space)
       return
     end if
-    r = 1.0_wp/coarser%normal_compliance
-    allocate (contact, source=coarse%pressure - r*min(coarse%gap, coarser%normal_compliance*p_max))
+    tangent = tangent_t(1.0_wp/coarser%normal_compliance, level%softest_spring(p_max))
+    allocate (contact, source=coarse%pressure - tangent%r*min(coarse%gap, coarser%normal_compliance*p_max))
     call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
-    softest = level%softest_spring(p_max)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too
-      call level%normal_law%linearize((row - 1)*size(pressure, 1) + 1, r, softest, spread(0.0_wp, 1, size(pressure, 1)), &
-                               -pressure(:, row)/r, level%candidate(:, row) .and. pressure(:, row) > 0.0_wp, compliance, offset)
-      pressure(:, row) = max((pressure(:, row) - r*offset)/(1.0_wp + r*compliance), 0.0_wp)
+      call level%normal_law%linearize((row - 1)*size(pressure, 1) + 1, tangent, spread(0.0_wp, 1, size(pressure, 1)), &
+                                      -pressure(:, row)/tangent%r, level%candidate(:, row) .and. pressure(:, row) > 0.0_wp, &
+                                      compliance, offset)
+      pressure(:, row) = max((pressure(:, row) - tangent%r*offset)/(1.0_wp + tangent%r*compliance), 0.0_wp)
     end do
     !$omp end parallel do
   end subroutine prolong_pressure

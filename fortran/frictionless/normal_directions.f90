@@ -60,14 +60,14 @@ contains
     do row = 1, size(now%p, 2)
       now%d(:, row, 1) = 0.0_sp
       associate (from => now%span(1, row), to => now%span(2, row))
-        associate (n => to - from + 1, p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+        associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
                    z => now%z(from:to, row, 1))
           if (fixed) then
-            call projected_row(n, now%p_unit, p, active, d, part(row))
+            call projected_row(now%p_unit, p, active, d, part(row))
           else if (now%by_load) then
-            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z, mean, now%punch(from:to, row))
+            call projected_row(now%p_unit, p, active, d, part(row), [step_length, step_length*mean], z, now%punch(from:to, row))
           else
-            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z)
+            call projected_row(now%p_unit, p, active, d, part(row), [step_length, 0.0_wp], z)
           end if
         end associate
       end associate

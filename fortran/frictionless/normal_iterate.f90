@@ -8,7 +8,7 @@ module hc_normal_iterate
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_rows, only: classify_row, add_row, dot_single, largest_of
+  use hc_normal_rows, only: limits_t, classification_t, classify_row, add_row, dot_single, largest_of
   implicit none
   private
 
@@ -139,53 +139,46 @@ contains
     logical, intent(out) :: changed
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: r, stiffness, p_max, worst, worst_active, worst_changed
-    integer :: row, n_next, n_changed
-    logical :: finite
+    type(classification_t) :: found(size(now%p, 2))
+    type(limits_t) :: limits
+    integer :: row
 
     ! r' of (N2)
-    r = level%normal_classification_parameter(now%n_active)
-    stiffness = 1.0_wp/level%normal_compliance
-    p_max = 0.0_wp
-    worst = 0.0_wp
-    worst_active = 0.0_wp
-    worst_changed = 0.0_wp
-    n_next = 0
-    n_changed = 0
-    finite = ieee_is_finite(now%approach)
-    !$omp parallel do schedule(static) num_threads(level%space%threads) &
-    !$omp& reduction(max: p_max, worst, worst_active, worst_changed) reduction(+: n_next, n_changed) reduction(.and.: finite)
+    limits = limits_t(level%normal_classification_parameter(now%n_active), 1.0_wp/level%normal_compliance, now%approach)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (allocated(now%offset)) then
-        call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, &
-                                    worst_changed, n_next, n_changed, finite)
-        cycle
+        call classify_compliant_row(level, now, row, limits%r, candidate(:, row), next(:, row), found(row))
+      else
+        call classify_row(limits, level%initial_gap(:, row), now%p(:, row), now%w(:, row), candidate(:, row), &
+                          now%active(:, row), next(:, row), found(row))
       end if
-      call classify_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
-                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, finite)
     end do
     !$omp end parallel do
-    if (.not. finite) then
+    if (.not. (all(found%finite) .and. ieee_is_finite(now%approach))) then
       call raise(error, status%no_convergence, not_finite)
       return
     end if
-    now%p_max = p_max
-    now%residual = worst/p_max
-    now%residual_changed = worst_changed/p_max
-    now%residual_active = worst_active/(level%normal_compliance*p_max)
-    if (allocated(now%offset)) now%residual_active = worst_active/p_max
-    changed = n_changed > 0 .and. n_next > 0
-    now%n_next = n_next
-    if (n_next > 0) return
-    ! too much pressure everywhere: less of it on the old set
+    now%p_max = maxval(found%p_max)
+    now%residual = maxval(found%worst)/now%p_max
+    now%residual_changed = maxval(found%worst_changed)/now%p_max
+    now%residual_active = maxval(found%worst_active)
+    if (.not. allocated(now%offset)) then
+      now%residual_active = now%residual_active/(level%normal_compliance*now%p_max)
+    else
+      now%residual_active = now%residual_active/now%p_max
+    end if
+    now%n_next = sum(found%n_next)
+    changed = sum(found%n_changed) > 0 .and. now%n_next > 0
+    if (now%n_next > 0) return
+    ! too much pressure everywhere: reduce it on the old set
     next = now%active
     now%n_next = now%n_active
   end subroutine classify
 
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
   !> linearised to.
-  subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, worst_changed, n_next, &
-                                    n_changed, finite)
+  subroutine classify_compliant_row(level, now, row, r, candidate, next, found)
     type(normal_lattice_t), intent(in) :: level
     type(normal_iterate_t), intent(in) :: now
     integer, intent(in) :: row
@@ -193,27 +186,24 @@ contains
     real(wp), intent(in) :: r
     logical, intent(in), contiguous :: candidate(:)
     logical, intent(out), contiguous :: next(:)
-    !> What the rows before gave, and now this one too
-    real(wp), intent(inout) :: p_max, worst, worst_active, worst_changed
-    integer, intent(inout) :: n_next, n_changed
-    !> Pressure and gap are finite numbers
-    logical, intent(inout) :: finite
+    !> Residuals and numbers of nodes
+    type(classification_t), intent(out) :: found
     real(wp) :: gap(size(next)), left(size(next))
     integer :: first
 
     first = (row - 1)*size(next) + 1
     left = level%initial_gap(:, row) + now%w(:, row) - now%approach
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
-    finite = finite .and. all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
-    if (.not. finite) return
+    found%finite = all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
+    if (.not. found%finite) return
     call level%normal_law%find_contact(r, now%p(:, row), gap, candidate, next)
-    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, candidate, worst)
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, candidate, found%worst)
     call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, &
-                                    candidate .and. (next .neqv. now%active(:, row)), worst_changed)
-    p_max = max(p_max, maxval(now%p(:, row)))
-    worst_active = max(worst_active, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
-    n_next = n_next + count(next)
-    n_changed = n_changed + count(next .neqv. now%active(:, row))
+                                    candidate .and. (next .neqv. now%active(:, row)), found%worst_changed)
+    found%p_max = max(0.0_wp, maxval(now%p(:, row)))
+    found%worst_active = max(0.0_wp, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
+    found%n_next = count(next)
+    found%n_changed = count(next .neqv. now%active(:, row))
   end subroutine classify_compliant_row
 
   !> Linearise a compliant law about the present pressure and gap, and give the springs to the preconditioner.

@@ -8,6 +8,7 @@ module test_interface
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, normal, &
     along_x
   use hc_coulomb, only: coulomb_t
+  use hc_normal_law, only: tangent_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
@@ -187,7 +188,8 @@ contains
     call check_true(error, law%is_compliant(), 'springs')
     if (allocated(error)) return
     ! of the nodes 3 to 5
-    call law%linearize(3, 1.0_wp, 5.0_wp, [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, compliance, offset)
+    call law%linearize(3, tangent_t(1.0_wp, 5.0_wp), [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, &
+                       compliance, offset)
     call check(error, [compliance, offset], [2.0_wp, 0.0_wp, 5.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'compliances and offsets')
     if (allocated(error)) return
     ! C p + min(d_n p, g) with d_n = 0.5: 2 - 2; 3*2 + min(1, -4) = 2; the last node is no candidate

@@ -13,8 +13,7 @@ module hc_area_system
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, precondition_constraints, satisfy_constraints, &
-    solution_accurate
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, precondition_constraints, solution_accurate
   use hc_projected_gmres, only: projected_gmres
   use hc_area_factors, only: area_factors_t
   implicit none
@@ -96,8 +95,7 @@ contains
       call new_active_set(nodes, spread(.true., 1, n), system%space)
       call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb, error)
       if (allocated(error)) return
-      call satisfy_constraints(constraints%rows, constraints%mb, area%load(determined) - matmul(x, constraints%rows), x, solved, &
-                               system%space)
+      call constraints%satisfy(system%space, area%load(determined) - matmul(x, constraints%rows), x, solved)
       if (.not. solved) return
       call system%product(x, ax, error)
       if (allocated(error)) return

@@ -29,7 +29,7 @@ module hc_coupled_newton
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: constraints_t, iteration_t, satisfy_constraints, step_ahead
+  use hc_linear_system, only: constraints_t, iteration_t, step_ahead
   use hc_projected_gmres, only: projected_gmres
   implicit none
   private
@@ -74,8 +74,7 @@ contains
     call find_nodes(now, shear_active, step)
     call constrain(now, step, missing, error)
     if (allocated(error)) return
-    call satisfy_constraints(step%constraints%rows, step%constraints%mb, missing, step%x, step%iteration%independent, &
-                             step%system%space, step%nodes)
+    call step%constraints%satisfy(step%system%space, missing, step%x, step%iteration%independent, step%nodes)
     ! 4.
     if (step%iteration%independent) call solve(now, step, error)
     if (allocated(error)) return

@@ -31,8 +31,7 @@ module hc_staggered_newton
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, satisfy_constraints, step_ahead, &
-    solution_accurate
+  use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
@@ -244,7 +243,7 @@ contains
 
     if (size(constraints%columns, 2) == 0) return
     missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure%space%sum(now%p)
-    call satisfy_constraints(constraints%columns, constraints%mb, missing, now%p, independent, now%pressure%space, nodes)
+    call constraints%satisfy(now%pressure%space, missing, now%p, independent, nodes)
   end subroutine fit_load
 
   !> Solve for the shear traction under the present pressure, (F10).
@@ -360,8 +359,7 @@ contains
       do try = 1, 2
         call find_rigid_traction(now, nodes, constraints%columns, try == 2, constraints%mb, error)
         if (allocated(error)) return
-        call satisfy_constraints(constraints%columns, constraints%mb, found%missing, found%x, found%independent, &
-                                 now%shear%space, nodes)
+        call constraints%satisfy(now%shear%space, found%missing, found%x, found%independent, nodes)
         if (found%independent) exit
       end do
     end associate

@@ -28,9 +28,8 @@ module hc_normal_lattice_solver
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, force_control, normal, sweeps_used_up, &
     no_progress
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, set_active, &
+  use hc_normal_iterate, only: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, &
     linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
-  use hc_normal_start, only: set_start
   use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, curvature, &
     find_sprung_step
   implicit none

@@ -19,7 +19,7 @@ module hc_linear_system
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, constraints_t, iteration_t, precondition_constraints, satisfy_constraints, step_ahead
+  public :: linear_system_t, constraints_t, iteration_t, precondition_constraints, step_ahead
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
@@ -50,6 +50,8 @@ module hc_linear_system
     !> Multipliers m
     real(wp), allocatable :: multiplier(:)
   contains
+    !> Unknowns that satisfy them
+    procedure :: satisfy
     !> (C^T M B)^-1
     procedure :: invert
     !> C^T x
@@ -155,38 +157,37 @@ contains
     end do
   end subroutine precondition_constraints
 
-  !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value; mostly C is B.
+  !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine satisfy_constraints(rows, mb, missing, x, independent, space, nodes)
-    !> C and M B
-    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
+  subroutine satisfy(self, space, missing, x, independent, nodes)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> What C^T x lacks
     real(wp), intent(in) :: missing(:)
     !> Unknowns, over all nodes if `nodes` are given
     real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
     !> Nodes to which C and M B belong; absent: all
     type(active_set_t), intent(in), optional :: nodes
     real(wp) :: inverse(size(missing), size(missing)), factor(size(missing))
     real(wp), allocatable :: values(:)
     integer :: m
 
-    call invert_gram(rows, mb, inverse, independent, space)
+    call self%invert(space, inverse, independent)
     if (.not. independent) return
     factor = [(dot_product(inverse(m, :), missing), m=1, size(missing))]
     if (.not. present(nodes)) then
-      call space%add_columns(mb, factor, x)
+      call space%add_columns(self%mb, factor, x)
     else if (size(missing) > 0) then
       allocate (values(nodes%n_active))
       call nodes%pack(x, values)
-      call space%add_columns(mb, factor, values)
+      call space%add_columns(self%mb, factor, values)
       call nodes%unpack(values, x)
     end if
-  end subroutine satisfy_constraints
+  end subroutine satisfy
 
   !> Take a step along the preconditioned residual, projected on the constraints, before the product A x is known: that of the
   !> unknowns before small changes serves for the residual, and one product serves for changes and step together.
@@ -235,12 +236,27 @@ contains
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
+    real(wp) :: gram(size(inverse, 1), size(inverse, 1)), scale(size(inverse, 1))
+    integer :: m
 
-    if (allocated(self%rows)) then
-      call invert_gram(self%rows, self%mb, inverse, independent, space)
-    else
-      call invert_gram(self%columns, self%mb, inverse, independent, space)
-    end if
+    independent = .true.
+    inverse = 0.0_wp
+    if (size(scale) == 0) return
+    do m = 1, size(scale)
+      gram(:, m) = self%resultants(space, self%mb(:, m))
+      scale(m) = gram(m, m)
+    end do
+    independent = all(scale > 0.0_wp)
+    if (.not. independent) return
+    scale = sqrt(scale)
+    do m = 1, size(scale)
+      gram(:, m) = gram(:, m)/(scale*scale(m))
+      inverse(m, m) = 1.0_wp/scale(m)
+    end do
+    call eliminate(gram, inverse)
+    independent = all([(abs(gram(m, m)), m=1, size(scale))] > dependence)
+    inverse = inverse/spread(scale, 2, size(scale))
+    if (.not. independent) inverse = 0.0_wp
   end subroutine invert
 
   !> Compute C^T x of values at the active nodes.
@@ -258,40 +274,5 @@ contains
       resultants = space%dots(self%columns, x)
     end if
   end function resultants
-
-  !> Compute (C^T M B)^-1, zero if the constraints depend on each other.
-  subroutine invert_gram(rows, mb, inverse, independent, space)
-    !> C and M B
-    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
-    !> The inverse
-    real(wp), intent(out) :: inverse(:, :)
-    !> The matrix can be inverted
-    logical, intent(out) :: independent
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
-    integer :: m, k
-
-    independent = .true.
-    inverse = 0.0_wp
-    if (size(mb, 2) == 0) return
-    do m = 1, size(mb, 2)
-      do k = 1, size(mb, 2)
-        gram(k, m) = space%dot(rows(:, k), mb(:, m))
-      end do
-      scale(m) = gram(m, m)
-    end do
-    independent = all(scale > 0.0_wp)
-    if (.not. independent) return
-    scale = sqrt(scale)
-    do m = 1, size(mb, 2)
-      gram(:, m) = gram(:, m)/(scale*scale(m))
-      inverse(m, m) = 1.0_wp/scale(m)
-    end do
-    call eliminate(gram, inverse)
-    independent = all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
-    inverse = inverse/spread(scale, 2, size(mb, 2))
-    if (.not. independent) inverse = 0.0_wp
-  end subroutine invert_gram
 
 end module hc_linear_system

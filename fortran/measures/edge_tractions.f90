@@ -20,8 +20,7 @@ module hc_edge_tractions
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints, &
-    satisfy_constraints
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
   use hc_traction_field, only: traction_field_t, new_traction_field
@@ -253,8 +252,7 @@ contains
       end do
       call precondition_constraints(system, set, size(x), constraints%columns, constraints%mb, error)
       if (allocated(error)) return
-      call satisfy_constraints(constraints%columns, constraints%mb, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, &
-                               independent, system%space, set)
+      call constraints%satisfy(system%space, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, set)
       call system%product(x, ax, error)
       if (allocated(error)) return
       iteration = iteration_t(tolerance=options%accuracy*maxval(abs(rhs - ax), mask=active), most=options%max_iterations)

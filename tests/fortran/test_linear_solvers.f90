@@ -8,8 +8,8 @@ module test_linear_solvers
   use hc_projected_gmres, only: freeing_gmres => projected_gmres
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, &
-    precondition_packed_constraints => precondition_constraints, satisfy_constraints, step_ahead, solution_accurate, &
-    iterations_used_up, solution_broke_off
+    precondition_packed_constraints => precondition_constraints, step_ahead, solution_accurate, iterations_used_up, &
+    solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none
   private
@@ -406,6 +406,7 @@ contains
   subroutine test_three_constraints(error)
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
+    type(constraints_t) :: constraints
     real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
     real(wp), allocatable :: mb(:, :)
     real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
@@ -426,7 +427,9 @@ contains
     call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
     if (allocated(error)) return
     x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
-    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
+    constraints%columns = constraint
+    constraints%mb = mb
+    call constraints%satisfy(field_space_t(), wanted, x, independent)
     call check_true(error, independent, 'independent constraints')
     if (allocated(error)) return
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
@@ -446,7 +449,9 @@ contains
     call precondition_constraints(system, active, constraint, mb, error)
     if (allocated(error)) return
     ax = x
-    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
+    constraints%columns = constraint
+    constraints%mb = mb
+    call constraints%satisfy(field_space_t(), wanted, x, independent)
     call check_true(error, .not. independent, 'constraints that depend on each other')
     if (allocated(error)) return
     call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')

@@ -137,7 +137,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     ! the first guess is that of the coarser lattices: a load gives the same bits whatever came before it
-    call descend(self, target, tolerance, max_sweeps, state, error)
+    call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.
@@ -156,25 +156,15 @@ contains
     !> Allocated on failure: a target that cannot be solved for, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
 
-    call descend(self, load_target_t([control], [target]), tolerance, max_sweeps, state, error)
-  end subroutine solve
-
-  !> Solve on all lattices, from the coarsest to the finest.
-  subroutine descend(self, target, tolerance, max_sweeps, state, error)
-    class(normal_contact_t), intent(inout), target :: self
-    type(load_target_t), intent(in) :: target
-    real(wp), intent(in) :: tolerance
-    integer, intent(in) :: max_sweeps
-    type(contact_state_t), intent(out) :: state
-    type(error_t), allocatable, intent(out) :: error
-
+    type(load_target_t) :: goal
     type(contact_state_t) :: coarse
     type(normal_iterate_t), allocatable :: passing
     real(wp) :: work, coarse_tolerance
     integer :: l
 
-    call check_target(target%control(:normal), target%value(:normal), tolerance, max_sweeps, error)
+    call check_target([control], [target], tolerance, max_sweeps, error)
     if (allocated(error)) return
+    goal = load_target_t([control], [target])
     work = 0.0_wp
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
@@ -191,8 +181,7 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_on_normal_lattice(level, passing, target, &
-                                       max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_on_normal_lattice(level, passing, goal, max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -200,13 +189,13 @@ contains
         else
           if (allocated(passing)) deallocate (passing)
           coarse = contact_state_t()
-          call solve_finest(self, target, tolerance, max_sweeps, state, work, error)
+          call solve_finest(self, goal, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
         end if
       end associate
     end do
     state%operator_applications = work
-  end subroutine descend
+  end subroutine solve
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.
   pure logical function is_smooth(level, p_max)

@@ -13,7 +13,7 @@
 !> Equations: docs/theory/multilevel.md, (M1).
 module hc_coarse_change
   use hc_precision, only: wp
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, slip, normal, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_transfer, only: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector
   implicit none
@@ -41,15 +41,13 @@ contains
   end subroutine restrict_state
 
   !> Set the coarse problem up so that the present state solves it under the present loads.
-  subroutine balance(problem, start, reference, target, before, displacement, model, origin, coarse_target)
+  subroutine balance(problem, start, step, before, displacement, model, origin, coarse_target)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step, in balance
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> That state at the coarse nodes, and w, u_x, u_y there under its tractions (n_col, n_row, 3) [m]
     type(contact_state_t), intent(in) :: before
     real(wp), intent(in) :: displacement(:, :, :)
@@ -62,9 +60,9 @@ contains
 
     model%initial_gap = merge(before%gap + before%motion(normal) - displacement(:, :, 1), model%initial_gap, model%candidate)
     origin = displacement(:, :, 2:) - model%rigid_displacement(before%motion) &
-             - (before%relative_displacement - restrict_vector(problem%lattice, reference, model%lattice))
-    coarse_target = target
-    where (target%control == force_control) coarse_target%value = before%load + (target%value - start%load)
+             - (before%relative_displacement - restrict_vector(problem%lattice, step%reference, model%lattice))
+    coarse_target = step%target
+    where (coarse_target%control == force_control) coarse_target%value = before%load + (coarse_target%value - start%load)
   end subroutine balance
 
   !> Add the change of a coarse state to a fine one.

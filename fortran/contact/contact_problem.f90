@@ -12,18 +12,18 @@ module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
-  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_hierarchy, only: level_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, stick, &
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, separated, stick, &
     slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
     sweeps_used_up, loads_not_carried, out_of_range
-  use hc_contact_residuals, only: normal_self_compliance, tangential_compliances, normal_residual, &
+  use hc_contact_residuals, only: tangential_compliances, normal_residual, &
     tangential_residual, force_residual, relative, least_traction
   use hc_friction_law, only: friction_law_t
-  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_normal_law, only: normal_law_t
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   implicit none
   private
 
@@ -34,26 +34,18 @@ module hc_contact_problem
   integer, parameter :: near_reach = 5
 
   !> Data of a contact problem.
-  type, extends(level_t) :: friction_problem_t
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t) :: pair
+  type, extends(normal_problem_t) :: friction_problem_t
     !> Law of friction
     class(friction_law_t), allocatable :: friction
-    !> Law of contact along the normal
-    class(normal_law_t), allocatable :: normal_law
     !> Goodman's approximation: shear tractions do not move the pressure
     logical :: goodman = .false.
-    !> Self-compliances d_n and d_t of a node [m/Pa]
-    real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Self-compliance d_t of a node [m/Pa]
+    real(wp) :: tangential_compliance = 0.0_wp
     !> Tangential displacements near a node under its own pyramid of unit traction, xx, xy and yy [m/Pa]
     real(wp) :: near_compliance(-near_reach:near_reach, -near_reach:near_reach, 3) = 0.0_wp
-    !> Tolerances, caps and tuning numbers of the solver
-    type(options_t) :: options
   contains
     !> Bodies, laws and tuning numbers from another lattice
     procedure :: inherit
-    !> Return whether the bodies will touch
-    procedure :: is_pressed
     !> Return whether pressure and shear traction act strongly on each other
     procedure :: couples_strongly
     !> State of bodies that do not touch
@@ -66,10 +58,8 @@ module hc_contact_problem
     procedure :: rigid_displacement, rigid_displacement_row
     !> Resultants of given tractions
     procedure :: resultants
-    !> Compliance beyond which a spring of a compliant law has no effect; that of a node with the stiffest of them
-    procedure :: softest_spring, sprung_compliance
-    !> Classification parameters r of the tangential conditions and r' of those along the normal
-    procedure :: classification_parameter, normal_classification_parameter
+    !> Classification parameter r of the tangential conditions
+    procedure :: classification_parameter
     !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
     procedure :: complete_state
     !> Residuals of its loads alone
@@ -99,23 +89,12 @@ contains
     !> Law of contact along the normal; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: normal_law
 
-    call check_problem(lattice, pair, initial_gap, candidate, error)
+    call new_normal_problem(problem, lattice, pair, initial_gap, candidate, error, normal_law)
     if (allocated(error)) return
     call friction%check(lattice, error)
     if (allocated(error)) return
-    if (present(normal_law)) call normal_law%check(error)
-    if (allocated(error)) return
-    problem%lattice = lattice
-    problem%pair = pair
     allocate (problem%friction, source=friction)
-    if (present(normal_law)) then
-      allocate (problem%normal_law, source=normal_law)
-    else
-      allocate (unilateral_t :: problem%normal_law)
-    end if
     problem%goodman = goodman
-    problem%initial_gap = initial_gap
-    problem%candidate = candidate
     call set_geometry(problem)
   end subroutine new_friction_problem
 
@@ -124,39 +103,22 @@ contains
     class(friction_problem_t), intent(inout) :: self
     class(level_t), intent(in) :: from
 
+    call self%normal_problem_t%inherit(from)
     select type (from)
     type is (friction_problem_t)
-      self%pair = from%pair
       call from%friction%on_lattice(from%lattice, self%lattice, self%friction)
-      if (allocated(self%normal_law)) deallocate (self%normal_law)
-      allocate (self%normal_law, source=from%normal_law)
       self%goodman = from%goodman
-      self%options = from%options
     end select
     call set_geometry(self)
   end subroutine inherit
 
-  !> Set self-compliances of the nodes of the lattice.
+  !> Set the tangential compliances of the nodes of the lattice.
   subroutine set_geometry(self)
     type(friction_problem_t), intent(inout) :: self
 
-    self%normal_compliance = normal_self_compliance(self%lattice, self%pair)
     self%near_compliance = tangential_compliances(self%lattice, self%pair, near_reach)
     self%tangential_compliance = self%near_compliance(0, 0, 1)
   end subroutine set_geometry
-
-  !> Return whether the bodies will touch: under any load, by an approach beyond the smallest gap.
-  logical function is_pressed(self, target)
-    class(friction_problem_t), intent(in) :: self
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-
-    if (target%control(normal) == force_control) then
-      is_pressed = target%value(normal) > 0.0_wp
-    else
-      is_pressed = target%value(normal) > self%space%min(self%initial_gap, self%candidate)
-    end if
-  end function is_pressed
 
   !> Return whether pressure and shear traction act strongly on each other, by |beta| min(mu, 1).
   pure logical function couples_strongly(self)
@@ -324,33 +286,6 @@ contains
                                                       self%lattice%cell_area()*max(n_contact, 1))
     r = r/(1.0_wp + r*self%pair%tangential_layer)
   end function classification_parameter
-
-  !> Compute r' = kappa/(2 pi lambda_1 a) [Pa/m].
-  pure real(wp) function normal_classification_parameter(self, n_contact) result(r)
-    class(friction_problem_t), intent(in) :: self
-    !> Nodes in contact
-    integer, intent(in) :: n_contact
-
-    r = self%options%contact%classification_parameter(self%pair%lambda_1, self%lattice%cell_area()*max(n_contact, 1))
-  end function normal_classification_parameter
-
-  !> Compute the compliance beyond which a spring of a compliant law has no effect [m/Pa].
-  pure real(wp) function softest_spring(self, p_max)
-    class(friction_problem_t), intent(in) :: self
-    !> Largest pressure [Pa]
-    real(wp), intent(in) :: p_max
-
-    softest_spring = self%normal_law%softest_spring(self%options%contact%softest_layer, self%normal_compliance, p_max)
-  end function softest_spring
-
-  !> Compute the compliance of a node along the normal, with that of the layer under the largest pressure [m/Pa].
-  pure real(wp) function sprung_compliance(self, p_max)
-    class(friction_problem_t), intent(in) :: self
-    !> Largest pressure [Pa]
-    real(wp), intent(in) :: p_max
-
-    sprung_compliance = self%normal_compliance + self%normal_law%compliance_under(p_max)
-  end function sprung_compliance
 
   !> Compute gap, slip, zones, loads and residuals of a state whose tractions, motions and displacements are known.
   subroutine complete_state(self, target, tolerance, reference, state)

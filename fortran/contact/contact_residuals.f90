@@ -2,24 +2,19 @@
 !>
 !> Equations: docs/theory/residuals.md, (R1) to (R4).
 module hc_contact_residuals
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_error, only: error_t, status, raise
-  use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
-    not_finite
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
   private
 
   public :: normal_self_compliance, tangential_self_compliance, tangential_compliances
-  public :: normal_residual, tangential_residual, tangential_scale, force_residual, relative, complete_state, &
-            least_traction
+  public :: normal_residual, tangential_residual, tangential_scale, force_residual, relative, least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
   real(wp), parameter :: least_traction = 1.0e-3_wp
@@ -217,48 +212,5 @@ contains
       relative = huge(1.0_wp)
     end if
   end function relative
-
-  !> Compute zones, load and residuals of a state whose pressure and gap are known.
-  subroutine complete_state(state, lattice, candidate, compliance, control, target, tolerance, space, error, law)
-    !> State to be completed
-    type(contact_state_t), intent(inout) :: state
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that may come into contact
-    logical, intent(in) :: candidate(:, :)
-    !> Self-compliance d_n [m/Pa]
-    real(wp), intent(in) :: compliance
-    !> force_control or displacement_control
-    integer, intent(in) :: control
-    !> Normal load [N] or approach [m] that was prescribed
-    real(wp), intent(in) :: target
-    !> Bound of the residuals
-    real(wp), intent(in) :: tolerance
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    !> Allocated on failure: a pressure or a gap that is not a finite number
-    type(error_t), allocatable, intent(out) :: error
-    !> Law of contact; absent: unilateral contact
-    class(normal_law_t), intent(in), optional :: law
-    integer :: row
-
-    !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, size(state%zone, 2)
-      state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
-    end do
-    !$omp end parallel do
-    state%load(normal) = lattice%cell_area()*space%sum(state%pressure)
-    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, space, law)
-    state%residual_force = 0.0_wp
-    if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
-    ! one by one: the largest of several numbers hides one that is not a number
-    state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
-    state%clipped = touches_rim(state)
-    if (state%converged) state%stopped = within_tolerance
-    if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
-    ! penetration without any pressure is infinite as well, but a state that can be shown
-    if (all(ieee_is_finite(state%pressure)) .and. all(ieee_is_finite(state%gap) .or. .not. candidate)) return
-    call raise(error, status%no_convergence, not_finite)
-  end subroutine complete_state
 
 end module hc_contact_residuals

@@ -39,7 +39,7 @@ module hc_contact_solver
       !> State to start the iteration from; without pressure anywhere, or without fields: none
       type(contact_state_t), intent(in) :: start
       !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]; of no use without friction
-      real(wp), intent(in), contiguous :: reference(:, :, :)
+      real(wp), intent(in), contiguous, target :: reference(:, :, :)
       !> Loads or motions to be reached
       type(load_target_t), intent(in) :: target
       !> Bound of all residuals

@@ -15,7 +15,7 @@ module hc_contact_state
   public :: not_finite
   public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
   public :: separated, stick, slip
-  public :: load_target_t, force_control, displacement_control
+  public :: load_step_t, load_target_t, force_control, displacement_control
   public :: normal, along_x, along_y, about_z, strain_xx, strain_yy, strain_xy, n_load, n_motion
   public :: remote_displacement
 
@@ -47,6 +47,18 @@ module hc_contact_state
     !> Load [N], torque [N m]; or approach, shift [m], twist [rad]; bulk strain
     real(wp) :: value(n_motion) = 0.0_wp
   end type load_target_t
+
+  !> A load step that is to be solved.
+  type :: load_step_t
+    !> Loads or motions to be reached
+    type(load_target_t) :: target
+    !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), pointer, contiguous :: reference(:, :, :) => null()
+    !> Bound of all residuals
+    real(wp) :: tolerance = 0.0_wp
+    !> Active sets that may be tried
+    integer :: max_sweeps = 0
+  end type load_step_t
 
   !> A target by the control and the value of the first motions; the others have their defaults.
   interface load_target_t

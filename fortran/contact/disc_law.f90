@@ -28,7 +28,7 @@ module hc_disc_law
   implicit none
   private
 
-  public :: disc_law_t, normal_to, residual_row, zone_row, cone_row
+  public :: disc_law_t, normal_to, cone_row
 
   !> Squares below this count as nothing
   real(wp), parameter :: nothing = 1.0e-200_wp
@@ -105,11 +105,11 @@ contains
 
     call self%find_disc(first, p, slope, pressed)
     if (self%is_isotropic()) then
-      call zone_row(size(p), unit, slope, r, pressed, qx, qy, dsx, dsy, zone)
+      zone = zone_of(pressed, unit*(qx - r*dsx), unit*(qy - r*dsy), slope*unit*pressed)
     else
       associate (a => self%stretch())
         associate (q => squeezed(a, qx, qy), ds => stretched(a, dsx, dsy))
-          call zone_row(size(p), unit, slope, r, pressed, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), zone)
+          zone = zone_of(pressed, unit*(q(:, 1) - r*ds(:, 1)), unit*(q(:, 2) - r*ds(:, 2)), slope*unit*pressed)
         end associate
       end associate
     end if
@@ -148,11 +148,23 @@ contains
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
     real(wp), intent(inout) :: largest, worst
     real(wp), allocatable :: cut(:, :), trial(:, :)
-    real(wp) :: slope, pressed(size(p))
+    real(wp) :: slope, pressed(size(p)), x, y, trial_x, trial_y, length, share, touches
+    integer :: i
 
     if (self%is_isotropic()) then
       call self%find_disc(first, p, slope, pressed)
-      call residual_row(size(p), unit, slope, stiffness, pressed, qx, qy, dsx, dsy, largest, worst)
+      !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share, touches)
+      do i = 1, size(p)
+        touches = merge(1.0_wp, 0.0_wp, pressed(i) > 0.0_wp)
+        x = unit*qx(i)
+        y = unit*qy(i)
+        trial_x = x - unit*stiffness*dsx(i)
+        trial_y = y - unit*stiffness*dsy(i)
+        length = sqrt(max(trial_x**2 + trial_y**2, nothing))
+        share = min(slope*max(unit*pressed(i), 0.0_wp)/length, 1.0_wp)
+        largest = max(largest, touches*(x**2 + y**2))
+        worst = max(worst, touches*((x - share*trial_x)**2 + (y - share*trial_y)**2))
+      end do
     else
       allocate (cut(size(p), 2))
       associate (a => self%stretch())
@@ -254,55 +266,14 @@ contains
     t = [-direction(2), direction(1)]
   end function normal_to
 
-  !> Measure what the tractions of a row lack of the law, |q - P(q - ds/d_t)|, squared.
-  pure subroutine residual_row(n, unit, slope, stiffness, p, qx, qy, dsx, dsy, largest, worst)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Inverse of the unit of pressure; slope of the radius; inverse of d_t [Pa/m]
-    real(wp), intent(in) :: unit, slope, stiffness
-    !> Pressure, traction and slip of the step
-    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
-    !> Squares of the largest traction and of what is lacking most, in the unit of pressure: those of the rows before,
-    !> and now of this one too
-    real(wp), intent(inout) :: largest, worst
-    real(wp) :: x, y, trial_x, trial_y, length, share, touches
-    integer :: i
+  !> Classify a node by |q - r ds|.
+  elemental integer function zone_of(p, x, y, radius) result(zone)
+    !> Pressure; components of q - r ds and radius of the disc, in the unit of pressure
+    real(wp), intent(in) :: p, x, y, radius
 
-    !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share, touches)
-    do i = 1, n
-      touches = merge(1.0_wp, 0.0_wp, p(i) > 0.0_wp)
-      x = unit*qx(i)
-      y = unit*qy(i)
-      trial_x = x - unit*stiffness*dsx(i)
-      trial_y = y - unit*stiffness*dsy(i)
-      length = sqrt(max(trial_x**2 + trial_y**2, nothing))
-      share = min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp)
-      largest = max(largest, touches*(x**2 + y**2))
-      worst = max(worst, touches*((x - share*trial_x)**2 + (y - share*trial_y)**2))
-    end do
-  end subroutine residual_row
-
-  !> Classify the nodes of a row by |q - r ds|.
-  pure subroutine zone_row(n, unit, slope, r, p, qx, qy, dsx, dsy, zone)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Inverse of the unit of pressure; slope of the radius; classification parameter [Pa/m]
-    real(wp), intent(in) :: unit, slope, r
-    !> Pressure, traction and slip of the step
-    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
-    !> separated, stick or slip
-    integer, intent(out) :: zone(n)
-    real(wp) :: x, y
-    integer :: i
-
-    !$omp simd private(x, y)
-    do i = 1, n
-      x = unit*(qx(i) - r*dsx(i))
-      y = unit*(qy(i) - r*dsy(i))
-      zone(i) = merge(stick, slip, x**2 + y**2 <= (slope*unit*p(i))**2)
-      zone(i) = merge(zone(i), separated, p(i) > 0.0_wp)
-    end do
-  end subroutine zone_row
+    zone = merge(stick, slip, x**2 + y**2 <= radius**2)
+    zone = merge(zone, separated, p > 0.0_wp)
+  end function zone_of
 
   !> Project the tractions of a row on the disc; zero where there is no pressure.
   pure subroutine cone_row(n, unit, slope, p, qx, qy, cut_x, cut_y)

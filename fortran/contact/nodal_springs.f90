@@ -9,7 +9,7 @@
 !> Equations: docs/theory/conditions.md, (C5); docs/theory/normal_contact.md, (N6).
 module hc_nodal_springs
   use hc_precision, only: wp
-  use hc_normal_law, only: unilateral_t
+  use hc_normal_law, only: unilateral_t, tangent_t
   implicit none
   private
 
@@ -33,16 +33,16 @@ contains
   end function is_compliant
 
   !> Return the springs themselves.
-  pure subroutine linearize(self, first, r, softest, p, gap, contact, compliance, offset)
+  pure subroutine linearize(self, first, tangent, p, gap, contact, compliance, offset)
     class(nodal_springs_t), intent(in) :: self
     integer, intent(in) :: first
-    real(wp), intent(in) :: r, softest
+    type(tangent_t), intent(in) :: tangent
     real(wp), intent(in), contiguous :: p(:), gap(:)
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)
 
     associate (springs => self%spring(first:first + size(p) - 1))
-      compliance = merge(min(springs, softest), 0.0_wp, contact)
+      compliance = merge(min(springs, tangent%softest), 0.0_wp, contact)
       offset = 0.0_wp
     end associate
   end subroutine linearize

@@ -21,7 +21,15 @@ module hc_normal_law
   implicit none
   private
 
-  public :: normal_law_t, unilateral_t
+  public :: normal_law_t, unilateral_t, tangent_t
+
+  !> Where a law is linearised.
+  type :: tangent_t
+    !> Classification parameter r, 0 to linearise about the present pressure [Pa/m]
+    real(wp) :: r = 0.0_wp
+    !> Compliance beyond which a spring has no effect [m/Pa]
+    real(wp) :: softest = huge(1.0_wp)
+  end type tangent_t
 
   !> A law of contact along the normal.
   type, abstract :: normal_law_t
@@ -32,8 +40,6 @@ module hc_normal_law
     procedure(law_check), deferred :: check
     !> Compliance of the layer under a pressure
     procedure(law_compliance), deferred :: compliance_under
-    !> Compliance beyond which a spring has no effect
-    procedure, non_overridable :: softest_spring
     !> Springs of the linearised law
     procedure(law_linearize), deferred :: linearize
     !> Find the nodes in contact by p - r g
@@ -78,14 +84,13 @@ module hc_normal_law
     end function law_compliance
 
     !> Linearise the law at the nodes of a row: springs of compliance C and offset s.
-    pure subroutine law_linearize(self, first, r, softest, p, gap, contact, compliance, offset)
-      import :: normal_law_t, wp
+    pure subroutine law_linearize(self, first, tangent, p, gap, contact, compliance, offset)
+      import :: normal_law_t, tangent_t, wp
       class(normal_law_t), intent(in) :: self
       !> Number of the first node
       integer, intent(in) :: first
-      !> Classification parameter, 0 to linearise about the present pressure [Pa/m]; compliance beyond which a spring has no
-      !> effect [m/Pa]
-      real(wp), intent(in) :: r, softest
+      !> Where the law is linearised
+      type(tangent_t), intent(in) :: tangent
       !> Pressure [Pa] and gap [m]
       real(wp), intent(in), contiguous :: p(:), gap(:)
       !> Nodes in contact
@@ -113,15 +118,6 @@ module hc_normal_law
 
 contains
 
-  !> Compute the compliance beyond which a spring has no effect [m/Pa].
-  pure real(wp) function softest_spring(self, softest_layer, compliance, p_max)
-    class(normal_law_t), intent(in) :: self
-    !> The spring over a node with the layer under the largest pressure; compliance of a node [m/Pa]; largest pressure [Pa]
-    real(wp), intent(in) :: softest_layer, compliance, p_max
-
-    softest_spring = softest_layer*(compliance + self%compliance_under(p_max))
-  end function softest_spring
-
   !> Return false: there is no layer.
   pure logical function unilateral_is_compliant(self) result(is_compliant)
     class(unilateral_t), intent(in) :: self
@@ -145,10 +141,10 @@ contains
   end function unilateral_compliance
 
   !> Return springs of no compliance.
-  pure subroutine unilateral_linearize(self, first, r, softest, p, gap, contact, compliance, offset)
+  pure subroutine unilateral_linearize(self, first, tangent, p, gap, contact, compliance, offset)
     class(unilateral_t), intent(in) :: self
     integer, intent(in) :: first
-    real(wp), intent(in) :: r, softest
+    type(tangent_t), intent(in) :: tangent
     real(wp), intent(in), contiguous :: p(:), gap(:)
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)

@@ -12,7 +12,7 @@ module hc_power_interface
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_normal_law, only: normal_law_t
+  use hc_normal_law, only: normal_law_t, tangent_t
   implicit none
   private
 
@@ -107,30 +107,32 @@ contains
   end function compliance_under
 
   !> Linearise about the solution P of P + r sigma(P) = p - r g at each node.
-  pure subroutine linearize(self, first, r, softest, p, gap, contact, compliance, offset)
+  pure subroutine linearize(self, first, tangent, p, gap, contact, compliance, offset)
     class(power_interface_t), intent(in) :: self
     integer, intent(in) :: first
-    real(wp), intent(in) :: r, softest
+    type(tangent_t), intent(in) :: tangent
     real(wp), intent(in), contiguous :: p(:), gap(:)
     logical, intent(in), contiguous :: contact(:)
     real(wp), intent(out), contiguous :: compliance(:), offset(:)
     real(wp) :: penetration, pressure
     integer :: i
 
-    do i = 1, size(p)
-      compliance(i) = 0.0_wp
-      offset(i) = 0.0_wp
-      if (.not. contact(i)) cycle
-      compliance(i) = softest
-      pressure = least_share*abs(p(i))
-      if (p(i) - r*gap(i) > 0.0_wp) then
-        pressure = max(pressure, self%pressure_under(self%shared_penetration(r, p(i) - r*gap(i))))
-      end if
-      if (.not. pressure > 0.0_wp) cycle
-      penetration = self%compression(pressure)
-      if (pressure*softest*self%exponent > penetration) compliance(i) = penetration/(self%exponent*pressure)
-      offset(i) = penetration - compliance(i)*pressure
-    end do
+    associate (r => tangent%r, softest => tangent%softest)
+      do i = 1, size(p)
+        compliance(i) = 0.0_wp
+        offset(i) = 0.0_wp
+        if (.not. contact(i)) cycle
+        compliance(i) = softest
+        pressure = least_share*abs(p(i))
+        if (p(i) - r*gap(i) > 0.0_wp) then
+          pressure = max(pressure, self%pressure_under(self%shared_penetration(r, p(i) - r*gap(i))))
+        end if
+        if (.not. pressure > 0.0_wp) cycle
+        penetration = self%compression(pressure)
+        if (pressure*softest*self%exponent > penetration) compliance(i) = penetration/(self%exponent*pressure)
+        offset(i) = penetration - compliance(i)*pressure
+      end do
+    end associate
   end subroutine linearize
 
   !> Measure |p - c psi_+^m|, or |g + sigma(p)|/d_n where the layer is stiffer than a node: for c -> infinity |min(p, g/d_n)|.

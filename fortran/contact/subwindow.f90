@@ -9,7 +9,7 @@ module hc_subwindow
   use hc_error, only: error_t
   use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_step_t
   use hc_contact_solver, only: friction_solver_t
   implicit none
   private
@@ -47,21 +47,15 @@ contains
   end subroutine next_part
 
   !> Solve a step on the part, and judge it on the window.
-  subroutine solve_part(whole, part, low, high, start, reference, target, tolerance, max_sweeps, state, solved, error)
+  subroutine solve_part(whole, part, corners, start, step, state, solved, error)
     !> Solver on the window, and one on the part
     class(friction_solver_t), intent(inout) :: whole, part
-    !> First and last column and row of the part
-    integer, intent(in) :: low(2), high(2)
+    !> First column and row of the part, and the last ones
+    integer, intent(in) :: corners(2, 2)
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: start
-    !> Displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Active sets that may be tried
-    integer, intent(in) :: max_sweeps
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> State on the window
     type(contact_state_t), intent(out) :: state
     !> There is a solution on the part
@@ -72,7 +66,8 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
 
     solved = .false.
-    associate (lattice => part%problem%lattice, west => low(1), east => high(1), south => low(2), north => high(2))
+    associate (lattice => part%problem%lattice, west => corners(1, 1), east => corners(1, 2), south => corners(2, 1), &
+               north => corners(2, 2))
       call new_friction_state(before, lattice, whole%problem%space)
       before%pressure = start%pressure(west:east, south:north)
       before%gap = start%gap(west:east, south:north)
@@ -80,15 +75,15 @@ contains
       before%relative_displacement = start%relative_displacement(west:east, south:north, :)
       before%motion = start%motion
       before%load = start%load
-      if (.not. part%problem%is_pressed(target)) return
+      if (.not. part%problem%is_pressed(step%target)) return
       if (allocated(whole%guess)) then
         allocate (part%guess)
         part%guess%pressure = whole%guess%pressure(west:east, south:north)
         part%guess%traction = whole%guess%traction(west:east, south:north, :)
         part%guess%motion = whole%guess%motion
       end if
-      call part%solve_step(before, reference(west:east, south:north, :), target, &
-                           whole%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
+      call part%solve_step(before, step%reference(west:east, south:north, :), step%target, &
+                           whole%problem%options%multilevel%part_tolerance*step%tolerance, step%max_sweeps, after, error)
       if (allocated(part%guess)) deallocate (part%guess)
       if (allocated(error)) return
       state%operator_applications = after%operator_applications*lattice%size()/whole%problem%lattice%size()
@@ -106,7 +101,7 @@ contains
     state%gap = displacement(:, :, 1)
     state%relative_displacement = displacement(:, :, 2:)
     deallocate (displacement)
-    call whole%problem%complete_state(target, tolerance, reference, state)
+    call whole%problem%complete_state(step%target, step%tolerance, step%reference, state)
     call add_history(state)
     state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part

@@ -23,12 +23,22 @@ module hc_area_factors
   implicit none
   private
 
-  public :: area_factors_t
+  public :: area_factors_t, factored_area_t
 
   !> A factor of BLAS
   real(real32), parameter :: one = 1.0_real32, none = 0.0_real32
   !> Spring, over the self-compliance of a node, that is as good as none; far from the largest number in single precision
   real(wp), parameter :: loosest = 1.0e30_wp
+
+  !> An area that is to be factorized.
+  type :: factored_area_t
+    !> Nodes in contact; those that stick, and which of these are sure to go on doing so; those that slip with a spring across
+    integer, allocatable :: contact(:), stuck(:)
+    logical, allocatable :: is_core(:)
+    integer, allocatable :: sliding(:)
+    !> Directions across the slip (2, size(sliding)), and compliances D over the unit
+    real(wp), allocatable :: side(:, :), compliance(:)
+  end type factored_area_t
 
   !> Factors of one area.
   type :: area_factors_t
@@ -70,8 +80,7 @@ contains
   end subroutine clear
 
   !> Factorize the matrix of an area.
-  subroutine factorize(self, flexibility, unit, shear, options, contact, stuck, is_core, sliding, side, compliance, &
-                       done, error)
+  subroutine factorize(self, flexibility, unit, shear, options, area, done, error)
     class(area_factors_t), intent(inout) :: self
     !> Influence coefficients
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -79,12 +88,8 @@ contains
     real(wp), intent(in) :: unit, shear
     !> What may have changed since L and T were made
     type(direct_options_t), intent(in) :: options
-    !> Nodes in contact; those that stick, and which of these are sure to go on doing so (size(stuck)); those that slip with
-    !> a spring across
-    integer, intent(in) :: contact(:), stuck(:), sliding(:)
-    logical, intent(in) :: is_core(:)
-    !> Directions across the slip (2, size(sliding)), and compliances D over the unit
-    real(wp), intent(in) :: side(:, :), compliance(:)
+    !> The area
+    type(factored_area_t), intent(in) :: area
     !> False: not positive definite in single precision
     logical, intent(out) :: done
     !> Allocated if there is not enough memory
@@ -94,31 +99,31 @@ contains
     integer :: i, info
 
     is_here = .false.
-    is_here(contact) = .true.
+    is_here(area%contact) = .true.
     self%shear = shear
-    self%wanted = self%wanted + size(contact)
+    self%wanted = self%wanted + size(area%contact)
     info = 0
-    if (is_kept(self, options%most_exchanged, contact, stuck, is_here)) then
-      new = pack(contact, self%row(contact) == 0)
+    if (is_kept(self, options%most_exchanged, area%contact, area%stuck, is_here)) then
+      new = pack(area%contact, self%row(area%contact) == 0)
       if (size(new) > 0) call add_rows(self, flexibility, unit, new, info, error)
     else
-      self%n_core = count(is_core)
-      is_here(pack(stuck, is_core)) = .false.
-      new = [pack(stuck, is_core), pack(contact, is_here(contact))]
-      is_here(contact) = .true.
+      self%n_core = count(area%is_core)
+      is_here(pack(area%stuck, area%is_core)) = .false.
+      new = [pack(area%stuck, area%is_core), pack(area%contact, is_here(area%contact))]
+      is_here(area%contact) = .true.
       call clear_rows(self, size(is_here))
       call add_rows(self, flexibility, unit, new, info, error)
     end if
     if (allocated(error)) return
     if (info == 0) then
-      self%pressed = self%row(contact)
-      self%stuck = self%row(stuck)
-      self%sliding = self%row(sliding)
+      self%pressed = self%row(area%contact)
+      self%stuck = self%row(area%stuck)
+      self%sliding = self%row(area%sliding)
       self%gone = pack([(i, i=1, size(self%order))],.not. is_here(self%order))
       call hold_gone(self, info, error)
       if (allocated(error)) return
     end if
-    if (info == 0) call factorize_across(self, side, compliance, options%largest_turn, info, error)
+    if (info == 0) call factorize_across(self, area%side, area%compliance, options%largest_turn, info, error)
     done = info == 0
     ! nothing can be kept of what fails
     if (.not. done) call self%clear()

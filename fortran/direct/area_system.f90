@@ -11,14 +11,33 @@ module hc_area_system
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t, normal, along_x
   use hc_contact_problem, only: friction_problem_t
+  use hc_load_constraints, only: driven_motions_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints, solution_accurate
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, precondition_constraints, solution_accurate
   use hc_projected_gmres, only: projected_gmres
   use hc_area_factors, only: area_factors_t
   implicit none
   private
 
-  public :: solve_with_factors
+  public :: area_t, solve_with_factors
+
+  !> The linear problem (F7) of an area; lengths are over the self-compliance of a node, so that every number is a pressure.
+  type :: area_t
+    !> Nodes in contact, those that stick, those that slip with a spring across
+    integer, allocatable :: contact(:), stuck(:), sliding(:)
+    !> Node of each unknown, and its place in `contact` (n)
+    integer, allocatable :: node(:), place(:)
+    !> Displacements that the row of each unknown adds up, and its tractions (3, n); springs (n)
+    real(wp), allocatable :: weight(:, :), traction(:, :), spring(:)
+    !> Right-hand side at the present motions, and of unit motions (n, 0:m); unknowns of the same [Pa]
+    real(wp), allocatable :: rhs(:, :), unknown(:, :)
+    !> Loads of unit unknowns (n, m), loads over the cell area, the tangential ones last, changes of the motions (m) [Pa]
+    real(wp), allocatable :: resultant(:, :), load(:), change(:)
+    !> Shear traction of every node of the window that does not change with the unknowns (:, 2) [Pa]
+    real(wp), allocatable :: fixed(:, :)
+    !> Tangential motions driven by their loads
+    type(driven_motions_t) :: driven
+  end type area_t
 
   !> The matrix of an area and its factors.
   type, extends(linear_system_t) :: area_system_t
@@ -27,9 +46,7 @@ module hc_area_system
     !> Products over the window
     class(flexibility_t), pointer :: operator => null()
     type(area_factors_t), pointer :: factors => null()
-    !> Node of each unknown (n), displacements that its row adds up and its tractions (3, n), springs (n)
-    integer, allocatable :: node(:)
-    real(wp), allocatable :: weight(:, :), traction(:, :), spring(:)
+    type(area_t), pointer :: area => null()
   contains
     procedure :: product
     procedure :: precondition_packed
@@ -38,75 +55,66 @@ module hc_area_system
 contains
 
   !> Solve for the unknowns of an area and the changes of the driven motions, from a start.
-  subroutine solve_with_factors(problem, operator, factors, node, weight, traction, spring, rhs, resultant, load, accuracy, x, &
-                                change, solved, error)
+  subroutine solve_with_factors(problem, operator, factors, accuracy, area, solved, error)
     !> What is given
     type(friction_problem_t), intent(in), target :: problem
     !> Products over the window
     class(flexibility_t), intent(inout), target :: operator
     !> Factors of the area
     type(area_factors_t), intent(in), target :: factors
-    !> Node of each unknown (n), displacements that its row adds up and its tractions (3, n), springs (n)
-    integer, intent(in) :: node(:)
-    real(wp), intent(in) :: weight(:, :), traction(:, :), spring(:)
-    !> Right-hand side at the present motions, and of unit motions (n, 0:m) [Pa]
-    real(wp), intent(in) :: rhs(:, 0:)
-    !> Loads of unit unknowns (n, m), loads over the cell area (m) [Pa]
-    real(wp), intent(in) :: resultant(:, :), load(:)
     !> Residual that may be left, relative to the largest pressure or traction
     real(wp), intent(in) :: accuracy
-    !> Unknowns, on entry a start (n) [Pa]
-    real(wp), intent(inout), contiguous :: x(:)
-    !> Changes of the motions over the self-compliance of a node (m) [Pa]
-    real(wp), allocatable, intent(out) :: change(:)
-    !> False: the loads do not determine the motions, or too many directions would be needed; x means nothing then
+    !> The area; its unknowns at the present motions are on entry a start
+    type(area_t), intent(inout), target :: area
+    !> False: the loads do not determine the motions, or too many directions would be needed; the unknowns mean nothing then
     logical, intent(out) :: solved
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(area_system_t) :: system
-    real(wp), allocatable :: columns(:, :), mb(:, :), rows(:, :), right(:), ax(:), multiplier(:)
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    real(wp), allocatable :: right(:), ax(:)
     integer, allocatable :: determined(:)
     type(active_set_t) :: nodes
-    logical :: independent
-    real(wp) :: scale, residual, largest
-    integer :: k, n, iterations, outcome
+    real(wp) :: scale, largest
+    integer :: k, n
 
-    n = size(x)
+    n = size(area%node)
     system%problem => problem
     system%operator => operator
     system%factors => factors
-    system%node = node
-    system%weight = weight
-    system%traction = traction
-    system%spring = spring
-    allocate (change(size(load)), source=0.0_wp)
-    ! motions that no unknown resists stay as they are
-    determined = pack([(k, k=1, size(load))], [(any(abs(rhs(:, k)) > 0.0_wp), k=1, size(load))])
-    columns = rhs(:, determined)
-    rows = resultant(:, determined)
-    allocate (ax(n))
-    call new_active_set(nodes, spread(.true., 1, n), system%space)
-    call precondition_constraints(system, nodes, n, columns, mb, error)
-    if (allocated(error)) return
-    call satisfy_constraints(rows, mb, load(determined) - matmul(x, rows), x, solved, system%space)
-    if (.not. solved) return
-    call system%product(x, ax, error)
-    if (allocated(error)) return
+    system%area => area
+    allocate (area%change(size(area%load)), source=0.0_wp)
+    associate (x => area%unknown(:, 0))
+      ! motions that no unknown resists stay as they are
+      determined = pack([(k, k=1, size(area%load))], [(any(abs(area%rhs(:, k)) > 0.0_wp), k=1, size(area%load))])
+      constraints%columns = area%rhs(:, determined)
+      constraints%rows = area%resultant(:, determined)
+      allocate (constraints%multiplier(size(determined)), source=0.0_wp)
+      allocate (ax(n))
+      call new_active_set(nodes, spread(.true., 1, n), system%space)
+      call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb, error)
+      if (allocated(error)) return
+      call constraints%satisfy(system%space, area%load(determined) - matmul(x, constraints%rows), x, solved)
+      if (.not. solved) return
+      call system%product(x, ax, error)
+      if (allocated(error)) return
 
-    right = rhs(:, 0)
-    largest = maxval(abs(x), mask=abs(weight(normal, :)) > 0.0_wp)
-    if (.not. largest > 0.0_wp) largest = maxval(abs(right))
-    scale = largest
-    if (problem%friction%is_bounded()) then
-      if (problem%friction%resists()) scale = min(scale, problem%friction%largest_bound(largest))
-    end if
-    allocate (multiplier(size(determined)), source=0.0_wp)
-    call projected_gmres(system, nodes, columns, mb, rows, [1.0_wp], right, x, ax, accuracy*scale*real(n, wp)**0.25_wp, &
-                         problem%options%direct%max_directions, problem%options%direct%max_directions, multiplier, independent, &
-                         residual, iterations, outcome, error)
-    if (allocated(error)) return
-    solved = independent .and. outcome == solution_accurate
-    change(determined) = multiplier
+      right = area%rhs(:, 0)
+      largest = maxval(abs(x), mask=abs(area%weight(normal, :)) > 0.0_wp)
+      if (.not. largest > 0.0_wp) largest = maxval(abs(right))
+      scale = largest
+      if (problem%friction%is_bounded()) then
+        if (problem%friction%resists()) scale = min(scale, problem%friction%largest_bound(largest))
+      end if
+      iteration = iteration_t(tolerance=accuracy*scale*real(n, wp)**0.25_wp, most=problem%options%direct%max_directions, &
+                              most_directions=problem%options%direct%max_directions)
+      iteration%weight = [1.0_wp]
+      call projected_gmres(system, nodes, constraints, right, x, ax, iteration, error)
+      if (allocated(error)) return
+    end associate
+    solved = iteration%independent .and. iteration%outcome == solution_accurate
+    area%change(determined) = constraints%multiplier
   end subroutine solve_with_factors
 
   subroutine product(self, x, y, error)
@@ -125,12 +133,12 @@ contains
     u(1:size(field)/3, 1:3) => moved
     f = 0.0_wp
     do k = 1, size(x)
-      f(self%node(k), :) = f(self%node(k), :) + x(k)*self%traction(:, k)
+      f(self%area%node(k), :) = f(self%area%node(k), :) + x(k)*self%area%traction(:, k)
     end do
     call self%problem%displacements(self%operator, field(:, :, normal), field(:, :, along_x:), moved, error)
     if (allocated(error)) return
     do k = 1, size(x)
-      y(k) = dot_product(self%weight(:, k), u(self%node(k), :))/self%problem%normal_compliance + self%spring(k)*x(k)
+      y(k) = dot_product(self%area%weight(:, k), u(self%area%node(k), :))/self%problem%normal_compliance + self%area%spring(k)*x(k)
     end do
   end subroutine product
 

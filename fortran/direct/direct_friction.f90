@@ -17,14 +17,15 @@ module hc_direct_friction
   use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, slip, normal, &
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, new_friction_state, copy_tractions, slip, normal, &
     force_control, loads_not_carried
+  use hc_normal_problem, only: nearest_nodes
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state
   use hc_transfer, only: restrict_vector
   use hc_load_constraints, only: overloads, fix_in_stick
-  use hc_direct_contact, only: first_guess, exchange
+  use hc_direct_contact, only: exchange
   use hc_area_factors, only: area_factors_t
   use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
     linearize_law, evaluate, record
@@ -80,13 +81,14 @@ contains
   recursive subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t) :: guess
+    type(load_step_t) :: step
     real(wp) :: work
     integer :: sweeps
     logical :: guessed
@@ -95,12 +97,12 @@ contains
       call self%problem%separate(start, reference, target, tolerance, state)
       return
     end if
+    step = load_step_t(target, reference, tolerance, max_sweeps)
     if (self%problem%options%direct%as_written) then
-      call iterate_as_written(self%problem, self%flexibility, self%operator, self%factors, start, reference, target, tolerance, &
-                              max_sweeps, state, error)
+      call iterate_as_written(self%problem, self%flexibility, self%operator, self%factors, start, step, state, error)
       return
     end if
-    call find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+    call find_start(self, start, step, guess, guessed, work, error)
     if (allocated(error)) return
     sweeps = 0
     if (guessed) then
@@ -119,7 +121,7 @@ contains
       !> State to start from
       type(contact_state_t), intent(in) :: from
 
-      call iterate(self, from, guessed .and. sweeps == 0, reference, target, tolerance, max_sweeps, state, error)
+      call iterate(self, from, guessed .and. sweeps == 0, step, state, error)
       sweeps = sweeps + state%sweeps
       work = work + state%operator_applications
     end subroutine attempt
@@ -127,16 +129,12 @@ contains
   end subroutine solve_step
 
   !> Find tractions and motions to start from by the lattice of every second node.
-  recursive subroutine find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+  recursive subroutine find_start(self, start, step, guess, guessed, work, error)
     class(direct_friction_t), intent(inout), target :: self
     !> State to start from otherwise
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Active sets that may be tried
-    integer, intent(in) :: max_sweeps
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> State to start from
     type(contact_state_t), intent(out) :: guess
     !> There is one
@@ -153,7 +151,7 @@ contains
     guessed = .false.
     work = 0.0_wp
     touching = any(start%pressure > 0.0_wp)
-    if (.not. is_worth_coarsening(self, touching, start, target)) return
+    if (.not. is_worth_coarsening(self, touching, start, step%target)) return
     if (.not. allocated(self%coarser)) call set_up_coarser(self, error)
     if (allocated(error)) return
     call copy_tractions(start, guess, self%problem%space)
@@ -165,7 +163,7 @@ contains
         call self%coarser%displacements(before%pressure, before%traction, displacement, error)
         if (allocated(error)) return
         gap = model%initial_gap
-        call balance(self%problem, start, reference, target, before, displacement, model, origin, coarse_target)
+        call balance(self%problem, start, step, before, displacement, model, origin, coarse_target)
         call self%coarser%solve_step(before, origin, coarse_target, self%problem%options%direct%change_tolerance, &
                                      options%change_sweeps, after, error)
         model%initial_gap = gap
@@ -175,8 +173,8 @@ contains
       else
         call new_friction_state(before, model%lattice, model%space)
         before%motion = start%motion
-        call self%coarser%solve_step(before, restrict_vector(self%problem%lattice, reference, model%lattice), target, &
-                                     self%problem%options%direct%nested_tolerance, max_sweeps, after, error)
+        call self%coarser%solve_step(before, restrict_vector(self%problem%lattice, step%reference, model%lattice), &
+                                     step%target, self%problem%options%direct%nested_tolerance, step%max_sweeps, after, error)
         if (allocated(error)) return
         guessed = after%converged
         if (guessed) call prolong_state(model, after, self%problem, guess)
@@ -203,9 +201,7 @@ contains
       if (touching) then
         nodes = reshape(start%pressure > 0.0_wp, [problem%lattice%size()])
       else
-        nodes = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), &
-                            reshape(problem%initial_gap, [problem%lattice%size()]), &
-                            reshape(problem%candidate, [problem%lattice%size()]))
+        nodes = problem%first_guess(target)
       end if
       worth = count(nodes) >= 4*options%least_contact
     end associate
@@ -226,16 +222,14 @@ contains
   end subroutine set_up_coarser
 
   !> Iterate from a state until the residuals are within the tolerance.
-  subroutine iterate(self, start, is_near, reference, target, tolerance, max_sweeps, state, error)
+  subroutine iterate(self, start, is_near, step, state, error)
     class(direct_friction_t), intent(inout), target :: self
     !> State to start from
     type(contact_state_t), intent(in) :: start
     !> Its contact area needs no ring around it
     logical, intent(in) :: is_near
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    type(load_target_t), intent(in) :: target
-    real(wp), intent(in) :: tolerance
-    integer, intent(in) :: max_sweeps
+    !> The load step
+    type(load_step_t), intent(in) :: step
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
     type(direct_iterate_t) :: it, before
@@ -248,21 +242,21 @@ contains
     call self%factors%clear()
     call new_friction_state(state, self%problem%lattice)
     self%operator%applications = 0.0_wp
-    call new_direct_iterate(it, self%problem, start, reference, target)
+    call new_direct_iterate(it, self%problem, start, step)
     it%accuracy = options%first_accuracy
 
     if (any(start%pressure > 0.0_wp)) then
       call continue_from(self, start, is_near, it, error)
     else
-      call set_start(self, target, it, error)
+      call set_start(self, step%target, it, error)
     end if
     unsupported = 0
     share = 1.0_wp
-    do sweep = 1, max_sweeps
+    do sweep = 1, step%max_sweeps
       if (allocated(error)) return
       before = it
       ! while stick and slip are wrong, iterating the contact area to its end costs more than it saves
-      call find_area(self, target, merge(1, sweep, is_near), it, error)
+      call find_area(self, step%target, merge(1, sweep, is_near), it, error)
       if (allocated(error)) return
       if (is_unsupported(self%problem, it)) then
         unsupported = unsupported + 1
@@ -271,16 +265,16 @@ contains
           it = before
           share = options%cautious_share*share
           call fix_in_stick(self%problem%space, self%problem%options%contact%fixed_share, it%compliance, it%zone)
-          call find_area(self, target, sweep, it, error)
+          call find_area(self, step%target, sweep, it, error)
           if (allocated(error)) return
         end if
       end if
-      call record(self%problem, self%operator, reference, target, tolerance, it, state, error)
+      call record(self%problem, self%operator, step, it, state, error)
       if (allocated(error) .or. state%converged) exit
-      it%accuracy = min(it%accuracy, max(options%last_accuracy*tolerance, options%inner_accuracy* &
+      it%accuracy = min(it%accuracy, max(options%last_accuracy*step%tolerance, options%inner_accuracy* &
                                          max(state%residual_normal, state%residual_tangential)))
-      if (unsupported > 0 .or. sweep == max_sweeps) then
-        state%sliding = overloads(self%problem, target, state%pressure, state%residual_normal)
+      if (unsupported > 0 .or. sweep == step%max_sweeps) then
+        state%sliding = overloads(self%problem, step%target, state%pressure, state%residual_normal)
         if (state%sliding .or. unsupported == options%max_unsupported) exit
       end if
       if (mod(sweep, options%sweeps_per_cut) == 0) share = 0.5_wp*share
@@ -301,8 +295,7 @@ contains
     real(wp) :: weight(size(it%p)), mean
     integer :: i
 
-    it%contact = first_guess(self%problem%lattice, self%problem%pair, target%control(normal), target%value(normal), &
-                             it%initial_gap, it%candidate)
+    it%contact = self%problem%first_guess(target)
     where (it%contact)
       it%zone = slip
       it%compliance = infinite
@@ -377,7 +370,7 @@ contains
       if (.not. any(wrong)) return
       before = it%contact
       call exchange(wrong, self%problem%options%direct%stalled_exchanges, fewest, left, it%contact)
-      if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+      if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
       do i = 1, size(it%p)
         if (it%contact(i) .and. .not. before(i)) call enter(self%problem, it, i)
       end do

@@ -5,7 +5,7 @@ module hc_direct_iterate
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, load_target_t, separated, stick, slip, normal, along_x, n_motion, &
+  use hc_contact_state, only: contact_state_t, load_step_t, separated, stick, slip, normal, along_x, n_motion, &
     displacement_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
@@ -46,24 +46,22 @@ module hc_direct_iterate
 contains
 
   !> Set up an iterate without tractions or contact.
-  subroutine new_direct_iterate(it, problem, start, reference, target)
+  subroutine new_direct_iterate(it, problem, start, step)
     !> Iterate
     type(direct_iterate_t), intent(out) :: it
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> State to start from: its motions
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
+    !> The load step
+    type(load_step_t), intent(in) :: step
     integer :: n
 
     n = problem%lattice%size()
     it%initial_gap = reshape(problem%initial_gap, [n])
     it%candidate = reshape(problem%candidate, [n])
-    it%reference = reshape(reference, [n, 2])
-    it%motion = merge(target%value, start%motion, target%control == displacement_control)
+    it%reference = reshape(step%reference, [n, 2])
+    it%motion = merge(step%target%value, start%motion, step%target%control == displacement_control)
     allocate (it%p(n), it%compliance(n), it%spring(n), it%offset(n), source=0.0_wp)
     allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
     allocate (it%zone(n), source=separated)
@@ -148,8 +146,8 @@ contains
                      > problem%friction%largest_bound(maxval(it%p))
   end function is_unsupported
 
-  !> Nodes in contact, and springs of a compliant law, that the present pressure and gap call for.
-  pure subroutine linearize_law(problem, it)
+  !> Find the nodes in contact, and the springs of a compliant law, that the present pressure and gap call for.
+  subroutine linearize_law(problem, it)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
@@ -159,11 +157,9 @@ contains
     integer :: i
 
     before = it%contact
-    r = problem%normal_classification_parameter(count(it%contact))
-    call problem%normal_law%find_contact(r, it%p, it%gap, it%candidate, it%contact)
-    if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
-    call problem%normal_law%linearize(1, r, problem%softest_spring(maxval(abs(it%p))), it%p, it%gap, it%contact, &
-                                      it%spring, it%offset)
+    r = problem%normal_classification_parameter(count(before))
+    call problem%find_contact(count(before), it%p, it%gap, it%candidate, it%contact)
+    call problem%linearize(r, it%p, it%gap, it%contact, it%spring, it%offset)
     do i = 1, size(it%p)
       if (it%contact(i) .and. .not. before(i)) call enter(problem, it, i)
     end do
@@ -191,17 +187,13 @@ contains
   end subroutine evaluate
 
   !> The state that an iterate stands for: with its tractions projected on p >= 0 and on the cone.
-  subroutine record(problem, operator, reference, target, tolerance, it, state, error)
+  subroutine record(problem, operator, step, it, state, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Products over the window
     class(flexibility_t), intent(inout) :: operator
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> Iterate
     type(direct_iterate_t), intent(in) :: it
     !> State to be filled
@@ -219,7 +211,7 @@ contains
     state%motion = it%motion
     call problem%displace(operator, state, error)
     if (allocated(error)) return
-    call problem%complete_state(target, tolerance, reference, state)
+    call problem%complete_state(step%target, step%tolerance, step%reference, state)
     state%sweeps = it%solves
     state%operator_applications = operator%applications
   end subroutine record

@@ -10,9 +10,9 @@ module hc_direct_system
   use hc_block_cholesky, only: solve_blocks
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
-  use hc_area_factors, only: area_factors_t
+  use hc_area_factors, only: area_factors_t, factored_area_t
   use hc_direct_iterate, only: direct_iterate_t, evaluate, infinite, unloaded, ring
-  use hc_area_system, only: solve_with_factors
+  use hc_area_system, only: area_t, solve_with_factors
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_disc_law, only: normal_to
   use hc_contact_problem, only: friction_problem_t
@@ -31,9 +31,8 @@ contains
   !>
   !> The unknowns are p on the contact, q_x and q_y in stick, tau in slip, in this order, and the changes
   !> of the rigid motions whose loads are prescribed. Unknown k acts with `traction(:, k)`, and its row
-  !> adds up the displacements by `weight(:, k)`: they differ by the mu e in q = mu p e + tau t. Lengths are
-  !> divided by the self-compliance of a node, so that every number is a pressure. Kept factors serve where they are of use,
-  !> those of the whole matrix else.
+  !> adds up the displacements by `weight(:, k)`: they differ by the mu e in q = mu p e + tau t. Kept factors serve where they are
+  !> of use, those of the whole matrix else.
   subroutine solve_area(problem, flexibility, operator, factors, target, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
@@ -49,115 +48,148 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type(driven_motions_t) :: driven
-    real(wp), allocatable :: rhs(:, :), unknown(:, :), weight(:, :), traction(:, :), resultant(:, :), &
-                             rigid(:, :), direction(:, :), spring(:), change(:)
+    type(area_t) :: area
     logical :: solved
-    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:)
-    real(wp) :: load(n_motion), fixed(size(it%p), 2)
-    real(wp), dimension(size(it%p)) :: slope, bound, ahead, aside
-    real(wp), allocatable :: moved(:, :)
-    integer :: i, k, n, n_p, n_free, stat
+    integer :: i, k
 
-    contact = pack([(i, i=1, size(it%p))], it%contact)
-    stuck = pack(contact, it%zone(contact) == stick)
-    sliding = pack(contact, it%zone(contact) == slip .and. it%compliance(contact) < infinite)
-    solved = size(contact) > problem%options%direct%most_explicit .and. .not. problem%normal_law%is_compliant() &
+    allocate (area%contact, source=pack([(i, i=1, size(it%p))], it%contact))
+    area%stuck = pack(area%contact, it%zone(area%contact) == stick)
+    area%sliding = pack(area%contact, it%zone(area%contact) == slip .and. it%compliance(area%contact) < infinite)
+    solved = size(area%contact) > problem%options%direct%most_explicit .and. .not. problem%normal_law%is_compliant() &
              .and. .not. problem%pair%tangential_layer > 0.0_wp
+    if (solved) call factorize_area(problem, flexibility, area, it, factors, solved, error)
+    if (allocated(error)) return
+    call set_unknowns(problem, target, it, area, error)
+    if (allocated(error)) return
+    call set_sides(problem, flexibility, target, it, area)
     if (solved) then
-      call factorize_area(problem, flexibility, contact, stuck, sliding, it, factors, solved, error)
-      if (allocated(error)) return
-    end if
-    allocate (node, source=[contact, stuck, stuck, sliding])
-    allocate (place(size(it%p)), source=0)
-    place(contact) = [(i, i=1, size(contact))]
-    place = place(node)
-    call new_driven_motions(driven, problem, target, reshape(it%contact, problem%lattice%extent))
-    n = size(node)
-    n_p = size(contact)
-    n_free = size(driven%motion) + merge(1, 0, target%control(normal) == force_control)
-    allocate (rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, no_memory)
-      return
-    end if
-    weight = 0.0_wp
-    weight(normal, :n_p) = 1.0_wp
-    weight(along_x, n_p + 1:n_p + size(stuck)) = 1.0_wp
-    weight(along_y, n_p + size(stuck) + 1:n_p + 2*size(stuck)) = 1.0_wp
-    do k = n_p + 2*size(stuck) + 1, n
-      weight(along_x:, k) = normal_to(it%direction(:, node(k)))
-    end do
-    traction = weight
-    fixed = 0.0_wp
-    call problem%friction%find_slopes(1, it%p, slope)
-    call problem%friction%find_bounds(1, it%p, bound)
-    call problem%friction%find_boundary(it%direction, ahead, aside)
-    do k = 1, n_p
-      if (it%zone(node(k)) == stick .or. .not. problem%friction%is_bounded()) cycle
-      associate (i => node(k), e => it%direction(:, node(k)))
-        traction(along_x:, k) = slope(i)*(ahead(i)*e + aside(i)*normal_to(e))
-        ! what a bound that is not proportional to the pressure has besides
-        if (it%p(i) > 0.0_wp) fixed(i, :) = (bound(i) - slope(i)*it%p(i))*(ahead(i)*e + aside(i)*normal_to(e))
-      end associate
-    end do
-    call displace_fixed(problem, flexibility, contact, fixed, moved)
-
-    rigid = unloaded(problem, it)
-    do k = 1, n
-      rhs(k, 0) = -dot_product(weight(:, k), rigid(node(k), :))/problem%normal_compliance
-      if (k <= n_p) rhs(k, 0) = rhs(k, 0) - it%offset(node(k))/problem%normal_compliance
-      if (allocated(moved)) rhs(k, 0) = rhs(k, 0) - dot_product(weight(:, k), moved(:, place(k)))
-    end do
-    if (n_free > size(driven%motion)) then
-      load(1) = target%value(normal)/problem%lattice%cell_area()
-      rhs(:, 1) = weight(normal, :)
-      resultant(:, 1) = traction(normal, :)
-    end if
-    do i = 1, size(driven%motion)
-      k = n_free - size(driven%motion) + i
-      load(k) = driven%load(i, problem, target)
-      direction = reshape(driven%direction(i, problem), [size(it%p), 2])
-      rhs(:, k) = sum(weight(along_x:, :)*transpose(direction(node, :)), dim=1)
-      resultant(:, k) = sum(traction(along_x:, :)*transpose(direction(node, :)), dim=1)
-      load(k) = load(k) - sum(fixed*direction)
-    end do
-    allocate (spring(n), source=0.0_wp)
-    spring(:n_p) = it%spring(contact)/problem%normal_compliance
-    spring(n_p + 2*size(stuck) + 1:) = it%compliance(sliding)/problem%normal_compliance
-    if (solved) then
-      unknown(:, 0) = [it%p(contact), it%q(stuck, 1), it%q(stuck, 2), spread(0.0_wp, 1, size(sliding))]
-      call solve_with_factors(problem, operator, factors, node, weight, traction, spring, rhs, resultant, load(:n_free), &
-                              it%accuracy, unknown(:, 0), change, solved, error)
+      area%unknown(:, 0) = [it%p(area%contact), it%q(area%stuck, 1), it%q(area%stuck, 2), &
+                            spread(0.0_wp, 1, size(area%sliding))]
+      call solve_with_factors(problem, operator, factors, it%accuracy, area, solved, error)
       if (allocated(error)) return
     end if
     if (solved) then
-      call move_motions(problem, driven, change, it)
-      it%carried = are_carried(problem, load(:n_free), resultant, unknown(:, 0))
+      call move_motions(problem, area%driven, area%change, it)
+      it%carried = are_carried(problem, area)
     else
-      call solve_whole_area(problem, flexibility, contact, place, weight, traction, spring, rhs, unknown, error)
+      call solve_whole_area(problem, flexibility, area, error)
       if (allocated(error)) return
-      call satisfy_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
+      call satisfy_loads(problem, area, it, error)
       if (allocated(error)) return
     end if
     it%p = 0.0_wp
-    it%q = fixed
-    it%p(contact) = unknown(:n_p, 0)
-    do k = 1, n
-      it%q(node(k), :) = it%q(node(k), :) + unknown(k, 0)*traction(along_x:, k)
+    it%q = area%fixed
+    it%p(area%contact) = area%unknown(:size(area%contact), 0)
+    do k = 1, size(area%node)
+      it%q(area%node(k), :) = it%q(area%node(k), :) + area%unknown(k, 0)*area%traction(along_x:, k)
     end do
     it%solves = it%solves + 1
     call evaluate(problem, operator, it, error)
   end subroutine solve_area
 
-  !> Factorize the area as it stands.
-  subroutine factorize_area(problem, flexibility, contact, stuck, sliding, it, factors, done, error)
+  !> Set the unknowns of an area: their nodes, the displacements that their rows add up, their tractions and springs.
+  subroutine set_unknowns(problem, target, it, area, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Iterate
+    type(direct_iterate_t), intent(in) :: it
+    !> Area, whose nodes are known
+    type(area_t), intent(inout) :: area
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), dimension(size(it%p)) :: slope, bound, ahead, aside
+    integer :: i, k, n, n_p, n_stuck, n_free, stat
+
+    n_p = size(area%contact)
+    n_stuck = size(area%stuck)
+    area%node = [area%contact, area%stuck, area%stuck, area%sliding]
+    n = size(area%node)
+    allocate (area%place(size(it%p)), source=0)
+    area%place(area%contact) = [(i, i=1, n_p)]
+    area%place = area%place(area%node)
+    call new_driven_motions(area%driven, problem, target, reshape(it%contact, problem%lattice%extent))
+    n_free = size(area%driven%motion) + merge(1, 0, target%control(normal) == force_control)
+    allocate (area%rhs(n, 0:n_free), area%unknown(n, 0:n_free), area%weight(3, n), area%resultant(n, n_free), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, no_memory)
+      return
+    end if
+    area%weight = 0.0_wp
+    area%weight(normal, :n_p) = 1.0_wp
+    area%weight(along_x, n_p + 1:n_p + n_stuck) = 1.0_wp
+    area%weight(along_y, n_p + n_stuck + 1:n_p + 2*n_stuck) = 1.0_wp
+    do k = n_p + 2*n_stuck + 1, n
+      area%weight(along_x:, k) = normal_to(it%direction(:, area%node(k)))
+    end do
+    area%traction = area%weight
+    allocate (area%fixed(size(it%p), 2), source=0.0_wp)
+    call problem%friction%find_slopes(1, it%p, slope)
+    call problem%friction%find_bounds(1, it%p, bound)
+    call problem%friction%find_boundary(it%direction, ahead, aside)
+    do k = 1, n_p
+      if (it%zone(area%node(k)) == stick .or. .not. problem%friction%is_bounded()) cycle
+      associate (i => area%node(k), e => it%direction(:, area%node(k)))
+        area%traction(along_x:, k) = slope(i)*(ahead(i)*e + aside(i)*normal_to(e))
+        ! the part of a bound that is not proportional to the pressure
+        if (it%p(i) > 0.0_wp) area%fixed(i, :) = (bound(i) - slope(i)*it%p(i))*(ahead(i)*e + aside(i)*normal_to(e))
+      end associate
+    end do
+    allocate (area%spring(n), source=0.0_wp)
+    area%spring(:n_p) = it%spring(area%contact)/problem%normal_compliance
+    area%spring(n_p + 2*n_stuck + 1:) = it%compliance(area%sliding)/problem%normal_compliance
+  end subroutine set_unknowns
+
+  !> Set the right-hand sides of an area, at the present motions and of unit motions, and the loads of unit unknowns.
+  subroutine set_sides(problem, flexibility, target, it, area)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
-    !> Nodes in contact, those that stick, those that slip with a spring across
-    integer, intent(in) :: contact(:), stuck(:), sliding(:)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Iterate
+    type(direct_iterate_t), intent(in) :: it
+    !> Area, whose unknowns are set
+    type(area_t), intent(inout) :: area
+    real(wp), allocatable :: direction(:, :), moved(:, :)
+    real(wp) :: rigid(size(it%p), 3)
+    integer :: i, k, n_free
+
+    call displace_fixed(problem, flexibility, area%contact, area%fixed, moved)
+    rigid = unloaded(problem, it)
+    associate (node => area%node, weight => area%weight, rhs => area%rhs)
+      do k = 1, size(node)
+        rhs(k, 0) = -dot_product(weight(:, k), rigid(node(k), :))/problem%normal_compliance
+        if (k <= size(area%contact)) rhs(k, 0) = rhs(k, 0) - it%offset(node(k))/problem%normal_compliance
+        if (allocated(moved)) rhs(k, 0) = rhs(k, 0) - dot_product(weight(:, k), moved(:, area%place(k)))
+      end do
+      n_free = size(area%resultant, 2)
+      allocate (area%load(n_free))
+      if (n_free > size(area%driven%motion)) then
+        area%load(1) = target%value(normal)/problem%lattice%cell_area()
+        rhs(:, 1) = weight(normal, :)
+        area%resultant(:, 1) = area%traction(normal, :)
+      end if
+      do i = 1, size(area%driven%motion)
+        k = n_free - size(area%driven%motion) + i
+        direction = reshape(area%driven%direction(i, problem), [size(it%p), 2])
+        rhs(:, k) = sum(weight(along_x:, :)*transpose(direction(node, :)), dim=1)
+        area%resultant(:, k) = sum(area%traction(along_x:, :)*transpose(direction(node, :)), dim=1)
+        area%load(k) = area%driven%load(i, problem, target) - sum(area%fixed*direction)
+      end do
+    end associate
+  end subroutine set_sides
+
+  !> Factorize the area as it stands.
+  subroutine factorize_area(problem, flexibility, area, it, factors, done, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its flexibility
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Area, whose nodes are known
+    type(area_t), intent(in) :: area
     !> Iterate
     type(direct_iterate_t), intent(in) :: it
     !> Factors of the last area, of this one on return
@@ -166,39 +198,32 @@ contains
     logical, intent(out) :: done
     !> Allocated if there is not enough memory
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: side(2, size(sliding))
+    real(wp) :: side(2, size(area%sliding))
     logical :: sticks(size(it%p)), edge(size(it%p))
     integer :: i
 
     sticks = .false.
-    sticks(stuck) = .true.
+    sticks(area%stuck) = .true.
     ! those next to a node that does not stick may be the next to slip or to leave
     edge = reshape(ring(reshape(.not. sticks, problem%lattice%extent)), [size(it%p)])
-    do i = 1, size(sliding)
-      side(:, i) = normal_to(it%direction(:, sliding(i)))
+    do i = 1, size(area%sliding)
+      side(:, i) = normal_to(it%direction(:, area%sliding(i)))
     end do
     associate (pair => problem%pair, unit => problem%normal_compliance)
-      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, &
-                             problem%options%direct, contact, stuck, .not. edge(stuck), sliding, side, &
-                             it%compliance(sliding)/unit, done, error)
+      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, problem%options%direct, &
+                             factored_area_t(area%contact, area%stuck, .not. edge(area%stuck), area%sliding, side, &
+                                             it%compliance(area%sliding)/unit), done, error)
     end associate
   end subroutine factorize_area
 
   !> Solve (F7) with the factors of the whole matrix, for the present motions and for unit motions.
-  subroutine solve_whole_area(problem, flexibility, contact, place, weight, traction, spring, rhs, unknown, error)
+  subroutine solve_whole_area(problem, flexibility, area, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
-    !> Nodes in contact, and the place of each unknown's node among them
-    integer, intent(in) :: contact(:), place(:)
-    !> Displacements that each row adds up, traction of each unknown (3, size(place))
-    real(wp), intent(in) :: weight(:, :), traction(:, :)
-    !> Springs (size(place))
-    real(wp), intent(in) :: spring(:)
-    !> Right-hand sides, and unknowns (size(place), 0:)
-    real(wp), intent(in), contiguous :: rhs(:, :)
-    real(wp), intent(out), contiguous :: unknown(:, :)
+    !> Area; its unknowns are found
+    type(area_t), intent(inout) :: area
     !> Allocated on failure: not enough memory, a singular matrix
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: matrix(:, :)
@@ -206,8 +231,8 @@ contains
     logical :: solved
     integer :: i, n, n_p, stat
 
-    n = size(place)
-    n_p = size(contact)
+    n = size(area%node)
+    n_p = size(area%contact)
     call require_memory(8*int(n, int64)**2 + 4*int(n_p, int64)**2 + 4*int(n - n_p, int64)**2, error)
     if (allocated(error)) return
     allocate (matrix(n, n), first(n_p, n_p), stat=stat)
@@ -215,16 +240,16 @@ contains
       call raise(error, status%resources, no_memory)
       return
     end if
-    call assemble(problem, flexibility, contact, place, weight, traction, matrix)
+    call assemble(problem, flexibility, area, matrix)
     do i = 1, n
-      matrix(i, i) = matrix(i, i) + spring(i)
+      matrix(i, i) = matrix(i, i) + area%spring(i)
     end do
     do i = 1, n_p
-      first(:, i) = real(flexibility%normal_influence(contact, contact(i))/problem%normal_compliance, real32)
-      first(i, i) = first(i, i) + real(spring(i), real32)
+      first(:, i) = real(flexibility%normal_influence(area%contact, area%contact(i))/problem%normal_compliance, real32)
+      first(i, i) = first(i, i) + real(area%spring(i), real32)
     end do
-    call solve_blocks(n, n_p, size(rhs, 2), first, matrix, rhs, unknown, solved, problem%options%direct)
-    if (.not. solved) call solve_whole(matrix, rhs, unknown, error)
+    call solve_blocks(n, n_p, first, matrix, area%rhs, area%unknown, solved, problem%options%direct)
+    if (.not. solved) call solve_whole(matrix, area%rhs, area%unknown, error)
   end subroutine solve_whole_area
 
   !> Displacements by tractions that do not change with the unknowns, over the self-compliance of a node; not allocated if
@@ -280,17 +305,11 @@ contains
   !> Find the motions whose loads are prescribed from these loads.
   !>
   !> Motions that the loads do not determine stay as they are (without a node in stick, say).
-  subroutine satisfy_loads(problem, driven, load, resultant, rhs, it, error)
+  subroutine satisfy_loads(problem, area, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
-    !> Tangential motions driven by their loads
-    type(driven_motions_t), intent(in) :: driven
-    !> Loads over the cell area, the tangential ones last [Pa]
-    real(wp), intent(in) :: load(:)
-    !> Loads of unit unknowns (size(rhs, 1), size(load))
-    real(wp), intent(in) :: resultant(:, :)
-    !> Unknowns at the present motions, and those of unit motions; on return the first are at the new motions
-    real(wp), intent(inout) :: rhs(:, 0:)
+    !> Area, with unknowns at the present motions and of unit motions; on return the first are at the new motions
+    type(area_t), intent(inout) :: area
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
@@ -299,30 +318,32 @@ contains
     real(wp) :: stiffness(n_motion, n_motion), change(n_motion, 1), singular(n_motion), work(64)
     integer :: n, rank, info
 
-    n = size(load)
+    n = size(area%load)
     if (n == 0) return
-    stiffness(:n, :n) = matmul(transpose(resultant), rhs(:, 1:))
-    change(:n, 1) = load - matmul(rhs(:, 0), resultant)
-    call dgelss(n, n, 1, stiffness, n_motion, change, n_motion, singular, problem%options%direct%undetermined_motion, &
-                rank, work, size(work), info)
-    if (info /= 0) then
-      call raise(error, status%no_convergence, 'the rigid motions of the contact cannot be found')
-      return
-    end if
-    rhs(:, 0) = rhs(:, 0) + matmul(rhs(:, 1:), change(:n, 1))
-    it%carried = are_carried(problem, load, resultant, rhs(:, 0))
-    call move_motions(problem, driven, change(:n, 1), it)
+    associate (unknown => area%unknown)
+      stiffness(:n, :n) = matmul(transpose(area%resultant), unknown(:, 1:))
+      change(:n, 1) = area%load - matmul(unknown(:, 0), area%resultant)
+      call dgelss(n, n, 1, stiffness, n_motion, change, n_motion, singular, problem%options%direct%undetermined_motion, &
+                  rank, work, size(work), info)
+      if (info /= 0) then
+        call raise(error, status%no_convergence, 'the rigid motions of the contact cannot be found')
+        return
+      end if
+      unknown(:, 0) = unknown(:, 0) + matmul(unknown(:, 1:), change(:n, 1))
+    end associate
+    it%carried = are_carried(problem, area)
+    call move_motions(problem, area%driven, change(:n, 1), it)
   end subroutine satisfy_loads
 
   !> Tell whether the unknowns carry the loads, but for rounding errors.
-  pure logical function are_carried(problem, load, resultant, unknown)
+  pure logical function are_carried(problem, area)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
-    !> Loads over the cell area, loads of unit unknowns (size(unknown), size(load)), unknowns [Pa]
-    real(wp), intent(in) :: load(:), resultant(:, :), unknown(:)
+    !> Area with its unknowns
+    type(area_t), intent(in) :: area
 
-    are_carried = maxval(abs(load - matmul(unknown, resultant))) <= &
-                  problem%options%direct%load_rounding*sum(abs(unknown))
+    are_carried = maxval(abs(area%load - matmul(area%unknown(:, 0), area%resultant))) <= &
+                  problem%options%direct%load_rounding*sum(abs(area%unknown(:, 0)))
   end function are_carried
 
   !> Add changes of the motions that loads drive.
@@ -344,33 +365,30 @@ contains
   end subroutine move_motions
 
   !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
-  subroutine assemble(problem, flexibility, contact, place, weight, traction, matrix)
+  subroutine assemble(problem, flexibility, area, matrix)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
-    !> Nodes in contact
-    integer, intent(in) :: contact(:)
-    !> Node of each unknown, as a place in `contact`
-    integer, intent(in) :: place(:)
-    !> Displacements that each row adds up, traction of each unknown (3, size(place))
-    real(wp), intent(in) :: weight(:, :), traction(:, :)
+    !> Area, whose unknowns are set
+    type(area_t), intent(in) :: area
     !> Matrix
     real(wp), intent(out) :: matrix(:, :)
-    real(wp) :: u(3, size(contact)), by_pressure(3, size(contact)), pressure(3)
+    real(wp) :: u(3, size(area%contact)), by_pressure(3, size(area%contact)), pressure(3)
     integer :: column, k
 
-    !$omp parallel do private(u, by_pressure, pressure, k) if (size(place) > 500)
-    do column = 1, size(place)
-      call flexibility%response(contact, contact(place(column)), traction(:, column)/problem%normal_compliance, u)
+    !$omp parallel do private(u, by_pressure, pressure, k) if (size(area%place) > 500)
+    do column = 1, size(area%place)
+      call flexibility%response(area%contact, area%contact(area%place(column)), &
+                                area%traction(:, column)/problem%normal_compliance, u)
       if (problem%goodman) then
         ! the gap does not feel shear tractions
-        pressure = [traction(normal, column)/problem%normal_compliance, 0.0_wp, 0.0_wp]
-        call flexibility%response(contact, contact(place(column)), pressure, by_pressure)
+        pressure = [area%traction(normal, column)/problem%normal_compliance, 0.0_wp, 0.0_wp]
+        call flexibility%response(area%contact, area%contact(area%place(column)), pressure, by_pressure)
         u(normal, :) = by_pressure(normal, :)
       end if
-      do k = 1, size(place)
-        matrix(k, column) = dot_product(weight(:, k), u(:, place(k)))
+      do k = 1, size(area%place)
+        matrix(k, column) = dot_product(area%weight(:, k), u(:, area%place(k)))
       end do
     end do
     !$omp end parallel do

@@ -22,11 +22,11 @@ module hc_written_iteration
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, stick, slip, normal, no_progress, &
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, new_friction_state, stick, slip, normal, no_progress, &
     sweeps_used_up, loads_not_carried
+  use hc_normal_problem, only: nearest_nodes
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
-  use hc_direct_contact, only: first_guess
   use hc_area_factors, only: area_factors_t
   use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, record
   use hc_direct_system, only: solve_area
@@ -45,8 +45,7 @@ module hc_written_iteration
 contains
 
   !> Iterate from a state until the residuals are within the tolerance or nothing new comes.
-  subroutine iterate_as_written(problem, flexibility, operator, factors, start, reference, target, tolerance, max_sweeps, state, &
-                                error)
+  subroutine iterate_as_written(problem, flexibility, operator, factors, start, step, state, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility: coefficients, and products
@@ -56,14 +55,8 @@ contains
     type(area_factors_t), intent(inout) :: factors
     !> State to start from
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Partitions that may be tried
-    integer, intent(in) :: max_sweeps
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> State at the end of the step, converged or not
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure
@@ -76,31 +69,30 @@ contains
     call factors%clear()
     call new_friction_state(state, problem%lattice)
     operator%applications = 0.0_wp
-    call new_direct_iterate(it, problem, start, reference, target)
-    it%accuracy = problem%options%direct%last_accuracy*tolerance
+    call new_direct_iterate(it, problem, start, step)
+    it%accuracy = problem%options%direct%last_accuracy*step%tolerance
     first = .not. any(start%pressure > 0.0_wp)
     if (.not. first) then
       it%contact = it%candidate .and. reshape(start%pressure > 0.0_wp, [size(it%p)])
       it%p = reshape(start%pressure, [size(it%p)])
       it%q = reshape(start%traction, [size(it%p), 2])
     else
-      it%contact = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), it%initial_gap, &
-                               it%candidate)
+      it%contact = problem%first_guess(step%target)
     end if
     if (.not. any(it%contact)) it%contact = it%candidate
     where (it%contact) it%zone = stick
     if (.not. first) call partition(problem, it, changed)
     allocate (before%sums(2, 0))
-    do sweep = 1, max_sweeps
+    do sweep = 1, step%max_sweeps
       call before%add(it, repeated)
-      call find_area(problem, flexibility, operator, factors, target, first, it, error)
+      call find_area(problem, flexibility, operator, factors, step%target, first, it, error)
       if (allocated(error)) return
-      call record(problem, operator, reference, target, tolerance, it, state, error)
+      call record(problem, operator, step, it, state, error)
       if (allocated(error) .or. state%converged) return
       state%stopped = no_progress
       if (repeated) return
       if (.not. it%carried) then
-        state%sliding = overloads(problem, target, state%pressure, state%residual_normal)
+        state%sliding = overloads(problem, step%target, state%pressure, state%residual_normal)
         if (state%sliding) state%stopped = loads_not_carried
         return
       end if
@@ -142,7 +134,7 @@ contains
       tension = it%contact .and. it%p < -negligible
       if (any(tension)) then
         it%contact = it%contact .and. .not. tension
-        if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+        if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
       else if (shrinks) then
         return
       else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then

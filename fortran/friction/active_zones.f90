@@ -11,35 +11,9 @@ module hc_active_zones
   implicit none
   private
 
-  public :: find_contact, linearize_law, shear_parameter, classify, find_constraints, find_prescribed_displacement
+  public :: linearize_law, shear_parameter, classify, find_constraints, find_prescribed_displacement
 
 contains
-
-  !> Find the nodes that the law of contact calls for, (F5): one step of a projected gradient map, which contracts
-  !> because r' is scaled with the size of the contact.
-  subroutine find_contact(now, gap, contact)
-    !> Iterate
-    type(friction_iterate_t), intent(in) :: now
-    !> Gap of the present tractions [m]
-    real(wp), intent(in), contiguous :: gap(:)
-    !> The nodes (n)
-    logical, allocatable, intent(out) :: contact(:)
-    real(wp) :: r, least
-    integer :: row, from, to
-
-    r = now%problem%normal_classification_parameter(now%operators%space%count(now%contact))
-    allocate (contact(size(gap)))
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
-    do row = 1, now%problem%lattice%extent(2)
-      to = row*now%problem%lattice%extent(1)
-      from = to - now%problem%lattice%extent(1) + 1
-      call now%problem%normal_law%find_contact(r, now%p(from:to), gap(from:to), now%candidate(from:to), contact(from:to))
-    end do
-    !$omp end parallel do
-    if (now%operators%space%count(contact) > 0) return
-    least = now%operators%space%min(gap, now%candidate)
-    contact = now%candidate .and. gap <= least
-  end subroutine find_contact
 
   !> Linearise a compliant law of contact about the present pressure and gap.
   subroutine linearize_law(now, gap, from_pressure)
@@ -49,22 +23,13 @@ contains
     real(wp), intent(in), contiguous :: gap(:)
     !> The gap means nothing yet: about the pressure
     logical, intent(in) :: from_pressure
-    real(wp) :: r, p_max
-    integer :: row, from, to
+    real(wp) :: r
 
-    p_max = 0.0_wp
-    if (allocated(now%pressure%compliance)) p_max = now%operators%space%max(abs(now%p))
-    if (.not. (allocated(now%pressure%compliance) .and. p_max > 0.0_wp)) return
+    if (.not. allocated(now%pressure%compliance)) return
+    if (.not. now%operators%space%max_abs(now%p) > 0.0_wp) return
     r = 0.0_wp
     if (.not. from_pressure) r = now%problem%normal_classification_parameter(now%operators%space%count(now%contact))
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
-    do row = 1, now%problem%lattice%extent(2)
-      to = row*now%problem%lattice%extent(1)
-      from = to - now%problem%lattice%extent(1) + 1
-      call now%problem%normal_law%linearize(from, r, now%problem%softest_spring(p_max), now%p(from:to), gap(from:to), &
-                                            now%contact(from:to), now%pressure%compliance(from:to), now%pressure%offset(from:to))
-    end do
-    !$omp end parallel do
+    call now%problem%linearize(r, now%p, gap, now%contact, now%pressure%compliance, now%pressure%offset)
     call now%operators%normal%set_active(now%contact, now%pressure%compliance)
   end subroutine linearize_law
 

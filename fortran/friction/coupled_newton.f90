@@ -24,17 +24,32 @@ module hc_coupled_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: satisfy_constraints, step_ahead
+  use hc_linear_system, only: constraints_t, iteration_t, step_ahead
   use hc_projected_gmres, only: projected_gmres
   implicit none
   private
 
   public :: coupled_sweep
+
+  !> A step: the linear problem (F7) and its solution.
+  type :: coupled_step_t
+    type(coupled_system_t) :: system
+    !> Nodes that carry unknowns (of 3 n), those of the shear traction (of 2 n) and of the pressure (of n)
+    type(active_set_t) :: nodes, sheared, pressed
+    !> Pressure, then shear traction in the frames, and its product (3 n)
+    real(wp), allocatable :: x(:), ax(:)
+    !> Motions that are driven by their loads; the loads as constraints, the normal one last
+    type(driven_motions_t) :: driven
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    !> Some node sticks
+    logical :: sticks = .false.
+  end type coupled_step_t
 
 contains
 
@@ -47,178 +62,261 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type(coupled_system_t) :: system
-    real(wp), allocatable :: x(:), ax(:), rhs(:), column(:), plane(:)
-    real(wp), allocatable :: shear_columns(:, :), part(:, :), b(:, :), m_b(:, :), c(:, :)
-    real(wp), allocatable :: gap(:), ahead(:), aside(:)
-    logical, allocatable :: active(:), shear_active(:), contact(:)
-    type(active_set_t), target :: nodes, sheared, pressed
-    real(wp), allocatable :: shear_missing(:)
-    type(driven_motions_t) :: driven
-    type(newton_options_t) :: options
-    real(wp) :: missing(4), multiplier(4), weight(2), goal, residual, drift, rounding
-    integer :: n, m, k, n_shear, iterations
-    logical :: independent, sticks
+    type(coupled_step_t), target :: step
+    logical, allocatable :: shear_active(:)
+    real(wp), allocatable :: missing(:)
 
-    n = size(now%p)
-    options = now%problem%options%newton
     ! 1.
+    call linearize(now, shear_active)
+    ! 2.
+    call enter_frames(now, shear_active, step)
+    ! 3.
+    call find_nodes(now, shear_active, step)
+    call constrain(now, step, missing, error)
+    if (allocated(error)) return
+    call step%constraints%satisfy(step%system%space, missing, step%x, step%iteration%independent, step%nodes)
+    ! 4.
+    if (step%iteration%independent) call solve(now, step, error)
+    if (allocated(error)) return
+    ! where all nodes slip, only their directions resist a load: limit the step along them
+    failed = .not. step%iteration%independent
+    if (.not. failed .and. size(step%driven%motion) > 0 .and. .not. step%sticks) then
+      associate (n => size(now%p))
+        failed = step%system%space%max_abs(step%x(n + 1:2*n)) > now%problem%options%newton%most_across*now%traction_scale()
+      end associate
+    end if
+    if (failed) then
+      call now%refresh(error)
+    else
+      ! 5.
+      call take_solution(now, step, error)
+    end if
+  end subroutine coupled_sweep
+
+  !> Find contact, stick, slip, directions and compliances that the present tractions call for.
+  subroutine linearize(now, shear_active)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout), target :: now
+    !> Components of the shear traction that are unknown (2 n)
+    logical, allocatable, intent(out) :: shear_active(:)
+    real(wp), allocatable :: gap(:)
+    logical, allocatable :: contact(:)
+
     call now%find_gap(gap)
-    call find_contact(now, gap, contact)
+    allocate (contact(size(gap)))
+    call now%problem%find_contact(now%operators%space%count(now%contact), now%p, gap, now%candidate, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
     call linearize_law(now, gap, .false.)
     deallocate (gap)
     call classify(now, .false., shear_active)
-    ! 2.
-    system%operators => now%operators
-    system%shear => now%shear
-    if (.not. allocated(now%pressure%compliance)) call now%operators%normal%set_active(now%contact)
-    if (allocated(now%pressure%compliance)) system%compliance = now%pressure%compliance
-    system%space = now%operators%space
-    allocate (active(3*n), x(3*n), plane(2*n))
-    active(:n) = now%contact
-    active(n + 1:) = shear_active
-    allocate (system%slope(n), source=0.0_wp)
-    allocate (ahead(n), aside(n))
-    call now%problem%friction%find_boundary(now%shear%direction, ahead, aside)
-    if (now%problem%friction%is_bounded()) then
-      call now%problem%friction%find_slopes(1, now%p, system%slope)
-      where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
-      if (allocated(now%shear%rest)) then
-        system%tilt = aside*system%slope
-        now%shear%rest = now%shear%rest - system%tilt*now%p
-      end if
-      system%slope = ahead*system%slope
-    end if
-    x(:n) = now%p
-    x(n + 1:) = now%q
-    call now%shear%turn(x(n + 1:))
-    ! what p carries along is not counted twice
-    x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
-    where (.not. shear_active) x(n + 1:) = 0.0_wp
-    if (now%problem%friction%is_bounded()) then
-      ! the part of a bound that does not grow with the pressure stays as it is
-      call now%problem%friction%find_bounds(1, now%p, plane(:n))
-      where (now%contact .and. .not. shear_active(n + 1:)) x(2*n + 1:) = ahead*plane(:n) - system%slope*now%p
-    end if
-    deallocate (ahead, aside)
+  end subroutine linearize
 
-    ! 3.
-    call new_active_set(nodes, active, system%space)
-    call new_active_set(sheared, shear_active, system%space)
-    call sheared%pair(2*n)
-    call new_active_set(pressed, now%contact, system%space)
-    system%pressed => pressed
-    system%sheared => sheared
-    sticks = any(shear_active(n + 1:))
-    deallocate (active, shear_active)
-    call find_constraints(now, sheared, driven, shear_columns, shear_missing)
-    n_shear = size(shear_missing)
-    m = n_shear
-    if (now%target%control(normal) == force_control) m = m + 1
-    call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
-    if (allocated(error)) return
-    ! one by one: over all nodes they are large
-    allocate (b(nodes%n_active, m), m_b(nodes%n_active, m), c(nodes%n_active, m), column(3*n))
-    do k = 1, n_shear
-      column = 0.0_wp
-      call sheared%unpack(part(:, k), column(n + 1:))
-      call nodes%pack(column, m_b(:, k))
-      column = 0.0_wp
-      call sheared%unpack(shear_columns(:, k), column(n + 1:))
-      call nodes%pack(column, b(:, k))
-      ! the traction mu p e belongs to the pressure
-      plane = reshape(driven%direction(k, now%problem), [2*n])
-      column(:n) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
-      call nodes%pack(column, c(:, k))
-    end do
-    deallocate (part, shear_columns, plane)
-    missing(:n_shear) = shear_missing
-    multiplier(:n_shear) = driven%multipliers(now%motion)
-    if (m > n_shear) then
-      missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - system%space%sum(now%p)
-      multiplier(m) = now%motion(normal)
-      allocate (shear_columns(pressed%n_active, 1), source=1.0_wp)
-      call find_punch_pressure(now, pressed, shear_columns, part, error)
+  !> Set up matrix and unknowns in the frames of the nodes; the part mu p e of a traction belongs to the pressure.
+  subroutine enter_frames(now, shear_active, step)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout), target :: now
+    !> Components of the shear traction that are unknown (2 n)
+    logical, intent(in), contiguous :: shear_active(:)
+    !> The step
+    type(coupled_step_t), intent(inout) :: step
+    real(wp), dimension(:), allocatable :: ahead, aside, bound
+    integer :: n
+
+    n = size(now%p)
+    associate (system => step%system, friction => now%problem%friction)
+      system%operators => now%operators
+      system%shear => now%shear
+      if (.not. allocated(now%pressure%compliance)) call now%operators%normal%set_active(now%contact)
+      if (allocated(now%pressure%compliance)) system%compliance = now%pressure%compliance
+      system%space = now%operators%space
+      allocate (step%x(3*n), ahead(n), aside(n), bound(n))
+      allocate (system%slope(n), source=0.0_wp)
+      call friction%find_boundary(now%shear%direction, ahead, aside)
+      if (friction%is_bounded()) then
+        call friction%find_slopes(1, now%p, system%slope)
+        where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
+        if (allocated(now%shear%rest)) then
+          system%tilt = aside*system%slope
+          now%shear%rest = now%shear%rest - system%tilt*now%p
+        end if
+        system%slope = ahead*system%slope
+      end if
+      step%x(:n) = now%p
+      step%x(n + 1:) = now%q
+      call now%shear%turn(step%x(n + 1:))
+      ! what p carries along is not counted twice
+      step%x(2*n + 1:) = step%x(2*n + 1:) - system%slope*now%p
+      where (.not. shear_active) step%x(n + 1:) = 0.0_wp
+      if (friction%is_bounded()) then
+        ! the part of a bound that does not grow with the pressure stays as it is
+        call friction%find_bounds(1, now%p, bound)
+        where (now%contact .and. .not. shear_active(n + 1:)) step%x(2*n + 1:) = ahead*bound - system%slope*now%p
+      end if
+    end associate
+  end subroutine enter_frames
+
+  !> Set the nodes that carry unknowns.
+  subroutine find_nodes(now, shear_active, step)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(in) :: now
+    !> Components of the shear traction that are unknown (2 n); freed
+    logical, allocatable, intent(inout) :: shear_active(:)
+    !> The step
+    type(coupled_step_t), intent(inout), target :: step
+    integer :: n
+
+    n = size(now%p)
+    call new_active_set(step%nodes, [now%contact, shear_active], step%system%space)
+    call new_active_set(step%sheared, shear_active, step%system%space)
+    call step%sheared%pair(2*n)
+    call new_active_set(step%pressed, now%contact, step%system%space)
+    step%system%pressed => step%pressed
+    step%system%sheared => step%sheared
+    step%sticks = any(shear_active(n + 1:))
+    deallocate (shear_active)
+  end subroutine find_nodes
+
+  !> Set the prescribed loads as constraints: loads as rows A B^T E, motions as columns E_t^T B, and M B.
+  subroutine constrain(now, step, missing, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> The step
+    type(coupled_step_t), intent(inout), target :: step
+    !> What the start lacks of the loads, over the cell area
+    real(wp), allocatable, intent(out) :: missing(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: shear_columns(:, :), part(:, :), column(:), plane(:)
+    integer :: n, m, k, n_shear
+
+    n = size(now%p)
+    associate (nodes => step%nodes, sheared => step%sheared, c => step%constraints)
+      call find_constraints(now, sheared, step%driven, shear_columns, missing)
+      n_shear = size(missing)
+      c%multiplier = step%driven%multipliers(now%motion)
+      m = n_shear + merge(1, 0, now%target%control(normal) == force_control)
+      call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
+      if (allocated(error)) return
+      ! one by one: over all nodes they are large
+      allocate (c%columns(nodes%n_active, m), c%mb(nodes%n_active, m), c%rows(nodes%n_active, m), column(3*n), plane(2*n))
+      do k = 1, n_shear
+        column = 0.0_wp
+        call sheared%unpack(part(:, k), column(n + 1:))
+        call nodes%pack(column, c%mb(:, k))
+        column = 0.0_wp
+        call sheared%unpack(shear_columns(:, k), column(n + 1:))
+        call nodes%pack(column, c%columns(:, k))
+        ! the traction mu p e belongs to the pressure
+        plane = reshape(step%driven%direction(k, now%problem), [2*n])
+        column(:n) = step%system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+        call nodes%pack(column, c%rows(:, k))
+      end do
+      deallocate (part, shear_columns, plane)
+      if (m == n_shear) return
+      missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - step%system%space%sum(now%p)]
+      c%multiplier = [c%multiplier, now%motion(normal)]
+      allocate (shear_columns(step%pressed%n_active, 1), source=1.0_wp)
+      call find_punch_pressure(now, step%pressed, shear_columns, part, error)
       if (allocated(error)) return
       column = 0.0_wp
-      call pressed%unpack(part(:, 1), column(:n))
-      call nodes%pack(column, m_b(:, m))
+      call step%pressed%unpack(part(:, 1), column(:n))
+      call nodes%pack(column, c%mb(:, m))
       column(:n) = merge(1.0_wp, 0.0_wp, now%contact)
-      call nodes%pack(column, b(:, m))
-      c(:, m) = b(:, m)
-      deallocate (part, shear_columns)
-    end if
-    deallocate (column)
-    call satisfy_constraints(c, m_b, missing(:m), x, independent, system%space, nodes)
-    ! 4.
-    if (independent) then
-      allocate (ax(3*n), rhs(3*n))
-      rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
+      call nodes%pack(column, c%columns(:, m))
+      c%rows(:, m) = c%columns(:, m)
+    end associate
+  end subroutine constrain
+
+  !> Solve (F7) by GMRES, preconditioned block by block and projected as in (F11).
+  subroutine solve(now, step, error)
+    !> Tractions and motions; its displacements are freed
+    type(friction_iterate_t), intent(inout) :: now
+    !> The step
+    type(coupled_step_t), intent(inout), target :: step
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(newton_options_t) :: options
+    real(wp), allocatable :: rhs(:)
+    real(wp) :: residual, p_max
+    integer :: n
+
+    n = size(now%p)
+    options = now%problem%options%newton
+    residual = max(now%residual_normal, now%residual_tangential)
+    associate (system => step%system, iteration => step%iteration)
+      allocate (step%ax(3*n), rhs(3*n))
+      rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), now%target%control(normal) == force_control)
       if (allocated(now%pressure%offset)) rhs(:n) = rhs(:n) - now%pressure%offset
       call find_prescribed_displacement(now, rhs(n + 1:))
       call now%shear%add_rest(rhs(n + 1:))
-      if (max(now%residual_normal, now%residual_tangential) < options%residual_ahead) then
-        ax(:n) = now%w + now%closing
-        if (allocated(system%compliance)) ax(:n) = ax(:n) + system%compliance*x(:n)
-        ax(n + 1:) = now%u
-        call now%shear%add_springs(x(n + 1:), ax(n + 1:))
-        if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*system%tilt*x(:n)
-        call step_ahead(system, nodes, b, m_b, c, rhs, ax, multiplier(:m), options%length_ahead, x, error)
+      if (residual < options%residual_ahead) then
+        step%ax(:n) = now%w + now%closing
+        if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
+        step%ax(n + 1:) = now%u
+        call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
+        if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
+        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, step%x, error)
         if (allocated(error)) return
       end if
       ! those of the iterate come from the solution, or anew
       call now%forget_displacements()
-      call system%product(x, ax, error)
+      call system%product(step%x, step%ax, error)
       if (allocated(error)) return
-      weight(1) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
+      p_max = system%space%max(now%p)
+      allocate (iteration%weight(3))
+      iteration%weight(1) = 1.0_wp/(now%problem%normal_compliance*p_max)
       if (allocated(system%compliance)) then
-        weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(system%space%max(now%p))*weight(1)
+        iteration%weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(p_max)*iteration%weight(1)
       end if
-      weight(2) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
-      goal = min(max(now%residual_normal, now%residual_tangential), 1.0_wp)
-      goal = max(goal*min(options%inner_accuracy, max(goal, options%coupled_accuracy)), options%final_accuracy*now%tolerance)
-      goal = goal*real(nodes%n_active, wp)**0.25_wp
-      call projected_gmres(system, nodes, b, m_b, c, weight([1, 2, 2]), rhs, x, ax, goal, options%max_coupled_iterations, &
-                           options%max_directions, multiplier(:m), independent, residual, iterations, now%outcome, error, drift)
+      iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
+      residual = min(residual, 1.0_wp)
+      iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
+                                options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
+      iteration%most = options%max_coupled_iterations
+      iteration%most_directions = options%max_directions
+      call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
       if (allocated(error)) return
-      if (drift > options%displacement_rounding) call system%product(x, ax, error)
-      if (allocated(error)) return
-    end if
-    ! where all nodes slip, only their directions resist a load: not beyond reason
-    failed = .not. independent
-    if (.not. failed .and. n_shear > 0) then
-      if (.not. sticks) then
-        failed = system%space%max_abs(x(n + 1:2*n)) > options%most_across*now%traction_scale()
-      end if
-    end if
-    if (failed) then
-      call now%refresh(error)
-      return
-    end if
+      now%outcome = iteration%outcome
+      if (iteration%drift > options%displacement_rounding) call system%product(step%x, step%ax, error)
+    end associate
+  end subroutine solve
 
-    ! 5.
-    call driven%set_motions(multiplier(:n_shear), now%motion)
-    if (m > n_shear) now%motion(normal) = multiplier(m)
-    now%p = x(:n)
-    x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
-    allocate (now%closing(n))
-    now%w = ax(:n)
-    call now%pressure%stretch(-1.0_wp, now%p, now%w)
-    now%closing = 0.0_wp
-    now%cut = .false.
-    now%joint = .true.
-    if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
-    call now%shear%leave_frames(x(n + 1:), ax(n + 1:), rounding)
-    now%q = x(n + 1:)
-    now%u = ax(n + 1:)
-    if (rounding > options%displacement_rounding*now%problem%tangential_compliance*now%traction_scale()) then
+  !> Take tractions and motions of the solution, and their displacements from the product that GMRES carries along.
+  subroutine take_solution(now, step, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> The step
+    type(coupled_step_t), intent(inout) :: step
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: rounding
+    integer :: n, n_shear
+
+    n = size(now%p)
+    n_shear = size(step%driven%motion)
+    associate (x => step%x, ax => step%ax, system => step%system, multiplier => step%constraints%multiplier)
+      call step%driven%set_motions(multiplier(:n_shear), now%motion)
+      if (size(multiplier) > n_shear) now%motion(normal) = multiplier(n_shear + 1)
+      now%p = x(:n)
+      x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
+      allocate (now%closing(n))
+      now%w = ax(:n)
+      call now%pressure%stretch(-1.0_wp, now%p, now%w)
+      now%closing = 0.0_wp
+      now%cut = .false.
+      now%joint = .true.
+      if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
+      call now%shear%leave_frames(x(n + 1:), ax(n + 1:), rounding)
+      now%q = x(n + 1:)
+      now%u = ax(n + 1:)
+    end associate
+    if (rounding > now%problem%options%newton%displacement_rounding*now%problem%tangential_compliance*now%traction_scale()) then
       call now%refresh(error)
       if (allocated(error)) return
     end if
     call now%find_residuals()
     now%first = .false.
-  end subroutine coupled_sweep
+  end subroutine take_solution
 
 end module hc_coupled_newton

@@ -8,7 +8,7 @@
 module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, copy_tractions, load_target_t
+  use hc_contact_state, only: contact_state_t, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_elastic_operators, only: operators_t
   use hc_lattice_solver, only: solve_on_lattice
@@ -21,8 +21,7 @@ module hc_fas_predictor
 contains
 
   !> Find tractions and motions to start a step from.
-  recursive subroutine predict(problem, coarse, operators, start, reference, target, guess, &
-                               predicted, work, error, estimate)
+  recursive subroutine predict(problem, coarse, operators, start, step, guess, error, estimate)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> The problem on the coarser lattices, and their operators
@@ -30,16 +29,11 @@ contains
     type(operators_t), intent(inout) :: operators(:)
     !> State at the beginning of the step, in balance
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> State to start from: the old one with new tractions and motions, or unchanged if the coarse lattices do not help
+    !> The load step
+    type(load_step_t), intent(in) :: step
+    !> State to start from: the old one with new tractions and motions, if the coarse lattices converged, else unchanged; with the
+    !> work, in applications of the full operator
     type(contact_state_t), intent(out) :: guess
-    !> There is something better
-    logical, intent(out) :: predicted
-    !> Work, in applications of the full operator
-    real(wp), intent(out) :: work
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     !> w, u_x, u_y of the state at the beginning of the step, on return of that to start from, but for an error of interpolation;
@@ -49,12 +43,10 @@ contains
     type(friction_problem_t) :: model
     type(contact_state_t) :: before, first, after
     type(load_target_t) :: coarse_target
-    real(wp), allocatable :: origin(:, :, :), displacement(:, :, :), moved(:, :, :)
-    real(wp) :: coarser_work
-    logical :: helped
+    real(wp), allocatable, target :: origin(:, :, :)
+    real(wp), allocatable :: displacement(:, :, :), moved(:, :, :)
+    real(wp) :: work
 
-    work = 0.0_wp
-    predicted = .false.
     call copy_tractions(start, guess, problem%space)
     if (size(coarse) == 0) return
     model = coarse(1)
@@ -66,24 +58,25 @@ contains
     call model%displacements(operators(1)%flexibility, before%pressure, before%traction, displacement, error)
     if (allocated(error)) return
     work = operators(1)%flexibility%applications
-    call balance(problem, start, reference, target, before, displacement, model, origin, coarse_target)
+    call balance(problem, start, step, before, displacement, model, origin, coarse_target)
     if (model%is_pressed(coarse_target)) then
       moved = displacement
-      call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, helped, coarser_work, error, &
-                   moved)
-      if (allocated(error)) return
-      work = work + coarser_work
-      call solve_on_lattice(model, operators(1), first, origin, coarse_target, model%options%multilevel%change_tolerance, &
-                            model%options%multilevel%change_sweeps, after, error, moved, as_start=.true.)
-      if (allocated(error)) return
+      associate (options => model%options%multilevel)
+        call predict(model, coarse(2:), operators(2:), before, load_step_t(coarse_target, origin), first, error, moved)
+        if (allocated(error)) return
+        work = work + first%operator_applications
+        call solve_on_lattice(model, operators(1), first, load_step_t(coarse_target, origin, options%change_tolerance, &
+                                                                      options%change_sweeps), after, error, moved, as_start=.true.)
+        if (allocated(error)) return
+      end associate
       work = work + after%operator_applications
-      predicted = after%converged
-      if (predicted) then
+      guess%converged = after%converged
+      if (guess%converged) then
         if (.not. allocated(estimate)) call find_displacements(problem, start, estimate)
         call add_change(model, before, after, problem, guess, moved - displacement, estimate)
       end if
     end if
-    work = work*model%lattice%size()/problem%lattice%size()
+    guess%operator_applications = work*model%lattice%size()/problem%lattice%size()
   end subroutine predict
 
 end module hc_fas_predictor

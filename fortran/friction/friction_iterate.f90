@@ -8,7 +8,7 @@ module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_contact_problem, only: friction_problem_t
@@ -96,7 +96,7 @@ module hc_friction_iterate
 contains
 
   !> Set tractions and motions from those of a state, and find what they displace.
-  subroutine set_start(self, problem, operators, start, reference, target, tolerance, error, estimate)
+  subroutine set_start(self, problem, operators, start, step, error, estimate)
     class(friction_iterate_t), intent(inout), target :: self
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
@@ -104,45 +104,17 @@ contains
     type(operators_t), intent(inout), target :: operators
     !> State to start from
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m], not copied
-    real(wp), intent(in), contiguous, target :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
+    !> The load step, whose reference is not copied
+    type(load_step_t), intent(in) :: step
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     !> w, u_x, u_y of the start but for an error of interpolation (n_col, n_row, 3), if known; freed [m]
     real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
     type(driven_motions_t) :: driven
-    real(wp) :: highest
     integer :: n, row, from, to
 
-    n = problem%lattice%size()
-    self%problem => problem
-    self%operators => operators
-    self%target = target
-    self%tolerance = tolerance
-    self%pressure%operators => operators
-    self%pressure%space = operators%space
-    call new_shear_system(self%shear, operators)
-    if (.not. problem%friction%is_isotropic()) allocate (self%shear%rest(n), source=0.0_wp)
-    self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
-    self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
-    highest = huge(1.0_wp)
-    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-    if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
-    self%h(1:n) => problem%initial_gap
-    self%origin(1:2*n) => reference
-    allocate (self%p(n), self%q(2*n))
-    allocate (self%contact(n))
-    self%candidate(1:n) => problem%candidate
-    if (highest < huge(1.0_wp)) then
-      allocate (self%reached(n))
-      self%reached = self%candidate .and. self%h < highest
-      self%candidate => self%reached
-    end if
-    if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
+    call set_problem(self, problem, operators, step)
+    n = size(self%p)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
     do row = 1, problem%lattice%extent(2)
       to = row*problem%lattice%extent(1)
@@ -153,19 +125,19 @@ contains
       self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
     end do
     !$omp end parallel do
-    self%motion = merge(start%motion, target%value, target%control == force_control)
+    self%motion = merge(start%motion, step%target%value, step%target%control == force_control)
     if (operators%space%count(self%contact) > 0) then
       ! a twist turns about the middle of the contact, as far as the shifts are free
-      call new_driven_motions(driven, problem, target, self%contact)
+      call new_driven_motions(driven, problem, step%target, self%contact)
       associate (turned => self%motion(about_z) - start%motion(about_z))
         if (any(driven%motion == along_x)) self%motion(along_x) = self%motion(along_x) + turned*driven%center(2)
         if (any(driven%motion == along_y)) self%motion(along_y) = self%motion(along_y) - turned*driven%center(1)
       end associate
     else
-      ! any pressure is better than none
+      ! initial guess: uniform pressure on all nodes that may touch
       self%without_start = .true.
       self%contact = self%candidate
-      if (target%control(normal) /= force_control) self%contact = self%contact .and. self%h < target%value(normal)
+      if (step%target%control(normal) /= force_control) self%contact = self%contact .and. self%h < step%target%value(normal)
       self%p = merge(1.0_wp, 0.0_wp, self%contact)
       self%q = 0.0_wp
     end if
@@ -179,6 +151,42 @@ contains
       if (allocated(estimate)) deallocate (estimate)
     end if
   end subroutine set_start
+
+  !> Set the problem that is solved, and allocate tractions and springs.
+  subroutine set_problem(self, problem, operators, step)
+    class(friction_iterate_t), intent(inout), target :: self
+    !> The problem
+    type(friction_problem_t), intent(in), target :: problem
+    !> Operator and preconditioners over its window
+    type(operators_t), intent(inout), target :: operators
+    !> The load step, whose reference is not copied
+    type(load_step_t), intent(in) :: step
+    integer :: n
+
+    n = problem%lattice%size()
+    self%problem => problem
+    self%operators => operators
+    self%target = step%target
+    self%tolerance = step%tolerance
+    self%pressure%operators => operators
+    self%pressure%space = operators%space
+    call new_shear_system(self%shear, operators)
+    if (.not. problem%friction%is_isotropic()) allocate (self%shear%rest(n), source=0.0_wp)
+    self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
+    self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
+    self%h(1:n) => problem%initial_gap
+    self%origin(1:2*n) => step%reference
+    allocate (self%p(n), self%q(2*n))
+    allocate (self%contact(n))
+    self%candidate(1:n) => problem%candidate
+    if (step%target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) then
+      ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+      allocate (self%reached(n))
+      self%reached = self%candidate .and. self%h < step%target%value(normal)
+      self%candidate => self%reached
+    end if
+    if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
+  end subroutine set_problem
 
   !> Take displacements that were estimated; the closing by the shear traction is found: the pressure needs it by itself.
   subroutine take_estimate(self, estimate, error)

@@ -13,7 +13,7 @@ module hc_frictional_contact
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count, build_levels
   use hc_flexibility, only: check_operator
-  use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
@@ -160,7 +160,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(frictional_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -168,8 +168,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: guess
+    type(load_step_t) :: step
     real(wp), allocatable :: estimate(:, :, :)
-    real(wp) :: work, coarse_work
+    real(wp) :: work
     integer :: sweeps
     logical :: guessed, touching
 
@@ -177,6 +178,7 @@ contains
       call self%problem%separate(start, reference, target, tolerance, state)
       return
     end if
+    step = load_step_t(target, reference, tolerance, max_sweeps)
     work = 0.0_wp
     sweeps = 0
     touching = self%problem%space%max(start%pressure) > 0.0_wp
@@ -192,15 +194,15 @@ contains
     guessed = .false.
     if (size(self%operators) > 1) then
       if (touching) then
-        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, coarse_work, error, &
-                     estimate)
+        call predict(self%problem, self%coarse, self%operators(2:), start, step, guess, error, estimate)
+        guessed = guess%converged
       else
-        call coarse_guess(self, reference, target, max_sweeps, guess, coarse_work, estimate, error)
+        call coarse_guess(self, step, guess, estimate, error)
         guessed = .not. allocated(error)
         if (guessed) guessed = self%problem%space%max(guess%pressure) > 0.0_wp
       end if
       if (allocated(error)) return
-      work = work + coarse_work
+      work = work + guess%operator_applications
     end if
     call attempt(guess)
     if (allocated(error)) return
@@ -226,8 +228,7 @@ contains
       !> State to start from, whose tractions are freed
       type(contact_state_t), intent(inout) :: from
 
-      call solve_on_lattice(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error, &
-                            estimate)
+      call solve_on_lattice(self%problem, self%operators(1), from, step, state, error, estimate)
       sweeps = sweeps + state%sweeps
       work = work + state%operator_applications
     end subroutine attempt
@@ -235,18 +236,13 @@ contains
   end subroutine solve_step
 
   !> Find a first guess on the coarser lattices.
-  subroutine coarse_guess(self, reference, target, max_sweeps, guess, work, estimate, error)
+  subroutine coarse_guess(self, step, guess, estimate, error)
     class(frictional_contact_t), intent(inout), target :: self
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Active sets that may be tried
-    integer, intent(in) :: max_sweeps
-    !> On entry a state without contact, on return one to start from
+    !> The load step
+    type(load_step_t), intent(in) :: step
+    !> On entry a state without contact, on return one to start from, with the work in applications of the full operator on the
+    !> finest lattice
     type(contact_state_t), intent(inout) :: guess
-    !> Work, in applications of the full operator on the finest lattice
-    real(wp), intent(out) :: work
     !> w, u_x, u_y of that state, but for an error of interpolation, if it has any tractions (n_col, n_row, 3) [m]
     real(wp), allocatable, intent(out) :: estimate(:, :, :)
     !> Allocated on failure
@@ -256,24 +252,26 @@ contains
       real(wp), allocatable :: value(:, :, :)
     end type field_t
     type(contact_state_t) :: state, coarser
-    type(field_t) :: origin(size(self%operators))
+    type(field_t), target :: origin(size(self%operators))
     real(wp), allocatable :: known(:, :, :)
+    real(wp) :: work
     integer :: l
 
     work = 0.0_wp
-    origin(2)%value = restrict_vector(self%problem%lattice, reference, self%coarse(2)%lattice)
+    origin(2)%value = restrict_vector(self%problem%lattice, step%reference, self%coarse(2)%lattice)
     do l = 3, size(self%operators)
       origin(l)%value = restrict_vector(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
     end do
     do l = size(self%operators), 2, -1
       associate (problem => self%coarse(l))
         if (problem%space%count(problem%candidate) == 0) cycle
-        if (.not. problem%is_pressed(target)) cycle
+        if (.not. problem%is_pressed(step%target)) cycle
         call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
         if (allocated(coarser%pressure)) call continue_from(self%coarse(l + 1), coarser, problem, state)
-        call solve_on_lattice(problem, self%operators(l), state, origin(l)%value, target, &
-                              problem%options%multilevel%nested_tolerance, max_sweeps, coarser, error, known, as_start=.true.)
+        call solve_on_lattice(problem, self%operators(l), state, &
+                              load_step_t(step%target, origin(l)%value, problem%options%multilevel%nested_tolerance, &
+                                          step%max_sweeps), coarser, error, known, as_start=.true.)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
         ! what is no solution is no start
@@ -283,6 +281,7 @@ contains
       end associate
     end do
     if (allocated(coarser%pressure)) call continue_from(self%coarse(2), coarser, self%problem, guess)
+    guess%operator_applications = work
     call move_alloc(known, estimate)
 
   contains

@@ -10,7 +10,7 @@ module hc_front_relaxation
   use hc_precision, only: wp
   use hc_lattice, only: neighbors
   use hc_options, only: newton_options_t
-  use hc_contact_problem, only: near_reach
+  use hc_contact_problem, only: friction_problem_t, near_reach
   use hc_friction_iterate, only: friction_iterate_t
   use hc_active_set, only: find_span
   use hc_active_zones, only: shear_parameter
@@ -22,6 +22,16 @@ module hc_front_relaxation
 
   public :: relax_fronts
 
+  !> Nodes near the fronts between stick and slip.
+  type :: fronts_t
+    !> Columns and rows (2, nodes)
+    integer, allocatable :: node(:, :)
+    !> Displacement beyond the slip, u - ds (2, nodes) [m]; largest traction (nodes) [Pa]
+    real(wp), allocatable :: rest(:, :), bound(:)
+    !> Changes of a traction below which it stays [Pa]
+    real(wp) :: least = 0.0_wp
+  end type fronts_t
+
 contains
 
   !> Relax the shear traction near the fronts, and estimate the displacements that it causes.
@@ -29,10 +39,8 @@ contains
     !> Iterate: traction and tangential displacement change, the latter but for an error
     type(friction_iterate_t), intent(inout), target :: now
     real(wp), pointer, contiguous :: q(:, :, :), u(:, :, :)
-    integer, allocatable :: node(:, :)
-    real(wp), allocatable :: rest(:, :), bound(:)
+    type(fronts_t) :: fronts
     type(newton_options_t) :: options
-    real(wp) :: least
     integer :: pass
     logical :: changed
 
@@ -43,17 +51,16 @@ contains
     if (now%pressure_feels_shear .or. (now%without_start .and. now%first)) return
     if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return
     if (now%operators%space%count(now%contact) < options%front_nodes) return
-    call find_fronts(now, options%front_rings, node)
-    if (size(node, 2) == 0) return
-    call describe(now, node, rest, bound)
+    call find_fronts(now, options%front_rings, fronts%node)
+    if (size(fronts%node, 2) == 0) return
+    call describe(now, fronts)
     associate (extent => now%problem%lattice%extent)
       q(1:extent(1), 1:extent(2), 1:2) => now%q
       u(1:extent(1), 1:extent(2), 1:2) => now%u
     end associate
-    least = options%front_share*now%residual_tangential*now%traction_scale()
+    fronts%least = options%front_share*now%residual_tangential*now%traction_scale()
     do pass = 1, options%front_passes
-      call relax(now%problem%near_compliance, near_reach, node, mod(pass, 2) == 0, now%problem%tangential_compliance, least, &
-                 bound, rest, q, u, changed)
+      call relax(now%problem, fronts, mod(pass, 2) == 0, q, u, changed)
       if (.not. changed) exit
     end do
   end subroutine relax_fronts
@@ -139,46 +146,38 @@ contains
   end subroutine mark_nodes
 
   !> Find what is subtracted from the displacement of a node for its slip, and the largest traction that it bears.
-  subroutine describe(now, node, rest, bound)
+  subroutine describe(now, fronts)
     type(friction_iterate_t), intent(in) :: now
-    !> Columns and rows (2, nodes)
-    integer, intent(in) :: node(:, :)
-    !> u - ds (2, nodes) [m]
-    real(wp), allocatable, intent(out) :: rest(:, :)
-    !> Largest tractions (nodes) [Pa]
-    real(wp), allocatable, intent(out) :: bound(:)
+    !> Nodes near the fronts
+    type(fronts_t), intent(inout) :: fronts
     real(wp) :: rigid(now%problem%lattice%extent(1), 2)
     integer :: k, i, n, row
 
     n = size(now%p)
     row = 0
-    allocate (rest(2, size(node, 2)), bound(size(node, 2)))
-    do k = 1, size(node, 2)
-      if (node(2, k) /= row) then
-        row = node(2, k)
-        call now%problem%rigid_displacement_row(now%motion, row, rigid(:, 1), rigid(:, 2))
-      end if
-      i = (row - 1)*size(rigid, 1) + node(1, k)
-      rest(1, k) = now%origin(i) + rigid(node(1, k), 1)
-      rest(2, k) = now%origin(n + i) + rigid(node(1, k), 2)
-      call now%problem%friction%find_bounds(i, now%p(i:i), bound(k:k))
-    end do
+    associate (node => fronts%node)
+      allocate (fronts%rest(2, size(node, 2)), fronts%bound(size(node, 2)))
+      do k = 1, size(node, 2)
+        if (node(2, k) /= row) then
+          row = node(2, k)
+          call now%problem%rigid_displacement_row(now%motion, row, rigid(:, 1), rigid(:, 2))
+        end if
+        i = (row - 1)*size(rigid, 1) + node(1, k)
+        fronts%rest(1, k) = now%origin(i) + rigid(node(1, k), 1)
+        fronts%rest(2, k) = now%origin(n + i) + rigid(node(1, k), 2)
+        call now%problem%friction%find_bounds(i, now%p(i:i), fronts%bound(k:k))
+      end do
+    end associate
   end subroutine describe
 
   !> Make one pass of nonlinear Gauss-Seidel, (F12).
-  pure subroutine relax(near, reach, node, backwards, compliance, least, bound, rest, q, u, changed)
-    !> Nodes that a traction moves, in each direction
-    integer, intent(in) :: reach
-    !> Displacements around a node under unit traction, xx, xy and yy [m/Pa]
-    real(wp), intent(in) :: near(-reach:reach, -reach:reach, 3)
-    !> Columns and rows of the nodes (2, nodes)
-    integer, intent(in) :: node(:, :)
+  pure subroutine relax(problem, fronts, backwards, q, u, changed)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Nodes near the fronts
+    type(fronts_t), intent(in) :: fronts
     !> From the last node to the first
     logical, intent(in) :: backwards
-    !> d_t [m/Pa]; changes of a traction below which it stays [Pa]
-    real(wp), intent(in) :: compliance, least
-    !> Largest traction of each node (nodes) [Pa]; what its displacement has beyond its slip (2, nodes) [m]
-    real(wp), intent(in) :: bound(:), rest(:, :)
     !> Shear traction [Pa] and tangential displacement [m] (n_col, n_row, 2)
     real(wp), intent(inout), contiguous :: q(:, :, :), u(:, :, :)
     !> A traction has changed
@@ -187,30 +186,33 @@ contains
     integer :: m, k, i, j, row, col, low(2), high(2)
 
     changed = .false.
-    do m = 1, size(node, 2)
-      k = merge(size(node, 2) + 1 - m, m, backwards)
-      i = node(1, k)
-      j = node(2, k)
-      trial(1) = q(i, j, 1) - (u(i, j, 1) - rest(1, k))/compliance
-      trial(2) = q(i, j, 2) - (u(i, j, 2) - rest(2, k))/compliance
-      length = sqrt(trial(1)**2 + trial(2)**2)
-      if (length > bound(k)) trial = trial*(bound(k)/length)
-      change(1) = trial(1) - q(i, j, 1)
-      change(2) = trial(2) - q(i, j, 2)
-      if (max(abs(change(1)), abs(change(2))) <= least) cycle
-      changed = .true.
-      q(i, j, 1) = trial(1)
-      q(i, j, 2) = trial(2)
-      low = max([i, j] - reach, 1)
-      high = min([i, j] + reach, [size(u, 1), size(u, 2)])
-      do row = low(2), high(2)
-        !$omp simd
-        do col = low(1), high(1)
-          u(col, row, 1) = u(col, row, 1) + near(col - i, row - j, 1)*change(1) + near(col - i, row - j, 2)*change(2)
-          u(col, row, 2) = u(col, row, 2) + near(col - i, row - j, 2)*change(1) + near(col - i, row - j, 3)*change(2)
+    associate (node => fronts%node, bound => fronts%bound, rest => fronts%rest, near => problem%near_compliance, &
+               compliance => problem%tangential_compliance)
+      do m = 1, size(node, 2)
+        k = merge(size(node, 2) + 1 - m, m, backwards)
+        i = node(1, k)
+        j = node(2, k)
+        trial(1) = q(i, j, 1) - (u(i, j, 1) - rest(1, k))/compliance
+        trial(2) = q(i, j, 2) - (u(i, j, 2) - rest(2, k))/compliance
+        length = sqrt(trial(1)**2 + trial(2)**2)
+        if (length > bound(k)) trial = trial*(bound(k)/length)
+        change(1) = trial(1) - q(i, j, 1)
+        change(2) = trial(2) - q(i, j, 2)
+        if (max(abs(change(1)), abs(change(2))) <= fronts%least) cycle
+        changed = .true.
+        q(i, j, 1) = trial(1)
+        q(i, j, 2) = trial(2)
+        low = max([i, j] - near_reach, 1)
+        high = min([i, j] + near_reach, [size(u, 1), size(u, 2)])
+        do row = low(2), high(2)
+          !$omp simd
+          do col = low(1), high(1)
+            u(col, row, 1) = u(col, row, 1) + near(col - i, row - j, 1)*change(1) + near(col - i, row - j, 2)*change(2)
+            u(col, row, 2) = u(col, row, 2) + near(col - i, row - j, 2)*change(1) + near(col - i, row - j, 3)*change(2)
+          end do
         end do
       end do
-    end do
+    end associate
   end subroutine relax
 
 end module hc_front_relaxation

@@ -9,8 +9,7 @@ module hc_lattice_solver
   use hc_precision, only: wp, pi
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
-  use hc_options, only: newton_options_t
-  use hc_contact_state, only: contact_state_t, add_fields, add_history, load_target_t, sweeps_used_up, &
+  use hc_contact_state, only: contact_state_t, add_fields, add_history, load_step_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
@@ -28,21 +27,15 @@ module hc_lattice_solver
 contains
 
   !> Sweep on one lattice until the residuals are small.
-  subroutine solve_on_lattice(problem, operators, start, reference, target, tolerance, max_sweeps, state, error, estimate, as_start)
+  subroutine solve_on_lattice(problem, operators, start, step, state, error, estimate, as_start)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
     !> State to start from, whose tractions are freed once they are taken over
     type(contact_state_t), intent(inout) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous, target :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Sweeps that may be made
-    integer, intent(in) :: max_sweeps
+    !> The load step
+    type(load_step_t), intent(in) :: step
     !> Solution, converged or not
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure
@@ -54,59 +47,95 @@ contains
     logical, intent(in), optional :: as_start
 
     type(friction_iterate_t), target :: now
-    type(newton_options_t) :: options
-    real(wp) :: less
-    integer :: sweep, fixed, staggered
-    logical :: failed, judged, known, finite
+    integer :: sweep, fixed
+    logical :: judged
 
-    options = problem%options%newton
     fixed = 0
     judged = .true.
     if (present(as_start)) judged = .not. as_start
     call operators%reset()
-    call now%set_start(problem, operators, start, reference, target, tolerance, error, estimate)
+    call now%set_start(problem, operators, start, step, error, estimate)
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
-    ! sweeps that find pressure and shear traction one after the other
-    staggered = max_sweeps
-    if (now%pressure_feels_shear) staggered = options%staggered_sweeps
-    if (problem%couples_strongly()) then
-      staggered = options%staggered_sweeps_strong
-      call now%globalization%cut(options%cautious_share, options)
-    end if
-    do sweep = 1, max_sweeps
-      failed = .true.
+    associate (options => problem%options%newton)
+      if (problem%couples_strongly()) call now%globalization%cut(options%cautious_share, options)
+      do sweep = 1, step%max_sweeps
+        call make_sweep(now, sweep, step%max_sweeps, error)
+        if (allocated(error)) return
+        if (.not. now%is_finite()) exit
+        if (debug_checks) call check_displacements(now, error)
+        if (allocated(error)) return
+        if (now%fixed) then
+          fixed = fixed + 1
+          state%sliding = overloads(problem, step%target, reshape(now%p, problem%lattice%extent), now%residual_normal)
+          if (state%sliding) fixed = options%max_fixed_sweeps
+        end if
+        state%sweeps = sweep
+        if (max(now%residual_normal, now%residual_tangential) > step%tolerance .and. sweep < step%max_sweeps &
+            .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
+        call judge(now, step, judged, state, error, estimate)
+        if (allocated(error)) return
+        if (state%converged .or. now%unsupported .or. fixed >= options%max_fixed_sweeps) exit
+        call now%refresh(error)
+        if (allocated(error)) return
+      end do
+    end associate
+    call finish(now, step, state)
+  end subroutine solve_on_lattice
+
+  !> Make one sweep: for the pressure, then for the shear traction, or for both at once where that is not enough.
+  subroutine make_sweep(now, sweep, max_sweeps, error)
+    type(friction_iterate_t), intent(inout), target :: now
+    !> Number of the sweep, from 1 on; sweeps that may be made
+    integer, intent(in) :: sweep, max_sweeps
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: staggered
+    logical :: failed
+
+    failed = .true.
+    associate (options => now%problem%options%newton)
+      staggered = max_sweeps
+      if (now%pressure_feels_shear) staggered = options%staggered_sweeps
+      if (now%problem%couples_strongly()) staggered = options%staggered_sweeps_strong
       if (sweep > staggered .and. (max(now%residual_normal, now%residual_tangential) < options%coupled_residual .or. &
-                              sweep > staggered + options%coupled_delay)) then
+                                   sweep > staggered + options%coupled_delay)) then
         call coupled_sweep(now, failed, error)
         if (allocated(error)) return
       end if
-      if (failed) call staggered_sweep(now, error)
-      if (allocated(error)) return
-      if (.not. now%is_finite()) exit
-      if (debug_checks) call check_displacements(now, error)
-      if (allocated(error)) return
-      if (now%fixed) then
-        fixed = fixed + 1
-        state%sliding = overloads(problem, target, reshape(now%p, problem%lattice%extent), now%residual_normal)
-        if (state%sliding) fixed = options%max_fixed_sweeps
-      end if
-      state%sweeps = sweep
-      if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
-          .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
+    end associate
+    if (failed) call staggered_sweep(now, error)
+  end subroutine make_sweep
 
-      ! the recorded tractions are admissible exactly, and judged by a product of their own
-      known = .not. judged .or. tolerance >= options%carried_tolerance
+  !> Record an iterate, with admissible tractions, and judge it by the displacements that were carried along, if their errors are
+  !> small, or by a product of its own.
+  subroutine judge(now, step, judged, state, error, estimate)
+    type(friction_iterate_t), intent(inout) :: now
+    !> The load step
+    type(load_step_t), intent(in) :: step
+    !> False: the solution is only a start of another one
+    logical, intent(in) :: judged
+    !> The record
+    type(contact_state_t), intent(inout) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> w, u_x, u_y of a solution that is only a start (n_col, n_row, 3) [m]
+    real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
+    real(wp) :: less
+    logical :: known
+
+    associate (problem => now%problem, options => now%problem%options%newton)
+      known = .not. judged .or. step%tolerance >= options%carried_tolerance
       ! without friction no sweep finds u, which follows the pressure
       if (judged .and. .not. problem%friction%resists()) known = .false.
       if (.not. known) call now%forget()
-      if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
+      if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, now%operators%space)
       call record(now, state)
       state%motion = now%motion
       less = 0.0_wp
       ! what carried displacements lack: those of the cut, and their rounding errors
       if (known .and. judged) less = cut_off(now, state) + 2*options%displacement_rounding
-      known = known .and. less <= options%cut_share*tolerance
+      known = known .and. less <= options%cut_share*step%tolerance
       if (known) then
         call collect(now, state)
         if (present(estimate) .and. .not. judged) then
@@ -114,25 +143,33 @@ contains
           estimate(:, :, 1) = state%gap
           estimate(:, :, 2:) = state%relative_displacement
         end if
-        call problem%complete_state(target, tolerance - less, reference, state)
+        call problem%complete_state(step%target, step%tolerance - less, step%reference, state)
       end if
       if (.not. known .or. (judged .and. .not. state%converged)) then
-        call problem%displace(operators%flexibility, state, error)
+        call problem%displace(now%operators%flexibility, state, error)
         if (allocated(error)) return
-        call problem%complete_state(target, tolerance, reference, state)
+        call problem%complete_state(step%target, step%tolerance, step%reference, state)
       end if
-      if (state%converged .or. now%unsupported .or. fixed >= options%max_fixed_sweeps) exit
-      call now%refresh(error)
-      if (allocated(error)) return
-    end do
+    end associate
+  end subroutine judge
+
+  !> Record work and reason of the end, and free the iterate.
+  subroutine finish(now, step, state)
+    type(friction_iterate_t), intent(inout) :: now
+    !> The load step
+    type(load_step_t), intent(in) :: step
+    !> The record
+    type(contact_state_t), intent(inout) :: state
+    logical :: finite
+
     ! numbers that are not finite: no tractions
-    if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
+    if (.not. allocated(state%pressure)) call add_fields(state, now%problem%lattice, now%operators%space)
     if (.not. (state%converged .or. state%sliding)) then
-      state%sliding = overloads(problem, target, state%pressure, state%residual_normal)
+      state%sliding = overloads(now%problem, step%target, state%pressure, state%residual_normal)
     end if
     state%sliding = state%sliding .and. .not. state%converged
-    state%operator_applications = operators%work()
-    call operators%clear()
+    state%operator_applications = now%operators%work()
+    call now%operators%clear()
     finite = now%is_finite()
     deallocate (now%p, now%q)
     call add_history(state)
@@ -140,7 +177,7 @@ contains
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
     if (state%sliding) state%stopped = loads_not_carried
     if (.not. finite) state%stopped = out_of_range
-  end subroutine solve_on_lattice
+  end subroutine finish
 
   !> Record the tractions of an iterate, without tension and within the admissible set.
   subroutine record(now, state)

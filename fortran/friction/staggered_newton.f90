@@ -27,16 +27,30 @@ module hc_staggered_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: precondition_constraints, satisfy_constraints, step_ahead, solution_accurate
+  use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
 
   public :: staggered_sweep, find_punch_pressure, find_rigid_traction
+
+  !> A shear traction that is solved for, with what it displaces.
+  type :: shear_solution_t
+    !> Traction [Pa], and displacement with the springs [m], in the frames (2 n)
+    real(wp), allocatable :: x(:), ax(:)
+    !> Motions that are driven by their loads, the loads as constraints, and what the start lacks of them
+    type(driven_motions_t) :: driven
+    type(constraints_t) :: constraints
+    real(wp), allocatable :: missing(:)
+    !> Displacement of a node under the largest traction [m]
+    real(wp) :: scale = 0.0_wp
+    !> Some node sticks; the loads determine the motions
+    logical :: sticks = .false., independent = .false.
+  end type shear_solution_t
 
 contains
 
@@ -84,102 +98,153 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
+    real(wp), allocatable :: gap(:)
     logical, allocatable :: contact(:)
-    type(active_set_t) :: nodes
     type(newton_options_t) :: options
-    real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
-    integer :: n, i, area, n_constraint, iterations, outcome
-    logical :: changed, independent, searching, compliant, unknown_gap, estimated
+    integer :: area, n_contact
+    logical :: changed, searching, estimated, accurate
 
-    n = size(now%p)
     options = now%problem%options%newton
     ! a start without contact: the contact without shear is found before stick and slip
     searching = now%without_start .and. now%first
-    compliant = now%problem%normal_law%is_compliant()
-    cell_area = now%problem%lattice%cell_area()
-    n_constraint = merge(1, 0, now%target%control(normal) == force_control)
-    level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
     estimated = now%estimated
     now%estimated = .false.
     do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
-      now%residual_normal = now%gap_residual(gap)
-      missing = 0.0_wp
-      carried = now%pressure%space%sum(now%p)
-      if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
-      if (now%residual_normal <= options%final_pressure*now%tolerance .and. &
-          abs(missing(1)) <= options%final_pressure*now%tolerance*carried) then
-        if (.not. estimated) return
-        ! a pressure that may stay as it is, if that is so without errors of interpolation
-        estimated = .false.
-        call now%pressure%product(now%p, now%w, error)
-        if (allocated(error)) return
-        call now%pressure%stretch(-1.0_wp, now%p, now%w)
-        call now%find_gap(gap)
-        now%residual_normal = now%gap_residual(gap)
-        if (now%residual_normal <= options%final_pressure*now%tolerance) return
-      end if
+      call judge_pressure(now, estimated, gap, accurate, error)
+      if (allocated(error) .or. accurate) return
       estimated = .false.
       changed = now%first .and. area == 1
       if (.not. (changed .and. now%without_start)) then
-        call find_contact(now, gap, contact)
+        allocate (contact(size(gap)))
+        n_contact = now%pressure%space%count(now%contact)
+        call now%problem%find_contact(n_contact, now%p, gap, now%candidate, contact)
         if (.not. changed) changed = now%pressure%space%count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
-      if (searching .and. now%pressure_feels_shear .and. .not. changed .and. &
-          .not. (compliant .and. now%residual_normal > options%settled_residual)) return
-      ! a first pressure has the load, but no gap yet
-      unknown_gap = changed .and. now%without_start .and. now%first .and. area == 1 .and. n_constraint == 1
-      if (compliant .and. .not. unknown_gap) call linearize_law(now, gap, .false.)
-
-      if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
-      if (searching .and. now%pressure_feels_shear .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
-      call new_active_set(nodes, now%contact, now%pressure%space)
-      if (allocated(constraint)) deallocate (constraint)
-      allocate (constraint(nodes%n_active, n_constraint), source=1.0_wp)
-      allocate (rhs(n))
-      !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
-      do i = 1, n
-        rhs(i) = level - now%h(i)
-        if (now%pressure_feels_shear) rhs(i) = rhs(i) - now%closing(i)
-        if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
-      end do
-      !$omp end parallel do
-      call find_punch_pressure(now, nodes, constraint, mb, error)
-      if (allocated(error)) return
-      if (changed) then
-        if (n_constraint == 1) then
-          missing = now%target%value(normal)/cell_area - now%pressure%space%sum(now%p)
-          call satisfy_constraints(constraint, mb, missing, now%p, independent, now%pressure%space, nodes)
-        end if
-        if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
-        call now%pressure%product(now%p, now%w, error)
-        if (allocated(error)) return
-      else
-        call now%pressure%stretch(1.0_wp, now%p, now%w)
+      if (searching .and. now%pressure_feels_shear) then
+        if (.not. changed .and. .not. (now%problem%normal_law%is_compliant() .and. &
+                                       now%residual_normal > options%settled_residual)) return
+        ! that of another set
+        if (allocated(now%punch_pressure)) deallocate (now%punch_pressure)
       end if
-      if (compliant) rhs = rhs - now%pressure%offset
-      goal = options%final_pressure*now%tolerance
-      if (changed .or. compliant .or. now%pressure_feels_shear) then
-        goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
-      end if
-      scale = now%pressure%space%max(now%p)
-      if (compliant) then
-        scale = now%problem%sprung_compliance(scale)*scale
-      else
-        scale = now%problem%normal_compliance*scale
-      end if
-      call projected_cg(now%pressure, nodes, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
-                        multiplier(:n_constraint), residual, iterations, outcome, error, drift)
+      call solve_on_contact(now, gap, changed, searching .and. area == 1, error)
       if (allocated(error)) return
-      if (drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
-      if (allocated(error)) return
-      call now%pressure%stretch(-1.0_wp, now%p, now%w)
-      now%outcome = max(now%outcome, outcome)
-      if (n_constraint == 1) now%motion(normal) = multiplier(1)
     end do
   end subroutine solve_pressure
+
+  !> Compute R_n, and tell whether the pressure may stay as it is.
+  subroutine judge_pressure(now, estimated, gap, accurate, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> The closing of the gap has errors of interpolation: the pressure stays only if it may without them
+    logical, intent(in) :: estimated
+    !> The gap; computed again where the closing is (n) [m]
+    real(wp), allocatable, intent(inout) :: gap(:)
+    !> It may stay
+    logical, intent(out) :: accurate
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: bound, carried, missing
+
+    bound = now%problem%options%newton%final_pressure*now%tolerance
+    now%residual_normal = now%gap_residual(gap)
+    missing = 0.0_wp
+    carried = now%pressure%space%sum(now%p)
+    if (now%target%control(normal) == force_control) then
+      missing = now%target%value(normal)/now%problem%lattice%cell_area() - carried
+    end if
+    accurate = now%residual_normal <= bound .and. abs(missing) <= bound*carried
+    if (.not. (accurate .and. estimated)) return
+    call now%pressure%product(now%p, now%w, error)
+    if (allocated(error)) return
+    call now%pressure%stretch(-1.0_wp, now%p, now%w)
+    call now%find_gap(gap)
+    now%residual_normal = now%gap_residual(gap)
+    accurate = now%residual_normal <= bound
+  end subroutine judge_pressure
+
+  !> Solve (F9) on the nodes in contact by conjugate gradients at constant load.
+  subroutine solve_on_contact(now, gap, changed, is_first, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> Gap of the present tractions [m]
+    real(wp), intent(in), contiguous :: gap(:)
+    !> The contact is another one; it is the first one of a start without contact
+    logical, intent(in) :: changed, is_first
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(active_set_t) :: nodes
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    type(newton_options_t) :: options
+    real(wp), allocatable :: rhs(:)
+    real(wp) :: scale, level
+    logical :: by_load, compliant, unknown_gap
+    integer :: i
+
+    options = now%problem%options%newton
+    compliant = now%problem%normal_law%is_compliant()
+    by_load = now%target%control(normal) == force_control
+    level = merge(0.0_wp, now%motion(normal), by_load)
+    ! a first pressure has the load, but no gap yet
+    unknown_gap = changed .and. is_first .and. by_load
+    if (compliant .and. .not. unknown_gap) call linearize_law(now, gap, .false.)
+    if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
+    call new_active_set(nodes, now%contact, now%pressure%space)
+    allocate (constraints%columns(nodes%n_active, merge(1, 0, by_load)), source=1.0_wp)
+    allocate (rhs(size(gap)))
+    !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
+    do i = 1, size(rhs)
+      rhs(i) = level - now%h(i)
+      if (now%pressure_feels_shear) rhs(i) = rhs(i) - now%closing(i)
+      if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
+    end do
+    !$omp end parallel do
+    call find_punch_pressure(now, nodes, constraints%columns, constraints%mb, error)
+    if (allocated(error)) return
+    if (changed) then
+      call fit_load(now, nodes, constraints)
+      if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
+      call now%pressure%product(now%p, now%w, error)
+      if (allocated(error)) return
+    else
+      call now%pressure%stretch(1.0_wp, now%p, now%w)
+    end if
+    if (compliant) rhs = rhs - now%pressure%offset
+    scale = now%pressure%space%max(now%p)
+    scale = now%problem%sprung_compliance(scale)*scale
+    iteration%tolerance = options%final_pressure*now%tolerance
+    if (changed .or. compliant .or. now%pressure_feels_shear) then
+      iteration%tolerance = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), iteration%tolerance)
+    end if
+    iteration%tolerance = iteration%tolerance*scale
+    iteration%most = options%max_iterations
+    call projected_cg(now%pressure, nodes, constraints, rhs, now%p, now%w, iteration, error)
+    if (allocated(error)) return
+    if (iteration%drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
+    if (allocated(error)) return
+    call now%pressure%stretch(-1.0_wp, now%p, now%w)
+    now%outcome = max(now%outcome, iteration%outcome)
+    if (by_load) now%motion(normal) = constraints%multiplier(1)
+  end subroutine solve_on_contact
+
+  !> Correct the pressure on another contact so that it carries the prescribed load.
+  subroutine fit_load(now, nodes, constraints)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> Nodes in contact
+    type(active_set_t), intent(in) :: nodes
+    !> The load, if it is prescribed
+    type(constraints_t), intent(in) :: constraints
+    real(wp) :: missing(1)
+    logical :: independent
+
+    if (size(constraints%columns, 2) == 0) return
+    missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure%space%sum(now%p)
+    call constraints%satisfy(now%pressure%space, missing, now%p, independent, nodes)
+  end subroutine fit_load
 
   !> Solve for the shear traction under the present pressure, (F10).
   subroutine solve_shear(now, judged, error)
@@ -190,15 +255,13 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), q(:)
-    logical, allocatable :: active(:)
-    type(active_set_t) :: nodes, loaded
-    real(wp), allocatable :: missing(:), multiplier(:)
-    type(driven_motions_t) :: driven
+    type(shear_solution_t) :: found
+    type(active_set_t) :: loaded
+    real(wp), allocatable :: before(:)
     type(newton_options_t) :: options
-    real(wp) :: goal, highest, scale, residual, drift, share, rounding, motion(n_motion)
-    integer :: n, iterations, outcome
-    logical :: independent, fixing, sticks
+    real(wp) :: highest
+    integer :: n
+    logical :: fixing
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -208,128 +271,207 @@ contains
       return
     end if
     call relax_fronts(now)
-    ! the traction before, where there is one
-    active = .not. (abs(now%q(:n)) <= 0.0_wp .and. abs(now%q(n + 1:)) <= 0.0_wp)
-    call new_active_set(loaded, [active, active], now%shear%space)
-    allocate (q(loaded%n_active))
-    call loaded%pack(now%q, q)
-    fixing = .false.
+    call keep_traction(now, loaded, before)
     highest = now%traction_scale()
-    scale = now%problem%tangential_compliance*highest
+    found%scale = now%problem%tangential_compliance*highest
+    fixing = .false.
     do
-      call classify(now, fixing, active)
-      call new_active_set(nodes, active, now%shear%space)
-      call nodes%pair(2*n)
-      sticks = any(active(n + 1:))
-      deallocate (active)
-      call find_constraints(now, nodes, driven, constraint, missing)
-      multiplier = driven%multipliers(now%motion)
-      call find_rigid_traction(now, nodes, constraint, .false., mb, error)
+      call solve_on_zones(now, fixing, found, error)
       if (allocated(error)) return
-      ! traction and displacement stay where they are, in the frames: a window is too large for copies
-      call move_alloc(now%q, x)
-      call now%shear%turn(x)
-      call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space, nodes)
-      if (.not. independent) then
-        call find_rigid_traction(now, nodes, constraint, .true., mb, error)
-        if (allocated(error)) return
-        call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space, nodes)
-      end if
-      if (independent) then
-        ! motions that are prescribed are known; the others are multipliers
-        allocate (rhs(2*n))
-        call find_prescribed_displacement(now, rhs)
-        call now%shear%add_rest(rhs)
-        if (size(missing) == 0 .or. fixing .or. sticks) then
-          call move_alloc(now%u, ax)
-        else
-          ! the old displacements may be needed again
-          allocate (ax(2*n))
-          call now%shear%space%copy(now%u, ax)
-        end if
-        ! the pressure moves what u does not contain yet
-        if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
-          call now%shear%add_springs(x, ax)
-          call step_ahead(now%shear, nodes, constraint, mb, constraint, rhs, ax, multiplier, options%length_ahead, x, error)
-          if (allocated(error)) return
-        end if
-        call displace(now, x, ax, error)
-        if (allocated(error)) return
-        ! Newton's method alone converges the faster the more accurate its steps are
-        goal = min(now%residual_tangential, 1.0_wp)
-        goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
-                                                              now%pressure_feels_shear)))
-        goal = max(goal, options%final_accuracy*now%tolerance)
-        call projected_cg(now%shear, nodes, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
-                          residual, iterations, outcome, error, drift)
-        if (allocated(error)) return
-        if (drift > options%displacement_rounding*scale) call displace(now, x, ax, error)
-        if (allocated(error)) return
-        now%outcome = max(now%outcome, outcome)
-      end if
-      now%unsupported = .not. independent
-      if (size(missing) == 0 .or. fixing) exit
-      ! where all nodes slip, only their directions resist a load: not beyond reason
-      if (independent) then
-        if (sticks) exit
-        if (now%shear%space%max_abs(x(:n)) <= options%most_across*highest) exit
-        deallocate (ax)
+      now%unsupported = .not. found%independent
+      if (size(found%missing) == 0 .or. fixing) exit
+      ! where all nodes slip, only their directions resist a load: limit the step along them
+      if (found%independent) then
+        if (found%sticks) exit
+        if (now%shear%space%max_abs(found%x(:n)) <= options%most_across*highest) exit
+        deallocate (found%ax)
       end if
       fixing = .true.
       call now%globalization%cut(options%cautious_share, options)
-      call take_back()
+      call restore_traction(now, loaded, before)
     end do
-    deallocate (constraint, mb)
+    deallocate (found%constraints%columns, found%constraints%mb)
     if (now%unsupported) then
-      call take_back()
+      call restore_traction(now, loaded, before)
       call now%refresh(error)
-      return
+    else
+      call take_solution(now, found, loaded, before, judged, error)
     end if
+  end subroutine solve_shear
+
+  !> Keep the shear traction, where there is any.
+  subroutine keep_traction(now, loaded, before)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(in) :: now
+    !> Nodes with a shear traction (of 2 n)
+    type(active_set_t), intent(out) :: loaded
+    !> The traction there [Pa]
+    real(wp), allocatable, intent(out) :: before(:)
+    logical :: active(size(now%p))
+    integer :: n
+
+    n = size(now%p)
+    active = .not. (abs(now%q(:n)) <= 0.0_wp .and. abs(now%q(n + 1:)) <= 0.0_wp)
+    call new_active_set(loaded, [active, active], now%shear%space)
+    allocate (before(loaded%n_active))
+    call loaded%pack(now%q, before)
+  end subroutine keep_traction
+
+  !> Restore the shear traction that was kept.
+  subroutine restore_traction(now, loaded, before)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> Nodes with a shear traction (of 2 n), and the traction there [Pa]
+    type(active_set_t), intent(in) :: loaded
+    real(wp), intent(in), contiguous :: before(:)
+
+    if (.not. allocated(now%q)) allocate (now%q(2*size(now%p)))
+    call now%shear%space%fill(now%q, 0.0_wp)
+    call loaded%unpack(before, now%q)
+  end subroutine restore_traction
+
+  !> Classify the nodes, and solve (F10) for their traction in the frames; the traction of the iterate moves there.
+  subroutine solve_on_zones(now, fixing, found, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout), target :: now
+    !> Fix some nodes in stick where none sticks
+    logical, intent(in) :: fixing
+    !> The solution
+    type(shear_solution_t), intent(inout) :: found
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(active_set_t) :: nodes
+    logical, allocatable :: active(:)
+    integer :: n, try
+
+    n = size(now%p)
+    call classify(now, fixing, active)
+    call new_active_set(nodes, active, now%shear%space)
+    call nodes%pair(2*n)
+    found%sticks = any(active(n + 1:))
+    deallocate (active)
+    associate (constraints => found%constraints)
+      call find_constraints(now, nodes, found%driven, constraints%columns, found%missing)
+      constraints%multiplier = found%driven%multipliers(now%motion)
+      ! traction and displacement stay where they are, in the frames: a window is too large for copies
+      call move_alloc(now%q, found%x)
+      call now%shear%turn(found%x)
+      do try = 1, 2
+        call find_rigid_traction(now, nodes, constraints%columns, try == 2, constraints%mb, error)
+        if (allocated(error)) return
+        call constraints%satisfy(now%shear%space, found%missing, found%x, found%independent, nodes)
+        if (found%independent) exit
+      end do
+    end associate
+    if (found%independent) call solve_in_frames(now, nodes, fixing, found, error)
+  end subroutine solve_on_zones
+
+  !> Solve (F10) by conjugate gradients from a traction that carries the prescribed loads.
+  subroutine solve_in_frames(now, nodes, fixing, found, error)
+    !> Tractions and motions; its displacements may move to the solution
+    type(friction_iterate_t), intent(inout) :: now
+    !> Unknowns (of 2 n)
+    type(active_set_t), intent(in) :: nodes
+    !> Some nodes are fixed in stick: there is no further attempt
+    logical, intent(in) :: fixing
+    !> The solution, on entry its start
+    type(shear_solution_t), intent(inout) :: found
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(iteration_t) :: iteration
+    type(newton_options_t) :: options
+    real(wp), allocatable :: rhs(:)
+    real(wp) :: goal, scale
+
+    options = now%problem%options%newton
+    ! motions that are prescribed are known; the others are multipliers
+    allocate (rhs(size(found%x)))
+    call find_prescribed_displacement(now, rhs)
+    call now%shear%add_rest(rhs)
+    if (size(found%missing) == 0 .or. fixing .or. found%sticks) then
+      call move_alloc(now%u, found%ax)
+    else
+      ! the old displacements may be needed again
+      allocate (found%ax(size(found%x)))
+      call now%shear%space%copy(now%u, found%ax)
+    end if
+    ! the pressure moves what u does not contain yet
+    if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
+      call now%shear%add_springs(found%x, found%ax)
+      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%x, error)
+      if (allocated(error)) return
+    end if
+    call displace(now, found%x, found%ax, error)
+    if (allocated(error)) return
+    ! Newton's method alone converges the faster the more accurate its steps are
+    goal = min(now%residual_tangential, 1.0_wp)
+    goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
+                                                            now%pressure_feels_shear)))
+    scale = found%scale
+    iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
+    call projected_cg(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
+    if (allocated(error)) return
+    if (iteration%drift > options%displacement_rounding*scale) call displace(now, found%x, found%ax, error)
+    if (allocated(error)) return
+    now%outcome = max(now%outcome, iteration%outcome)
+  end subroutine solve_in_frames
+
+  !> Take traction, displacement and motions of a solution, or a share of its step where the residual does not fall.
+  subroutine take_solution(now, found, loaded, before, judged, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> The solution, which is used up
+    type(shear_solution_t), intent(inout) :: found
+    !> Nodes with a shear traction before (of 2 n), and the traction there [Pa]
+    type(active_set_t), intent(in) :: loaded
+    real(wp), intent(in), contiguous :: before(:)
+    !> R_t is that of the traction taken
+    logical, intent(out) :: judged
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: motion(n_motion), share, rounding
+
     motion = now%motion
-    call driven%set_motions(multiplier, now%motion)
-    call take(x, ax)
+    call found%driven%set_motions(found%constraints%multiplier, now%motion)
+    call leave_frames(now, found, rounding)
     call now%find_tangential_residual()
     judged = .true.
-    call now%globalization%step_share(now%residual_tangential, options, share)
-    if (share < 1.0_wp) then
-      judged = .false.
-      ! Newton's method oscillates: any iterate between carries the same loads
-      call move_alloc(now%q, x)
-      call take_back()
-      x = merge(now%q + share*(x - now%q), 0.0_wp, [now%contact, now%contact])
-      deallocate (now%q)
-      now%motion = motion + share*(now%motion - motion)
-      call now%shear%turn(x)
-      call move_alloc(now%u, ax)
-      call displace(now, x, ax, error)
-      if (allocated(error)) return
-      call take(x, ax)
-    end if
-    if (rounding > options%displacement_rounding*scale) then
-      judged = .false.
-      call now%refresh(error)
-    end if
+    associate (options => now%problem%options%newton)
+      call now%globalization%step_share(now%residual_tangential, options, share)
+      if (share < 1.0_wp) then
+        judged = .false.
+        ! Newton's method oscillates: any iterate between carries the same loads
+        call move_alloc(now%q, found%x)
+        call restore_traction(now, loaded, before)
+        found%x = merge(now%q + share*(found%x - now%q), 0.0_wp, [now%contact, now%contact])
+        deallocate (now%q)
+        now%motion = motion + share*(now%motion - motion)
+        call now%shear%turn(found%x)
+        call move_alloc(now%u, found%ax)
+        call displace(now, found%x, found%ax, error)
+        if (allocated(error)) return
+        call leave_frames(now, found, rounding)
+      end if
+      if (rounding > options%displacement_rounding*found%scale) then
+        judged = .false.
+        call now%refresh(error)
+      end if
+    end associate
+  end subroutine take_solution
 
-  contains
+  !> Turn traction and displacement out of the frames.
+  subroutine leave_frames(now, found, rounding)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(inout) :: now
+    !> The solution, whose fields move to the iterate
+    type(shear_solution_t), intent(inout) :: found
+    !> Rounding error of the displacements [m]
+    real(wp), intent(out) :: rounding
 
-    !> Take the traction before.
-    subroutine take_back()
-      if (.not. allocated(now%q)) allocate (now%q(2*n))
-      call now%shear%space%fill(now%q, 0.0_wp)
-      call loaded%unpack(q, now%q)
-    end subroutine take_back
-
-    !> Take a traction and its displacement out of the frames.
-    subroutine take(traction, displacement)
-      !> Traction, and displacement with the springs, in the frames (2 n)
-      real(wp), allocatable, intent(inout) :: traction(:), displacement(:)
-
-      call now%shear%leave_frames(traction, displacement, rounding)
-      call move_alloc(traction, now%q)
-      call move_alloc(displacement, now%u)
-    end subroutine take
-
-  end subroutine solve_shear
+    call now%shear%leave_frames(found%x, found%ax, rounding)
+    call move_alloc(found%x, now%q)
+    call move_alloc(found%ax, now%u)
+  end subroutine leave_frames
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.
   subroutine displace(now, x, ax, error)

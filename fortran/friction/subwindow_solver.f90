@@ -8,7 +8,7 @@
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
@@ -78,7 +78,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(windowed_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -105,8 +105,8 @@ contains
         if (.not. found) exit
         call extract_part(self, low, high, error)
         if (allocated(error)) return
-        call solve_part(self%frictional_contact_t, self%part, low, high, start, reference, target, tolerance, max_sweeps, state, &
-                        solved, error)
+        call solve_part(self%frictional_contact_t, self%part, reshape([low, high], [2, 2]), start, &
+                        load_step_t(target, reference, tolerance, max_sweeps), state, solved, error)
         if (allocated(error)) return
         work = work + state%operator_applications
         sweeps = sweeps + state%sweeps

@@ -15,12 +15,14 @@ module hc_normal_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_fft_layout_single, only: convolution_memory
+  use hc_flexibility, only: check_operator
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal
   use hc_contact_solver, only: contact_solver_t
-  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_normal_law, only: normal_law_t, tangent_t
+  use hc_normal_problem, only: new_normal_problem
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
@@ -88,25 +90,14 @@ contains
     if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     if (present(options)) self%options = options
-    call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
-    if (allocated(error)) return
-    if (present(law)) call law%check(error)
+    call check_operator(lattice, pair, error, n_threads)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
     allocate (self%scratch)
-    associate (finest => self%level(1))
-      finest%lattice = lattice
-      finest%initial_gap = initial_gap
-      finest%candidate = candidate
-      finest%pair = pair
-      finest%options = self%options
-      if (present(law)) then
-        allocate (finest%law, source=law)
-      else
-        allocate (unilateral_t :: finest%law)
-      end if
-      call build_levels(finest, self%level(2:))
-    end associate
+    self%level(1)%options = self%options
+    call new_normal_problem(self%level(1), lattice, pair, initial_gap, candidate, error, law)
+    if (allocated(error)) return
+    call build_levels(self%level(1), self%level(2:))
     do l = 1, size(self%level)
       ! operators for iterations on the finest lattice are set up on demand: a part of it may be enough
       call self%level(l)%prepare(self%kernel, l == 1, l > 1, space_of(self, self%level(l)%lattice), error, self%cache)
@@ -138,7 +129,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(normal_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -165,6 +156,7 @@ contains
     !> Allocated on failure: a target that cannot be solved for, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
 
+    type(load_target_t) :: goal
     type(contact_state_t) :: coarse
     type(normal_iterate_t), allocatable :: passing
     real(wp) :: work, coarse_tolerance
@@ -172,6 +164,7 @@ contains
 
     call check_target([control], [target], tolerance, max_sweeps, error)
     if (allocated(error)) return
+    goal = load_target_t([control], [target])
     work = 0.0_wp
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
@@ -188,8 +181,7 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_on_normal_lattice(level, passing, control, target, &
-                                       max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_on_normal_lattice(level, passing, goal, max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -197,7 +189,7 @@ contains
         else
           if (allocated(passing)) deallocate (passing)
           coarse = contact_state_t()
-          call solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+          call solve_finest(self, goal, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
         end if
       end associate
@@ -211,7 +203,7 @@ contains
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
 
-    is_smooth = level%law%compliance_under(p_max) > level%options%normal%soft_layer*level%compliance
+    is_smooth = level%normal_law%compliance_under(p_max) > level%options%normal%soft_layer*level%normal_compliance
   end function is_smooth
 
   !> Interpolate the pressure from the next coarser lattice.
@@ -228,7 +220,8 @@ contains
     real(wp), intent(inout) :: pressure(:, :)
     real(wp), dimension(size(pressure, 1)) :: compliance, offset
     real(wp), allocatable :: contact(:, :)
-    real(wp) :: r, softest, p_max
+    type(tangent_t) :: tangent
+    real(wp) :: p_max
     integer :: row
 
     p_max = coarser%space%max(coarse%pressure)
@@ -236,16 +229,16 @@ contains
       call prolong_edge(coarser%lattice, coarse%pressure, level%lattice, pressure, level%space)
       return
     end if
-    r = 1.0_wp/coarser%compliance
-    allocate (contact, source=coarse%pressure - r*min(coarse%gap, coarser%compliance*p_max))
+    tangent = tangent_t(1.0_wp/coarser%normal_compliance, level%softest_spring(p_max))
+    allocate (contact, source=coarse%pressure - tangent%r*min(coarse%gap, coarser%normal_compliance*p_max))
     call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
-    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, p_max)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too
-      call level%law%linearize((row - 1)*size(pressure, 1) + 1, r, softest, spread(0.0_wp, 1, size(pressure, 1)), &
-                               -pressure(:, row)/r, level%candidate(:, row) .and. pressure(:, row) > 0.0_wp, compliance, offset)
-      pressure(:, row) = max((pressure(:, row) - r*offset)/(1.0_wp + r*compliance), 0.0_wp)
+      call level%normal_law%linearize((row - 1)*size(pressure, 1) + 1, tangent, spread(0.0_wp, 1, size(pressure, 1)), &
+                                      -pressure(:, row)/tangent%r, level%candidate(:, row) .and. pressure(:, row) > 0.0_wp, &
+                                      compliance, offset)
+      pressure(:, row) = max((pressure(:, row) - tangent%r*offset)/(1.0_wp + tangent%r*compliance), 0.0_wp)
     end do
     !$omp end parallel do
   end subroutine prolong_pressure
@@ -270,12 +263,10 @@ contains
   !> Solve on the finest lattice: on the part around the contact, if that is much smaller than the window.
   !>
   !> The gap elsewhere follows from one product over the window.
-  subroutine solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+  subroutine solve_finest(self, target, tolerance, max_sweeps, state, work, error)
     class(normal_contact_t), intent(inout), target :: self
-    !> force_control or displacement_control
-    integer, intent(in) :: control
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
+    !> Normal load or approach to be reached
+    type(load_target_t), intent(in) :: target
     !> Bound of both residuals
     real(wp), intent(in) :: tolerance
     !> Iterations that may be made
@@ -301,7 +292,7 @@ contains
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window contains the errors of single precision
-          call solve_on_normal_lattice(inner, self%iterate, control, target, &
+          call solve_on_normal_lattice(inner, self%iterate, target, &
                                        self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
@@ -311,7 +302,7 @@ contains
         end associate
         state%motion = part%motion
         state%stopped = part%stopped
-        call whole%complete_from_pressure(control, target, tolerance, state, error)
+        call whole%complete_from_pressure(target, tolerance, state, error)
         if (allocated(error)) return
         work = work + whole%work()
         state%sweeps = sweeps
@@ -323,7 +314,7 @@ contains
       if (.not. whole%iterating) call self%kernel%clear()
       call whole%prepare(self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
-      call solve_on_normal_lattice(whole, self%iterate, control, target, tolerance, max_sweeps, state, error)
+      call solve_on_normal_lattice(whole, self%iterate, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()

@@ -10,7 +10,7 @@ module hc_normal_directions
   implicit none
   private
 
-  public :: find_residual, projected_step, next_direction, next_sprung_direction, find_step, find_sprung_step
+  public :: find_residual, projected_step, next_direction, next_sprung_direction, curvature, find_sprung_step
 
 contains
 
@@ -33,22 +33,20 @@ contains
   end subroutine find_residual
 
   !> Compute d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or the part of p on a fixed set.
-  subroutine projected_step(level, now, fixed, by_load, pressures)
+  subroutine projected_step(level, now, fixed)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> The set of active nodes is fixed; the normal load is prescribed, not the approach
-    logical, intent(in) :: fixed, by_load
-    !> Sum of the pressures under a prescribed load
-    real(wp), intent(in) :: pressures
+    !> The set of active nodes is fixed
+    logical, intent(in) :: fixed
     real(wp) :: part(size(now%p, 2)), mean, step_length
     real(sp) :: lack
     integer :: row
 
     step_length = level%options%normal%step_length
     mean = 0.0_wp
-    if (by_load .and. .not. fixed) then
+    if (now%by_load .and. .not. fixed) then
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%p, 2)
         associate (from => now%span(1, row), to => now%span(2, row))
@@ -62,14 +60,14 @@ contains
     do row = 1, size(now%p, 2)
       now%d(:, row, 1) = 0.0_sp
       associate (from => now%span(1, row), to => now%span(2, row))
-        associate (n => to - from + 1, p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+        associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
                    z => now%z(from:to, row, 1))
           if (fixed) then
-            call projected_row(n, now%p_unit, p, active, d, part(row))
-          else if (by_load) then
-            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z, mean, now%punch(from:to, row))
+            call projected_row(now%p_unit, p, active, d, part(row))
+          else if (now%by_load) then
+            call projected_row(now%p_unit, p, active, d, part(row), [step_length, step_length*mean], z, now%punch(from:to, row))
           else
-            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z)
+            call projected_row(now%p_unit, p, active, d, part(row), [step_length, 0.0_wp], z)
           end if
         end associate
       end associate
@@ -81,8 +79,8 @@ contains
       part = count(now%active, dim=1)
     end if
     ! what was cut off goes where it changes the approach alone
-    if (.not. by_load) return
-    lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
+    if (.not. now%by_load) return
+    lack = real((now%pressures/now%p_unit - sum(part))/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
@@ -93,13 +91,11 @@ contains
   end subroutine projected_step
 
   !> Compute the next direction of conjugate gradients.
-  subroutine next_direction(level, now, by_load, recurrence)
+  subroutine next_direction(level, now, recurrence)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> The normal load is prescribed, not the approach
-    logical, intent(in) :: by_load
     !> That of the last direction; on return that of the new one
     type(conjugate_gradient_t), intent(inout) :: recurrence
     real(wp), dimension(size(now%p, 2)) :: part, sum_z
@@ -118,13 +114,13 @@ contains
     call recurrence%last_share(sum(part), share, anew)
     back = real(share, sp)
     mean = 0.0_sp
-    if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
+    if (now%by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (anew) now%d(:, row, 1) = 0.0_sp
       associate (from => now%span(1, row), to => now%span(2, row))
         call direction_row(to - from + 1, back, now%z(from:to, row, 1), now%active(from:to, row), now%d(from:to, row, 1))
-        if (by_load) now%d(from:to, row, 1) = now%d(from:to, row, 1) - mean*now%punch(from:to, row)
+        if (now%by_load) now%d(from:to, row, 1) = now%d(from:to, row, 1) - mean*now%punch(from:to, row)
       end associate
     end do
     !$omp end parallel do
@@ -133,20 +129,20 @@ contains
   !> Compute the next direction of conjugate gradients on springs, which change from one direction to the next.
   !>
   !> It is conjugate to the last one by the springs as they are now, (N7), so that no step is lost where they change.
-  subroutine next_sprung_direction(level, now, by_load, anew)
+  subroutine next_sprung_direction(level, now, anew)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> The normal load is prescribed, not the approach; there is no last direction
-    logical, intent(in) :: by_load, anew
+    !> There is no last direction
+    logical, intent(in) :: anew
     real(wp), dimension(size(now%p, 2)) :: part, sum_z
     real(wp) :: unit
     real(sp) :: back, mean
     integer :: row
 
     mean = 0.0_sp
-    if (by_load) then
+    if (now%by_load) then
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%p, 2)
         sum_z(row) = sum(real(now%z(:, row, 1), wp), mask=now%active(:, row))
@@ -158,7 +154,7 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%z(:, row, 1) = merge(now%z(:, row, 1), 0.0_sp, now%active(:, row))
-      if (by_load) now%z(:, row, 1) = now%z(:, row, 1) - mean*now%punch(:, row)
+      if (now%by_load) now%z(:, row, 1) = now%z(:, row, 1) - mean*now%punch(:, row)
       part(row) = 0.0_wp
       if (.not. anew) part(row) = sum(now%z(:, row, 1)*(now%kd(:, row, 1) + unit*now%compliance(:, row)*now%d(:, row, 1)))
     end do
@@ -212,17 +208,5 @@ contains
     find_sprung_step = 0.0_wp
     if (steepness > 0.0_wp) find_sprung_step = sum(part)/steepness
   end function find_sprung_step
-
-  !> Compute the length of a step of conjugate gradients; 0 if there is no curvature.
-  real(wp) function find_step(level, now, recurrence)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
-    !> Iterate
-    type(normal_iterate_t), intent(in) :: now
-    !> Recurrence of conjugate gradients
-    type(conjugate_gradient_t), intent(in) :: recurrence
-
-    find_step = recurrence%step_length(curvature(level, now))
-  end function find_step
 
 end module hc_normal_directions

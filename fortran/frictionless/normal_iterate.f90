@@ -8,13 +8,15 @@ module hc_normal_iterate
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_rows, only: classify_row, add_row, dot_single, largest_of
+  use hc_normal_rows, only: limits_t, classification_t, classify_row, add_row, dot_single, largest_of
   implicit none
   private
 
-  public :: normal_iterate_t, find_span, rescale, find_approach, classify, set_active, linearize_law, &
-            add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
+  public :: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, linearize_law, add_springs, &
+            find_punch_pressure, advance, missing_load, fit_load, remove_tension
 
+  !> Steps of Newton's method for the size of a pressure of which only the shape is known, under a compliant law.
+  integer, parameter :: start_steps = 8
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
 
@@ -45,6 +47,11 @@ module hc_normal_iterate
     real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
     !> Under a compliant law: the residual of the nodes that would enter or leave the set
     real(wp) :: residual_changed = huge(1.0_wp)
+    !> The normal load is prescribed, not the approach; the load [N] or the approach [m]
+    logical :: by_load = .false.
+    real(wp) :: target = 0.0_wp
+    !> Sum of the pressures under a prescribed load [Pa]
+    real(wp) :: pressures = 0.0_wp
     !> Active nodes, now and next
     integer :: n_active = 0, n_next = 0
   end type normal_iterate_t
@@ -134,53 +141,46 @@ contains
     logical, intent(out) :: changed
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: r, stiffness, p_max, worst, worst_active, worst_changed
-    integer :: row, n_next, n_changed
-    logical :: finite
+    type(classification_t) :: found(size(now%p, 2))
+    type(limits_t) :: limits
+    integer :: row
 
     ! r' of (N2)
-    r = level%options%contact%classification_parameter(level%pair%lambda_1, level%lattice%cell_area()*now%n_active)
-    stiffness = 1.0_wp/level%compliance
-    p_max = 0.0_wp
-    worst = 0.0_wp
-    worst_active = 0.0_wp
-    worst_changed = 0.0_wp
-    n_next = 0
-    n_changed = 0
-    finite = ieee_is_finite(now%approach)
-    !$omp parallel do schedule(static) num_threads(level%space%threads) &
-    !$omp& reduction(max: p_max, worst, worst_active, worst_changed) reduction(+: n_next, n_changed) reduction(.and.: finite)
+    limits = limits_t(level%normal_classification_parameter(now%n_active), 1.0_wp/level%normal_compliance, now%approach)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (allocated(now%offset)) then
-        call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, &
-                                    worst_changed, n_next, n_changed, finite)
-        cycle
+        call classify_compliant_row(level, now, row, limits%r, candidate(:, row), next(:, row), found(row))
+      else
+        call classify_row(limits, level%initial_gap(:, row), now%p(:, row), now%w(:, row), candidate(:, row), &
+                          now%active(:, row), next(:, row), found(row))
       end if
-      call classify_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
-                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, finite)
     end do
     !$omp end parallel do
-    if (.not. finite) then
+    if (.not. (all(found%finite) .and. ieee_is_finite(now%approach))) then
       call raise(error, status%no_convergence, not_finite)
       return
     end if
-    now%p_max = p_max
-    now%residual = worst/p_max
-    now%residual_changed = worst_changed/p_max
-    now%residual_active = worst_active/(level%compliance*p_max)
-    if (allocated(now%offset)) now%residual_active = worst_active/p_max
-    changed = n_changed > 0 .and. n_next > 0
-    now%n_next = n_next
-    if (n_next > 0) return
-    ! too much pressure everywhere: less of it on the old set
+    now%p_max = maxval(found%p_max)
+    now%residual = maxval(found%worst)/now%p_max
+    now%residual_changed = maxval(found%worst_changed)/now%p_max
+    now%residual_active = maxval(found%worst_active)
+    if (.not. allocated(now%offset)) then
+      now%residual_active = now%residual_active/(level%normal_compliance*now%p_max)
+    else
+      now%residual_active = now%residual_active/now%p_max
+    end if
+    now%n_next = sum(found%n_next)
+    changed = sum(found%n_changed) > 0 .and. now%n_next > 0
+    if (now%n_next > 0) return
+    ! too much pressure everywhere: reduce it on the old set
     next = now%active
     now%n_next = now%n_active
   end subroutine classify
 
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
   !> linearised to.
-  subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, worst_changed, n_next, &
-                                    n_changed, finite)
+  subroutine classify_compliant_row(level, now, row, r, candidate, next, found)
     type(normal_lattice_t), intent(in) :: level
     type(normal_iterate_t), intent(in) :: now
     integer, intent(in) :: row
@@ -188,27 +188,24 @@ contains
     real(wp), intent(in) :: r
     logical, intent(in), contiguous :: candidate(:)
     logical, intent(out), contiguous :: next(:)
-    !> What the rows before gave, and now this one too
-    real(wp), intent(inout) :: p_max, worst, worst_active, worst_changed
-    integer, intent(inout) :: n_next, n_changed
-    !> Pressure and gap are finite numbers
-    logical, intent(inout) :: finite
+    !> Residuals and numbers of nodes
+    type(classification_t), intent(out) :: found
     real(wp) :: gap(size(next)), left(size(next))
     integer :: first
 
     first = (row - 1)*size(next) + 1
     left = level%initial_gap(:, row) + now%w(:, row) - now%approach
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
-    finite = finite .and. all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
-    if (.not. finite) return
-    call level%law%find_contact(r, now%p(:, row), gap, candidate, next)
-    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate, worst)
-    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate .and. (next .neqv. now%active(:, row)), &
-                             worst_changed)
-    p_max = max(p_max, maxval(now%p(:, row)))
-    worst_active = max(worst_active, maxval(abs(left)/(level%compliance + now%compliance(:, row)), mask=now%active(:, row)))
-    n_next = n_next + count(next)
-    n_changed = n_changed + count(next .neqv. now%active(:, row))
+    found%finite = all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
+    if (.not. found%finite) return
+    call level%normal_law%find_contact(r, now%p(:, row), gap, candidate, next)
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, candidate, found%worst)
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, &
+                                    candidate .and. (next .neqv. now%active(:, row)), found%worst_changed)
+    found%p_max = max(0.0_wp, maxval(now%p(:, row)))
+    found%worst_active = max(0.0_wp, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
+    found%n_next = count(next)
+    found%n_changed = count(next .neqv. now%active(:, row))
   end subroutine classify_compliant_row
 
   !> Linearise a compliant law about the present pressure and gap, and give the springs to the preconditioner.
@@ -219,18 +216,17 @@ contains
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
-    real(wp) :: gap(size(now%p, 1)), softest
+    real(wp), allocatable :: gap(:, :)
     integer :: row
 
     call add_springs(level, now, -1)
-    softest = level%law%softest_spring(level%options%contact%softest_layer, level%compliance, level%space%max(abs(now%p)))
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(gap)
-    do row = 1, size(now%p, 2)
-      gap = level%initial_gap(:, row) + now%w(:, row) - now%approach
-      call level%law%linearize((row - 1)*size(gap) + 1, r, softest, now%p(:, row), gap, now%active(:, row), &
-                               now%compliance(:, row), now%offset(:, row))
+    allocate (gap, mold=now%w)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(gap, 2)
+      gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
     end do
     !$omp end parallel do
+    call level%linearize(r, now%p, gap, now%active, now%compliance, now%offset)
     call add_springs(level, now, 1)
     associate (n => size(now%p))
       call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
@@ -330,15 +326,15 @@ contains
   !> Update p <- p + share d, w <- w + share (K + C) d, C the springs of a compliant law.
   !>
   !> Without springs the approach moves along, so that under a prescribed load it is still that of `find_approach`.
-  subroutine advance(level, now, share, by_load)
+  subroutine advance(level, now, share, follows)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Share of the direction that is added
     real(wp), intent(in) :: share
-    !> The normal load is prescribed, not the approach
-    logical, intent(in) :: by_load
+    !> The approach follows a prescribed load
+    logical, intent(in) :: follows
     real(wp) :: step, closing, moment(size(now%p, 2))
     real(sp) :: largest
     integer :: row
@@ -349,7 +345,7 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
-        if (by_load) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
+        if (follows) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
         ! springs may be many times softer than the bodies: theirs is computed in double precision
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              - now%compliance(from:to, row)*now%p(from:to, row)
@@ -364,7 +360,7 @@ contains
     end do
     !$omp end parallel do
     now%closing_error = now%closing_error + single_error*abs(closing)*largest
-    if (by_load) now%approach = now%approach + closing*sum(moment)/now%punch_sum
+    if (follows) now%approach = now%approach + closing*sum(moment)/now%punch_sum
   end subroutine advance
 
   !> Set tension to zero: it is within the tolerance.
@@ -388,34 +384,107 @@ contains
     !$omp end parallel do
   end subroutine remove_tension
 
-  !> Compute what the sum of the pressures lacks because of rounding.
-  real(wp) function missing_load(level, now, pressures)
+  !> Compute the difference between the prescribed load and the sum of the pressures, which is rounding error.
+  real(wp) function missing_load(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
-    !> What it should be
-    real(wp), intent(in) :: pressures
 
-    missing_load = pressures - level%space%sum(now%p)
+    missing_load = now%pressures - level%space%sum(now%p)
   end function missing_load
 
   !> Scale the pressures to the prescribed load.
-  subroutine fit_load(level, now, pressures)
+  subroutine fit_load(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> Sum of the pressures under the prescribed load [Pa]
-    real(wp), intent(in) :: pressures
     real(wp) :: lack
 
-    lack = missing_load(level, now, pressures)
+    lack = missing_load(level, now)
     if (allocated(now%punch)) then
       now%p = now%p + lack/now%punch_sum*now%punch
     else
-      now%p = pressures/(pressures - lack)*now%p
+      now%p = now%pressures/(now%pressures - lack)*now%p
     end if
   end subroutine fit_load
+
+  !> Set the pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
+  subroutine set_start(level, now, candidate, error)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(inout) :: level
+    !> Iterate, whose pressure is the one to start from, up to a factor
+    type(normal_iterate_t), intent(inout) :: now
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: scale, largest
+    integer :: n(2), row, stat, try
+    logical :: known
+
+    n = level%lattice%extent
+    if (allocated(now%active)) then
+      if (any(shape(now%active) /= n)) deallocate (now%r, now%z, now%d, now%kd, now%active, now%span)
+    end if
+    if (allocated(now%punch)) deallocate (now%punch)
+    if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
+    if (allocated(now%w)) deallocate (now%w)                                   ! of a solution that failed
+    stat = 0
+    if (.not. allocated(now%active)) then
+      allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
+                now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+    end if
+    if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
+    if (stat == 0 .and. level%normal_law%is_compliant()) then
+      allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
+    end if
+    if (stat /= 0) then
+      now = normal_iterate_t()                                                 ! fields that did fit
+      call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+      return
+    end if
+    known = any(now%p > 0.0_wp .and. candidate)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, n(2)
+      now%active(:, row) = candidate(:, row)
+      if (known) now%active(:, row) = candidate(:, row) .and. now%p(:, row) > 0.0_wp
+      if (.not. known) now%p(:, row) = 1.0_wp
+      now%p(:, row) = merge(now%p(:, row), 0.0_wp, now%active(:, row))
+      now%w(:, row) = 0.0_wp
+      now%r(:, row, 1) = 0.0_sp
+    end do
+    !$omp end parallel do
+    now%n_active = level%space%count(now%active)
+    largest = level%space%max(now%p)
+    now%approach = now%target
+    now%closing_error = 0.0_wp
+    scale = 1.0_wp
+    if (now%by_load) scale = now%target/(level%lattice%cell_area()*level%space%sum(now%p))
+    now%span(1, :) = n(1) + 1
+    now%span(2, :) = 0
+    call find_span(now, level%space)
+    now%p_unit = scale*largest
+    now%w_unit = now%p_unit*level%preconditioner%unit
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, n(2)
+      now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
+      now%p(:, row) = 0.0_wp
+    end do
+    !$omp end parallel do
+    call level%multiply(now%d, now%kd)
+    call advance(level, now, 1.0_wp, .false.)
+    do try = 1, merge(start_steps, 0, allocated(now%offset))
+      call linearize_law(level, now, 0.0_wp)
+      if (now%by_load) exit
+      call rescale(level, now)
+    end do
+    if (.not. now%by_load) then
+      call rescale(level, now)
+      now%p_unit = level%space%max(now%p)
+      now%w_unit = now%p_unit*level%preconditioner%unit
+    end if
+  end subroutine set_start
 
 end module hc_normal_iterate

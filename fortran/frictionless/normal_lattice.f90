@@ -7,10 +7,7 @@
 module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
-  use hc_options, only: options_t
   use hc_field_space, only: field_space_t
-  use hc_hierarchy, only: level_t
-  use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_fftw, only: good_size
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
@@ -18,9 +15,8 @@ module hc_normal_lattice
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
-  use hc_contact_state, only: contact_state_t
-  use hc_normal_law, only: normal_law_t
-  use hc_contact_residuals, only: complete_state, normal_self_compliance
+  use hc_contact_state, only: contact_state_t, load_target_t
+  use hc_normal_problem, only: normal_problem_t
   use hc_inverse_symbol, only: single_cost
   use hc_preconditioner, only: preconditioner_t
   use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
@@ -30,24 +26,16 @@ module hc_normal_lattice
   public :: normal_lattice_t
 
   !> The problem on one lattice.
-  type, extends(level_t) :: normal_lattice_t
-    type(elastic_pair_t) :: pair
-    !> Law of contact
-    class(normal_law_t), allocatable :: law
-    type(options_t) :: options
+  type, extends(normal_problem_t) :: normal_lattice_t
     class(preconditioner_t), allocatable :: preconditioner
     !> The flexibility in single precision, in the unit of the preconditioner
     type(convolution_t) :: single
     !> The flexibility in double precision; whether it is set up, and whether the operators of iterations are
     type(fft_flexibility_t) :: flexibility
     logical :: exact = .false., iterating = .false.
-    !> Self-compliance of a node [m/Pa]
-    real(wp) :: compliance = 0.0_wp
     !> Work in single precision, in applications of the full operator
     real(wp) :: single_work = 0.0_wp
   contains
-    !> Bodies, law and tuning numbers from another lattice
-    procedure :: inherit
     !> Operators
     procedure :: prepare
     !> Gap, zones, load and residuals of a given pressure
@@ -66,20 +54,6 @@ module hc_normal_lattice
   end type rounded_kernel_t
 
 contains
-
-  !> Take bodies, law and tuning numbers of the same problem from another lattice.
-  subroutine inherit(self, from)
-    class(normal_lattice_t), intent(inout) :: self
-    class(level_t), intent(in) :: from
-
-    select type (from)
-    type is (normal_lattice_t)
-      self%pair = from%pair
-      self%options = from%options
-      if (allocated(self%law)) deallocate (self%law)
-      allocate (self%law, source=from%law)
-    end select
-  end subroutine inherit
 
   !> Set up the operators that are needed and not set up yet.
   subroutine prepare(self, kernel, exact, iterating, space, error, cache)
@@ -100,7 +74,6 @@ contains
     logical :: found
     integer :: block
 
-    self%compliance = normal_self_compliance(self%lattice, self%pair)
     self%space = space
     if (exact .and. .not. self%exact) then
       call new_fft_flexibility(self%flexibility, self%lattice, self%pair, error, normal_only=.true., space=space, &
@@ -140,12 +113,10 @@ contains
   end subroutine prepare
 
   !> Compute gap, zones, load and residuals of a given pressure at a given approach.
-  subroutine complete_from_pressure(self, control, target, tolerance, state, error)
+  subroutine complete_from_pressure(self, target, tolerance, state, error)
     class(normal_lattice_t), intent(inout) :: self
-    !> force_control or displacement_control
-    integer, intent(in) :: control
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
+    !> Normal load or approach to be reached
+    type(load_target_t), intent(in) :: target
     !> Bound of the residuals
     real(wp), intent(in) :: tolerance
     !> State whose pressure and approach are known
@@ -163,8 +134,7 @@ contains
       state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
     end do
     !$omp end parallel do
-    call complete_state(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%space, error, &
-                  self%law)
+    call self%complete_pressed(target, tolerance, state, error)
   end subroutine complete_from_pressure
 
   !> Compute K d in single precision, in units of the preconditioner.

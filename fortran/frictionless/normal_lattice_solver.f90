@@ -25,31 +25,42 @@ module hc_normal_lattice_solver
   use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
-  use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
-  use hc_contact_residuals, only: complete_state
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, force_control, normal, sweeps_used_up, &
+    no_progress
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, set_active, &
+  use hc_normal_iterate, only: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, &
     linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
-  use hc_normal_start, only: set_start
-  use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, find_step, &
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, curvature, &
     find_sprung_step
   implicit none
   private
 
   public :: solve_on_normal_lattice
 
+  !> Progress of an iteration.
+  type :: progress_t
+    !> The last residual, the one before it, and the best of those before
+    real(wp) :: best(3) = huge(1.0_wp)
+    !> The set of active nodes is fixed until its linear problem is solved; some set was fixed
+    logical :: fixed = .false., fresh = .false.
+    !> Residual where the set was fixed
+    real(wp) :: fixed_start = 1.0_wp
+    !> Times that the pressure was fitted to the load
+    integer :: fits = 0
+  contains
+    procedure :: judge
+  end type progress_t
+
 contains
 
   !> Solve for a normal load or an approach.
-  subroutine solve_on_normal_lattice(level, now, control, target, tolerance, max_sweeps, state, error)
+  subroutine solve_on_normal_lattice(level, now, target, tolerance, max_sweeps, state, error)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate of an earlier solution, whose memory is used again
     type(normal_iterate_t), intent(inout) :: now
-    !> force_control or displacement_control
-    integer, intent(in) :: control
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
+    !> Normal load or approach to be reached
+    type(load_target_t), intent(in) :: target
     !> Bound of both residuals
     real(wp), intent(in) :: tolerance
     !> Iterations that may be made
@@ -59,7 +70,6 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp) :: delta
     logical :: pulls
     integer :: row, stat
 
@@ -67,18 +77,20 @@ contains
     level%single_work = 0.0_wp
     call move_alloc(state%pressure, now%p)
     state = contact_state_t()
-    delta = level%space%min(level%initial_gap, level%candidate)
-    if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
+    if (.not. level%is_pressed(target)) then
       call new_contact_state(state, level%lattice, level%space)
-      state%motion(normal) = merge(delta, target, control == force_control)
+      state%motion(normal) = target%value(normal)
+      if (target%control(normal) == force_control) state%motion(normal) = level%space%min(level%initial_gap, level%candidate)
       state%gap = level%initial_gap - state%motion(normal)
     else
-      if (control == force_control) then
-        call iterate(level, now, level%candidate, .true., target, tolerance, max_sweeps, state%sweeps, error)
+      now%by_load = target%control(normal) == force_control
+      now%target = target%value(normal)
+      if (now%by_load) then
+        now%pressures = now%target/level%lattice%cell_area()
+        call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
         ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-        call iterate(level, now, level%candidate .and. level%initial_gap < target, .false., target, tolerance, max_sweeps, &
-                     state%sweeps, error)
+        call iterate(level, now, level%candidate .and. level%initial_gap < now%target, tolerance, max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return
@@ -103,143 +115,171 @@ contains
       end if
       state%motion(normal) = now%approach
     end if
-    call complete_state(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error, &
-                  level%law)
+    call level%complete_pressed(target, tolerance, state, error)
   end subroutine solve_on_normal_lattice
 
   !> Iterate up to the tolerance.
-  subroutine iterate(level, now, candidate, by_load, target, tolerance, max_sweeps, sweeps, error)
+  subroutine iterate(level, now, candidate, tolerance, max_sweeps, sweeps, error)
     type(normal_lattice_t), intent(inout) :: level
     !> Its pressure is the start, up to a factor; on return the solution
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in), contiguous :: candidate(:, :)
-    !> The normal load is prescribed, not the approach
-    logical, intent(in) :: by_load
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
     !> Iterations made
     integer, intent(out) :: sweeps
     type(error_t), allocatable, intent(out) :: error
 
-    logical, allocatable :: next(:, :)
-    real(wp) :: history(3), fixed_start, pressures, share, softness, r
+    type(progress_t) :: progress
     type(conjugate_gradient_t) :: recurrence
-    logical :: changed, fixed, fresh, compliant, settled, stalled, anew, follows
-    integer :: fits
-    type(normal_options_t) :: options
+    logical, allocatable :: next(:, :)
+    real(wp) :: share
+    logical :: changed, compliant, anew, corrected, follows
 
-    options = level%options%normal
-    pressures = target/level%lattice%cell_area()                  ! of no meaning under a prescribed approach
-    call set_start(level, now, by_load, target, candidate, error)
+    sweeps = 0
+    call set_start(level, now, candidate, error)
     if (allocated(error)) return
     allocate (next, mold=candidate)
-    compliant = level%law%is_compliant()
-    share = 1.0_wp
+    compliant = level%normal_law%is_compliant()
     anew = .true.
-    history = huge(1.0_wp)
-    fixed = .false.
-    fresh = .false.
     follows = .false.
-    fixed_start = 1.0_wp
-    sweeps = 0
-    fits = 0
     do
-      if (by_load .and. .not. follows) call find_approach(level, now)
+      if (now%by_load .and. .not. follows) call find_approach(level, now)
       follows = .false.
       call classify(level, now, candidate, next, changed, error)
       if (allocated(error)) return
-      ! what an error of the gap does to the pressure falls with the stiffness of the layer
-      softness = max(level%compliance, level%law%compliance_under(now%p_max))
-      if (level%exact .and. now%closing_error > softness*now%p_max*max(options%residual_share*now%residual, &
-                                                                       options%tolerance_share*tolerance)) then
-        if (by_load) call fit_load(level, now, pressures)
-        call find_closing(level, now, error)
-        if (allocated(error)) return
-        cycle
-      end if
-      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < options%max_fits) then
-        if (abs(missing_load(level, now, pressures)) > options%tolerance_share*tolerance*pressures) then
-          fits = fits + 1
-          call fit_load(level, now, pressures)
-          call find_closing(level, now, error)
-          if (allocated(error)) return
-          cycle
-        end if
-      end if
+      call remove_rounding(level, now, tolerance, progress%fits, corrected, error)
+      if (allocated(error)) return
+      if (corrected) cycle
       if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
       sweeps = sweeps + 1
-      ! nodes of no weight, as there are many along a soft edge, do not stop conjugate gradients again and again
-      stalled = compliant .and. now%residual > options%progress*history(1)
-      if (stalled .and. now%residual_changed <= options%slight_change*now%residual) changed = .false.
-      if (sweeps == 1) changed = .true.
-
-      ! has the residual come down, compared with the best but the last two?
-      if (.not. fixed .and. sweeps > options%first_steps) fixed = now%residual > options%progress*history(3)
-      history = [now%residual, history(1), min(history(2), history(3))]
-      if (fixed .and. changed) then
-        if (fresh .and. now%residual_active > options%fixed_accuracy*fixed_start) then
-          changed = .false.
-        else
-          fixed_start = min(now%residual, 1.0_wp)
-          fresh = .true.
-        end if
-      end if
-
+      call progress%judge(now, level%options%normal, sweeps, compliant, changed)
       if (changed) then
         call set_active(level, now, next)
         call recurrence%restart()
       end if
-      if (compliant) then
-        ! linearising costs no product
-        settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
-        anew = anew .or. settled
-        if (changed .or. settled .or. sweeps <= options%most_linearized) then
-          r = level%options%contact%classification_parameter(level%pair%lambda_1, level%lattice%cell_area()*now%n_active)
-          ! what is left close to the solution are errors of a few nodes along the edge
-          if (now%residual < options%close_residual) r = max(r, options%local_share/level%compliance)
-          call linearize_law(level, now, r)
-        end if
-        if (by_load) call find_approach(level, now)
-      end if
-      if (by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
-      if (.not. (changed .and. fixed)) then
-        if (by_load .and. changed) call find_approach(level, now)
+      if (compliant) call follow_law(level, now, changed, sweeps, anew)
+      if (now%by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
+      if (.not. (changed .and. progress%fixed)) then
+        if (now%by_load .and. changed) call find_approach(level, now)
         call find_residual(level, now)
         call level%precondition(now%r, now%z)
       end if
       if (changed) then
-        call projected_step(level, now, fixed, by_load, pressures)
-        share = 1.0_wp
-        anew = .true.
+        call projected_step(level, now, progress%fixed)
       else if (compliant) then
-        call next_sprung_direction(level, now, by_load, anew)
-        anew = .false.
+        call next_sprung_direction(level, now, anew)
       else
-        call next_direction(level, now, by_load, recurrence)
+        call next_direction(level, now, recurrence)
       end if
+      anew = changed .or. (anew .and. .not. compliant)
       call level%multiply(now%d, now%kd)
+      share = 1.0_wp
       if (.not. changed) then
         if (compliant) then
           share = find_sprung_step(level, now)
         else
-          share = find_step(level, now, recurrence)
+          share = recurrence%step_length(curvature(level, now))
         end if
         if (.not. share > 0.0_wp) then
-          ! nothing is left to gain in single precision, and perhaps at all
+          ! the residual has reached round-off of single precision: a product in double precision is next, or the end
           if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return
           now%closing_error = huge(1.0_wp)
           cycle
         end if
       end if
       ! a step of a fixed set moves pressures whose approach was not found; close to the solution rounding errors would add up
-      follows = by_load .and. now%residual > sqrt(epsilon(1.0_wp)) .and. .not. (compliant .or. (changed .and. fixed))
+      follows = now%by_load .and. now%residual > sqrt(epsilon(1.0_wp)) .and. &
+                .not. (compliant .or. (changed .and. progress%fixed))
       call advance(level, now, share, follows)
-      if (changed .and. .not. by_load) call rescale(level, now)
+      if (changed .and. .not. now%by_load) call rescale(level, now)
     end do
   end subroutine iterate
+
+  !> Compute the closing of the gap in double precision where errors of single precision, or a load that was missed by rounding,
+  !> would limit the accuracy.
+  subroutine remove_rounding(level, now, tolerance, fits, corrected, error)
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
+    real(wp), intent(in) :: tolerance
+    !> Times that the pressure of a solution was fitted to the load
+    integer, intent(inout) :: fits
+    !> The gap is another one: residuals have to be computed again
+    logical, intent(out) :: corrected
+    type(error_t), allocatable, intent(out) :: error
+
+    corrected = .false.
+    if (.not. level%exact) return
+    associate (options => level%options%normal)
+      ! the error of the pressure by an error of the gap falls with the stiffness of the layer
+      corrected = now%closing_error > max(level%normal_compliance, level%normal_law%compliance_under(now%p_max))*now%p_max &
+                  *max(options%residual_share*now%residual, options%tolerance_share*tolerance)
+      if (.not. corrected .and. now%residual <= tolerance .and. now%by_load .and. fits < options%max_fits) then
+        corrected = abs(missing_load(level, now)) > options%tolerance_share*tolerance*now%pressures
+        if (corrected) fits = fits + 1
+      end if
+    end associate
+    if (.not. corrected) return
+    if (now%by_load) call fit_load(level, now)
+    call find_closing(level, now, error)
+  end subroutine remove_rounding
+
+  !> Judge the progress of the residual, and fix the set where it changes without end.
+  pure subroutine judge(self, now, options, sweeps, compliant, changed)
+    class(progress_t), intent(inout) :: self
+    type(normal_iterate_t), intent(in) :: now
+    type(normal_options_t), intent(in) :: options
+    !> Iterations made
+    integer, intent(in) :: sweeps
+    !> There is a compliant layer
+    logical, intent(in) :: compliant
+    !> Pressure and gap call for another set; false on return where the set stays
+    logical, intent(inout) :: changed
+    logical :: stalled
+
+    ! nodes of no weight, as there are many along a soft edge, do not stop conjugate gradients again and again
+    stalled = compliant .and. now%residual > options%progress*self%best(1)
+    if (stalled .and. now%residual_changed <= options%slight_change*now%residual) changed = .false.
+    if (sweeps == 1) changed = .true.
+    ! has the residual come down, compared with the best but the last two?
+    if (.not. self%fixed .and. sweeps > options%first_steps) self%fixed = now%residual > options%progress*self%best(3)
+    self%best = [now%residual, self%best(1), min(self%best(2), self%best(3))]
+    if (.not. (self%fixed .and. changed)) return
+    if (self%fresh .and. now%residual_active > options%fixed_accuracy*self%fixed_start) then
+      changed = .false.
+    else
+      self%fixed_start = min(now%residual, 1.0_wp)
+      self%fresh = .true.
+    end if
+  end subroutine judge
+
+  !> Linearise a compliant law again, which costs no product: in the first iterations, for a new set, and where the linear problem
+  !> is solved.
+  subroutine follow_law(level, now, changed, sweeps, anew)
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
+    !> The set of active nodes is another one
+    logical, intent(in) :: changed
+    !> Iterations made
+    integer, intent(in) :: sweeps
+    !> The next direction is not conjugate to the last one
+    logical, intent(inout) :: anew
+    real(wp) :: r
+    logical :: settled
+
+    associate (options => level%options%normal)
+      settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
+      anew = anew .or. settled
+      if (changed .or. settled .or. sweeps <= options%most_linearized) then
+        r = level%normal_classification_parameter(now%n_active)
+        ! what is left close to the solution are errors of a few nodes along the edge
+        if (now%residual < options%close_residual) r = max(r, options%local_share/level%normal_compliance)
+        call linearize_law(level, now, r)
+      end if
+    end associate
+    if (now%by_load) call find_approach(level, now)
+  end subroutine follow_law
 
   !> Compute w = K p in double precision, without a rest of single precision.
   subroutine find_closing(level, now, error)

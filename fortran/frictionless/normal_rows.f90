@@ -6,53 +6,72 @@ module hc_normal_rows
   implicit none
   private
 
+  public :: limits_t, classification_t
   public :: classify_row, residual_row, sum_row, projected_row, direction_row, add_row, dot_single, largest_of
+
+  !> Limits of a classification.
+  type :: limits_t
+    !> Classification parameter, and inverse of the self-compliance [Pa/m]
+    real(wp) :: r = 0.0_wp, stiffness = 0.0_wp
+    !> Approach [m]
+    real(wp) :: approach = 0.0_wp
+  end type limits_t
+
+  !> What the nodes of a row are like.
+  type :: classification_t
+    !> Largest pressure [Pa]; largest residual of the conditions, and on the active nodes of what they were linearised to
+    real(wp) :: p_max = 0.0_wp, worst = 0.0_wp, worst_active = 0.0_wp
+    !> Under a compliant law: largest residual of the nodes that would enter or leave the set
+    real(wp) :: worst_changed = 0.0_wp
+    !> Nodes of the next set, and nodes that would enter or leave
+    integer :: n_next = 0, n_changed = 0
+    !> Pressure and closing are finite numbers
+    logical :: finite = .true.
+  end type classification_t
 
 contains
 
   !> Compute the residuals of the nodes of a row, and find which of them pressure and gap call for.
-  pure subroutine classify_row(n, r, stiffness, approach, initial_gap, pressure, closing, candidate, active, next, &
-                            p_max, worst, worst_active, n_next, n_changed, finite)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Classification parameter, and inverse of the self-compliance [Pa/m]
-    real(wp), intent(in) :: r, stiffness
-    !> Approach, gap of the undeformed bodies, pressure and the closing of the gap
-    real(wp), intent(in) :: approach, initial_gap(n), pressure(n), closing(n)
-    logical, intent(in) :: candidate(n), active(n)
-    logical, intent(out) :: next(n)
-    !> What the rows before gave, and now this one too
-    real(wp), intent(inout) :: p_max, worst, worst_active
-    integer, intent(inout) :: n_next, n_changed
-    !> Pressure and closing are finite numbers
-    logical, intent(inout) :: finite
-    real(wp) :: gap(n), rest
-    integer :: possible(n), carries(n), enters(n), col
+  pure subroutine classify_row(limits, initial_gap, pressure, closing, candidate, active, next, found)
+    !> Limits of the classification
+    type(limits_t), intent(in) :: limits
+    !> Gap of the undeformed bodies, pressure and the closing of the gap
+    real(wp), intent(in), contiguous :: initial_gap(:), pressure(:), closing(:)
+    logical, intent(in), contiguous :: candidate(:), active(:)
+    logical, intent(out), contiguous :: next(:)
+    !> Residuals and numbers of nodes
+    type(classification_t), intent(out) :: found
+    real(wp) :: gap(size(next)), rest, p_max, worst, worst_active
+    integer, dimension(size(next)) :: possible, carries, enters
+    integer :: n, col
 
+    n = size(next)
     ! without branches, and the sets as numbers, so that several nodes are judged at a time
     do col = 1, n
       possible(col) = merge(1, 0, candidate(col))
       carries(col) = merge(1, 0, active(col))
     end do
     do col = 1, n
-      gap(col) = initial_gap(col) + closing(col) - approach
-      enters(col) = merge(1, 0, pressure(col) - r*gap(col) > 0.0_wp)*merge(1, 0, candidate(col))
+      gap(col) = initial_gap(col) + closing(col) - limits%approach
+      enters(col) = merge(1, 0, pressure(col) - limits%r*gap(col) > 0.0_wp)*merge(1, 0, candidate(col))
     end do
     ! the gap may be infinite where nothing can touch; a number less itself is 0, unless it is infinite or none
+    p_max = 0.0_wp
+    worst = 0.0_wp
+    worst_active = 0.0_wp
     rest = 0.0_wp
     !$omp simd reduction(max: p_max, worst, worst_active) reduction(+: rest)
     do col = 1, n
       p_max = max(p_max, pressure(col))
-      worst = max(worst, abs(min(pressure(col), stiffness*gap(col)))*possible(col))
+      worst = max(worst, abs(min(pressure(col), limits%stiffness*gap(col)))*possible(col))
       worst_active = max(worst_active, abs(min(gap(col), huge(1.0_wp)))*carries(col))
       rest = rest + (pressure(col) - pressure(col)) + (closing(col) - closing(col))
     end do
     do col = 1, n
       next(col) = enters(col) == 1
-      n_next = n_next + enters(col)
-      n_changed = n_changed + abs(enters(col) - carries(col))
     end do
-    finite = finite .and. abs(rest) <= 0.0_wp
+    found = classification_t(p_max, worst, worst_active, n_next=sum(enters), n_changed=sum(abs(enters - carries)), &
+                             finite=abs(rest) <= 0.0_wp)
   end subroutine classify_row
 
   !> Compute r = approach - h - w at the active nodes of a row, in single precision; the others stay.
@@ -106,35 +125,34 @@ contains
   end subroutine sum_row
 
   !> Compute d = max(p + step (z - mean punch), 0) - p at the active nodes of a row, -p at the others.
-  pure subroutine projected_row(n, unit, pressure, active, d, total, step, z, mean, punch)
-    !> Number of nodes
-    integer, intent(in) :: n
+  pure subroutine projected_row(unit, pressure, active, d, total, step, z, punch)
     !> Unit of d and z [Pa], and pressure [Pa]
-    real(wp), intent(in) :: unit, pressure(n)
-    logical, intent(in) :: active(n)
+    real(wp), intent(in) :: unit
+    real(wp), intent(in), contiguous :: pressure(:)
+    logical, intent(in), contiguous :: active(:)
     !> The direction
-    real(sp), intent(out) :: d(n)
+    real(sp), intent(out), contiguous :: d(:)
     !> Sum of p + d
     real(wp), intent(out) :: total
-    !> Length of the step, and the preconditioned residual; absent: no step
-    real(wp), intent(in), optional :: step
-    real(sp), intent(in), optional :: z(n)
-    !> Share of the pressure of a punch that is taken off, and that pressure; absent: none
-    real(wp), intent(in), optional :: mean
-    real(sp), intent(in), optional :: punch(n)
-    real(wp) :: before(n), aim(n)
-    integer :: carries(n), col
+    !> Length of the step, and its product with the share of the pressure of a punch that is taken off
+    real(wp), intent(in), optional :: step(2)
+    !> The preconditioned residual; absent: no step
+    real(sp), intent(in), optional, contiguous :: z(:)
+    !> The pressure of a punch; absent: none is taken off
+    real(sp), intent(in), optional, contiguous :: punch(:)
+    real(wp), dimension(size(d)) :: before, aim
+    integer :: carries(size(d)), col
 
-    do col = 1, n
+    do col = 1, size(d)
       carries(col) = merge(1, 0, active(col))
     end do
     before = pressure/unit
     aim = before
-    if (present(z)) aim = aim + step*z
-    if (present(punch)) aim = aim - step*mean*punch
+    if (present(z)) aim = aim + step(1)*z
+    if (present(punch)) aim = aim - step(2)*punch
     total = 0.0_wp
     !$omp simd reduction(+: total)
-    do col = 1, n
+    do col = 1, size(d)
       aim(col) = carries(col)*max(aim(col), 0.0_wp)
       total = total + aim(col)
       d(col) = real(aim(col) - before(col), sp)

@@ -9,14 +9,11 @@
 module hc_wear_ahead
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lattice, only: lattice_t
-  use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, force_control, displacement_control
-  use hc_normal_law, only: normal_law_t
+  use hc_contact_state, only: contact_state_t, load_target_t, force_control, displacement_control
   use hc_nodal_springs, only: nodal_springs_t
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
@@ -70,27 +67,19 @@ contains
   end function energy_ahead_memory
 
   !> Find the energy of a cycle by which a jump wears, (V4): that of the cycle before it, times the pressure after over before.
-  subroutine energy_ahead(now, lattice, pair, law, coefficient, cycles, tolerance, ahead, error, space, cache)
+  subroutine energy_ahead(now, problem, wear, tolerance, ahead, error, cache)
     !> The cycle before the jump
     type(worn_cycle_t), intent(in) :: now
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    !> Law of contact
-    class(normal_law_t), intent(in) :: law
-    !> Coefficient of wear [m^2/N]
-    real(wp), intent(in) :: coefficient
-    !> Cycles of the jump
-    real(wp), intent(in) :: cycles
+    !> Window, bodies and law of contact
+    class(normal_problem_t), intent(in) :: problem
+    !> Cycles of the jump times the coefficient of wear [m^2/N]
+    real(wp), intent(in) :: wear
     !> Bound of the residual of the pressure
     real(wp), intent(in) :: tolerance
     !> Energy by area of each cycle (n_col, n_row) [J/m^2]
     real(wp), intent(out) :: ahead(:, :)
     !> Allocated on failure: no convergence, not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Where sums are taken
-    type(field_space_t), intent(in) :: space
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     real(wp), dimension(size(ahead, 1), size(ahead, 2)) :: before, after, spring
@@ -100,8 +89,8 @@ contains
     ahead = now%energy
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
     if (.not. any(now%candidate .and. before > 0.0_wp)) return
-    spring = merge(cycles*coefficient*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
-    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, space, cache)
+    spring = merge(wear*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
+    call settle(now, problem, before, spring, tolerance, after, error, cache)
     if (allocated(error)) return
     do row = 1, size(ahead, 2)
       do col = 1, size(ahead, 1)
@@ -112,15 +101,11 @@ contains
   end subroutine energy_ahead
 
   !> Solve for the pressure on springs that are new, given one that is in balance without them.
-  subroutine settle(now, lattice, pair, law, before, spring, tolerance, after, error, space, cache)
+  subroutine settle(now, problem, before, spring, tolerance, after, error, cache)
     !> The cycle
     type(worn_cycle_t), intent(in) :: now
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    !> Law of contact
-    class(normal_law_t), intent(in) :: law
+    !> Window, bodies and law of contact
+    class(normal_problem_t), intent(in) :: problem
     !> Pressure without the springs (n_col, n_row) [Pa]
     real(wp), intent(in), contiguous :: before(:, :)
     !> Compliance of the springs (n_col, n_row) [m/Pa]
@@ -131,29 +116,27 @@ contains
     real(wp), intent(out) :: after(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Where sums are taken
-    type(field_space_t), intent(in) :: space
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     type(normal_lattice_t) :: level
     type(normal_iterate_t) :: iterate
     type(normal_kernel_t), target :: kernel
     type(contact_state_t) :: state
+    type(load_target_t) :: target
     real(wp), allocatable :: closing(:, :), layer(:, :)
     real(wp) :: lift
     integer :: col, row
 
-    level%lattice = lattice
-    level%pair = pair
-    level%candidate = now%candidate
     allocate (layer, mold=before)
     do row = 1, size(layer, 2)
       do col = 1, size(layer, 1)
-        layer(col, row) = law%compliance_under(before(col, row))
+        layer(col, row) = problem%normal_law%compliance_under(before(col, row))
       end do
     end do
-    allocate (level%law, source=nodal_springs_t(reshape(spring + layer, [size(spring)])))
-    call level%prepare(kernel, .true., .true., space, error, cache)
+    call new_normal_problem(level, problem%lattice, problem%pair, merge(now%gap, 0.0_wp, now%candidate), now%candidate, &
+                            error, nodal_springs_t(reshape(spring + layer, [size(spring)])))
+    if (allocated(error)) return
+    call level%prepare(kernel, .true., .true., problem%space, error, cache)
     if (allocated(error)) return
     allocate (closing, mold=before)
     call level%multiply_exactly(before, closing, error)
@@ -161,7 +144,7 @@ contains
     closing = closing + layer*before
     ! the gap under `before` is that of the cycle, 0 where nodes carry
     lift = maxval(closing, mask=now%candidate)
-    allocate (level%initial_gap, source=lift - closing)
+    level%initial_gap = lift - closing
     do row = 1, size(before, 2)
       do col = 1, size(before, 1)
         if (.not. now%candidate(col, row)) then
@@ -172,10 +155,9 @@ contains
       end do
     end do
     allocate (state%pressure, source=merge(before, 0.0_wp, now%candidate))
-    associate (control => merge(force_control, displacement_control, now%by_load), &
-               target => merge(lattice%cell_area()*sum(state%pressure), lift, now%by_load))
-      call solve_on_normal_lattice(level, iterate, control, target, tolerance, max_sweeps, state, error)
-    end associate
+    target = load_target_t([merge(force_control, displacement_control, now%by_load)], &
+                           [merge(problem%lattice%cell_area()*sum(state%pressure), lift, now%by_load)])
+    call solve_on_normal_lattice(level, iterate, target, tolerance, max_sweeps, state, error)
     if (allocated(error)) return
     if (.not. state%converged) then
       call raise(error, status%no_convergence, 'the pressure after a jump of wear was not found')

@@ -22,17 +22,17 @@ module hc_block_cholesky
 contains
 
   !> Solve matrix.unknown = rhs for several right-hand sides at once.
-  subroutine solve_blocks(n, n_1, n_rhs, first, matrix, rhs, unknown, solved, options)
-    !> Numbers of unknowns, of those in the first block, of right-hand sides
-    integer, intent(in) :: n, n_1, n_rhs
+  subroutine solve_blocks(n, n_1, first, matrix, rhs, unknown, solved, options)
+    !> Numbers of unknowns, and of those in the first block
+    integer, intent(in) :: n, n_1
     !> Symmetric positive definite part of the first block; its factor on return
     real(real32), intent(inout) :: first(n_1, n_1)
     !> Matrix; its second block is symmetric positive definite
     real(wp), intent(in) :: matrix(n, n)
-    !> Right-hand sides
-    real(wp), intent(in) :: rhs(n, n_rhs)
+    !> Right-hand sides (n, number of them)
+    real(wp), intent(in), contiguous :: rhs(:, :)
     !> Unknowns, to rounding
-    real(wp), intent(out) :: unknown(n, n_rhs)
+    real(wp), intent(out), contiguous :: unknown(:, :)
     !> False: the coupling is too strong, a block not positive definite, single precision too narrow, or there is
     !> not enough memory; the unknowns mean nothing then
     logical, intent(out) :: solved
@@ -41,14 +41,15 @@ contains
 
     type(direct_options_t) :: tuning
     real(real32), allocatable :: second(:, :)
-    real(real32) :: part_1(n_1, n_rhs), part_2(n - n_1, n_rhs)
-    real(wp) :: residual(n, n_rhs), correction(n, n_rhs), along(n - n_1, n_rhs)
-    real(wp), dimension(n_rhs) :: scale, left, bound, step, last
+    real(real32) :: part_1(n_1, size(rhs, 2)), part_2(n - n_1, size(rhs, 2))
+    real(wp) :: residual(n, size(rhs, 2)), correction(n, size(rhs, 2)), along(n - n_1, size(rhs, 2))
+    real(wp), dimension(size(rhs, 2)) :: scale, left, bound, step, last
     real(wp) :: norm
-    integer :: i, n_2, info, stat
+    integer :: i, n_2, n_rhs, info, stat
 
     if (present(options)) tuning = options
     n_2 = n - n_1
+    n_rhs = size(rhs, 2)
     solved = .false.
     unknown = 0.0_wp
     allocate (second(n_2, n_2), stat=stat)

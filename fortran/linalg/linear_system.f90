@@ -19,7 +19,7 @@ module hc_linear_system
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, precondition_constraints, satisfy_constraints, invert_gram, step_ahead
+  public :: linear_system_t, constraints_t, iteration_t, precondition_constraints, step_ahead
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
@@ -40,6 +40,41 @@ module hc_linear_system
     !> Free what products keep for the next one
     procedure :: release
   end type linear_system_t
+
+  !> Linear constraints on the unknowns; at the active nodes (n_active, number of constraints, may be 0).
+  type :: constraints_t
+    !> B, along which the multipliers act, and M B
+    real(wp), allocatable :: columns(:, :), mb(:, :)
+    !> C, if it is not B
+    real(wp), allocatable :: rows(:, :)
+    !> Multipliers m
+    real(wp), allocatable :: multiplier(:)
+  contains
+    !> Unknowns that satisfy them
+    procedure :: satisfy
+    !> (C^T M B)^-1
+    procedure :: invert
+    !> C^T x
+    procedure :: resultants
+  end type constraints_t
+
+  !> An iteration: how far it may go, and how it ended.
+  type :: iteration_t
+    !> Norm of the residual that is allowed, and the one that is left
+    real(wp) :: tolerance = 0.0_wp, residual = huge(1.0_wp)
+    !> Iterations allowed, and made
+    integer :: most = 0, made = 0
+    !> GMRES: directions that are stored; after as many the iteration begins anew with the residual that is left
+    integer :: most_directions = 0
+    !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
+    real(wp), allocatable :: weight(:)
+    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer :: outcome = solution_broke_off
+    !> False where the constraints depend on each other: nothing was done
+    logical :: independent = .true.
+    !> Bound of the rounding errors in the product A x, which is carried along
+    real(wp) :: drift = 0.0_wp
+  end type iteration_t
 
   abstract interface
     !> Apply a linear map to a vector.
@@ -122,52 +157,49 @@ contains
     end do
   end subroutine precondition_constraints
 
-  !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value; mostly C is B.
+  !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine satisfy_constraints(rows, mb, missing, x, independent, space, nodes)
-    !> C and M B
-    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
+  subroutine satisfy(self, space, missing, x, independent, nodes)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> What C^T x lacks
     real(wp), intent(in) :: missing(:)
     !> Unknowns, over all nodes if `nodes` are given
     real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
     !> Nodes to which C and M B belong; absent: all
     type(active_set_t), intent(in), optional :: nodes
     real(wp) :: inverse(size(missing), size(missing)), factor(size(missing))
     real(wp), allocatable :: values(:)
     integer :: m
 
-    call invert_gram(rows, mb, inverse, independent, space)
+    call self%invert(space, inverse, independent)
     if (.not. independent) return
     factor = [(dot_product(inverse(m, :), missing), m=1, size(missing))]
     if (.not. present(nodes)) then
-      call space%add_columns(mb, factor, x)
+      call space%add_columns(self%mb, factor, x)
     else if (size(missing) > 0) then
       allocate (values(nodes%n_active))
       call nodes%pack(x, values)
-      call space%add_columns(mb, factor, values)
+      call space%add_columns(self%mb, factor, values)
       call nodes%unpack(values, x)
     end if
-  end subroutine satisfy_constraints
+  end subroutine satisfy
 
   !> Take a step along the preconditioned residual, projected on the constraints, before the product A x is known: that of the
-  !> unknowns before small changes serves for the residual, and the product that follows is that of changes and step together.
-  subroutine step_ahead(system, nodes, columns, mb, rows, rhs, ax, multiplier, length, x, error)
+  !> unknowns before small changes serves for the residual, and one product serves for changes and step together.
+  subroutine step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns
     type(active_set_t), intent(in) :: nodes
-    !> B, M B and C at these nodes (n_active, number of constraints)
-    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
+    !> Constraints, with multipliers that are nearly right
+    type(constraints_t), intent(in) :: constraints
     !> Right-hand side, and nearly A x (n)
     real(wp), intent(in), contiguous :: rhs(:), ax(:)
-    !> Multipliers of the constraints, nearly
-    real(wp), intent(in) :: multiplier(:)
     !> Share of the preconditioned residual
     real(wp), intent(in) :: length
     !> Unknowns (n), whose C^T x stays
@@ -175,58 +207,72 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: r(:), z(:)
-    real(wp) :: inverse(size(multiplier), size(multiplier)), share(size(multiplier))
+    real(wp), dimension(size(constraints%multiplier)) :: share
+    real(wp) :: inverse(size(share), size(share))
     logical :: independent
 
-    call invert_gram(rows, mb, inverse, independent, system%space)
+    call constraints%invert(system%space, inverse, independent)
     if (.not. independent) return
     allocate (r(nodes%n_active), z(nodes%n_active))
     call nodes%pack(rhs, r)
     call nodes%pack(ax, z)
     r = r - z
-    call system%space%add_columns(columns, multiplier, r)
+    call system%space%add_columns(constraints%columns, constraints%multiplier, r)
     call system%precondition_packed(nodes, size(x), r, z, error)
     if (allocated(error)) return
-    share = -matmul(inverse, system%space%dots(rows, z))
-    call system%space%add_columns(mb, share, z)
+    share = -matmul(inverse, constraints%resultants(system%space, z))
+    call system%space%add_columns(constraints%mb, share, z)
     call nodes%pack(x, r)
     r = r + length*z
     call nodes%unpack(r, x)
   end subroutine step_ahead
 
-  !> Compute (C^T M B)^-1, zero if the constraints depend on each other.
-  subroutine invert_gram(rows, mb, inverse, independent, space)
-    !> C and M B
-    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
-    !> The inverse
+  !> Compute (C^T M B)^-1.
+  subroutine invert(self, space, inverse, independent)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> The inverse; zero if the constraints depend on each other
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
-    integer :: m, k
+    real(wp) :: gram(size(inverse, 1), size(inverse, 1)), scale(size(inverse, 1))
+    integer :: m
 
     independent = .true.
     inverse = 0.0_wp
-    if (size(mb, 2) == 0) return
-    do m = 1, size(mb, 2)
-      do k = 1, size(mb, 2)
-        gram(k, m) = space%dot(rows(:, k), mb(:, m))
-      end do
+    if (size(scale) == 0) return
+    do m = 1, size(scale)
+      gram(:, m) = self%resultants(space, self%mb(:, m))
       scale(m) = gram(m, m)
     end do
     independent = all(scale > 0.0_wp)
     if (.not. independent) return
     scale = sqrt(scale)
-    do m = 1, size(mb, 2)
+    do m = 1, size(scale)
       gram(:, m) = gram(:, m)/(scale*scale(m))
       inverse(m, m) = 1.0_wp/scale(m)
     end do
     call eliminate(gram, inverse)
-    independent = all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
-    inverse = inverse/spread(scale, 2, size(mb, 2))
+    independent = all([(abs(gram(m, m)), m=1, size(scale))] > dependence)
+    inverse = inverse/spread(scale, 2, size(scale))
     if (.not. independent) inverse = 0.0_wp
-  end subroutine invert_gram
+  end subroutine invert
+
+  !> Compute C^T x of values at the active nodes.
+  function resultants(self, space, x)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> The values
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp) :: resultants(size(self%columns, 2))
+
+    if (allocated(self%rows)) then
+      resultants = space%dots(self%rows, x)
+    else
+      resultants = space%dots(self%columns, x)
+    end if
+  end function resultants
 
 end module hc_linear_system

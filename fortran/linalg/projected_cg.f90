@@ -14,7 +14,8 @@ module hc_projected_cg
   use hc_active_set, only: active_set_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_field_space, only: field_space_t
-  use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, iterations_used_up, &
+    solution_broke_off
   implicit none
   private
 
@@ -36,35 +37,26 @@ module hc_projected_cg
 contains
 
   !> Solve by preconditioned conjugate gradients with projection on the constraints.
-  subroutine projected_cg(system, nodes, b, m_b, rhs, x, ax, tolerance, max_iterations, &
-                          multiplier, residual, iterations, outcome, error, drift)
+  !>
+  !> The drift is a bound of the rounding errors of the largest residual on the way
+  !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551); the norm of a residual is its largest element.
+  subroutine projected_cg(system, nodes, constraints, rhs, x, ax, iteration, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns
     type(active_set_t), intent(in) :: nodes
-    !> Constraint vectors B and M B, at these nodes (n_active, number of constraints, may be 0)
-    real(wp), intent(in), contiguous :: b(:, :), m_b(:, :)
+    !> Constraints, with C = B; on return their multipliers
+    type(constraints_t), intent(inout) :: constraints
     !> Right-hand side (n); freed, once there is a copy of its active part
     real(wp), allocatable, intent(inout) :: rhs(:)
     !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere, on entry and on return
     real(wp), intent(inout), contiguous :: ax(:)
-    !> The largest residual that is allowed on an active node
-    real(wp), intent(in) :: tolerance
-    !> Iterations allowed
-    integer, intent(in) :: max_iterations
-    !> Multipliers of the constraints
-    real(wp), intent(out) :: multiplier(:)
-    !> The largest residual on an active node
-    real(wp), intent(out) :: residual
-    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
-    integer, intent(out) :: iterations, outcome
+    !> How far it may go, and how it ended
+    type(iteration_t), intent(inout) :: iteration
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> What rounding errors of the largest residual on the way may have left in A x
-    !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551)
-    real(wp), intent(out), optional :: drift
 
     !> Product of a direction, over all nodes
     real(wp), allocatable :: onto(:)
@@ -73,15 +65,71 @@ contains
     real(wp), allocatable :: r(:), z(:), d(:)
     type(conjugate_gradient_t) :: recurrence
     real(wp) :: step, share, rz, largest
-    real(wp) :: change(size(b, 2)), along(size(b, 2)), inverse(size(b, 2), size(b, 2))
-    integer :: i, m
+    real(wp), dimension(size(constraints%columns, 2)) :: change, along
+    real(wp) :: inverse(size(change), size(change))
     type(field_space_t) :: space
     logical :: independent, anew
 
     space = system%space
-    associate (n => nodes%n_active)
-      allocate (r(n), z(n), d(n))
+    call find_residual(nodes, rhs, ax, space, r, z)
+    allocate (d(size(r)), onto(size(x)))
+    call constraints%invert(space, inverse, independent)
+    iteration%made = 0
+    iteration%outcome = iterations_used_up
+    largest = 0.0_wp
+    step = 0.0_wp
+    associate (b => constraints%columns, m_b => constraints%mb)
+      change = first_change(b, r, space)
+      constraints%multiplier = change
+      do
+        ! The share of the constraints is taken out of the residual before it is
+        ! preconditioned: it is the larger part by far, and its rounding errors would stay.
+        ! The rest is normal to M B, so that the projected preconditioner is
+        ! symmetric even if the given M B is only about M times B.
+        call advance_residual(-step, z, change, b, m_b, r, along, space)
+        change = -matmul(along, inverse)
+        constraints%multiplier = constraints%multiplier + change
+        call add_constraints(change, b, r, iteration%residual, space)
+        largest = max(largest, iteration%residual)
+        if (iteration%residual <= iteration%tolerance .or. iteration%made >= iteration%most) exit
+        call system%precondition_packed(nodes, size(x), r, z, error)
+        if (allocated(error)) return
+        call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
+        call recurrence%last_share(rz, share, anew)
+        call combine(1.0_wp, z, merge(0.0_wp, share, anew), d, space)
+        call system%product_packed(nodes, d, onto, error)
+        if (allocated(error)) return
+        call nodes%pack(onto, z)
+        step = recurrence%step_length(space%dot(d, z))
+        if (.not. step > 0.0_wp) iteration%outcome = solution_broke_off
+        if (.not. step > 0.0_wp) exit
+        call nodes%add(step, d, x)
+        call combine(step, onto, 1.0_wp, ax, space)
+        change = 0.0_wp
+        iteration%made = iteration%made + 1
+      end do
     end associate
+    call system%release()
+    if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
+    ! the largest of several numbers hides one that is not a number
+    if (.not. ieee_is_finite(space%dot(r, r))) iteration%outcome = solution_broke_off
+    iteration%drift = epsilon(1.0_wp)*largest
+  end subroutine projected_cg
+
+  !> Compute r = rhs - A x on the active nodes, and free the right-hand side.
+  subroutine find_residual(nodes, rhs, ax, space, r, z)
+    !> Nodes that carry unknowns
+    type(active_set_t), intent(in) :: nodes
+    !> Right-hand side, freed, and A x (n)
+    real(wp), allocatable, intent(inout) :: rhs(:)
+    real(wp), intent(in), contiguous :: ax(:)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> The residual, and memory for another vector (n_active)
+    real(wp), allocatable, intent(out) :: r(:), z(:)
+    integer :: i
+
+    allocate (r(nodes%n_active), z(nodes%n_active))
     call nodes%pack(rhs, r)
     deallocate (rhs)
     call nodes%pack(ax, z)
@@ -90,51 +138,21 @@ contains
       r(i) = r(i) - z(i)
     end do
     !$omp end parallel do simd
-    allocate (onto(size(x)))
-    call invert_gram(b, m_b, inverse, independent, space)
-    iterations = 0
-    largest = 0.0_wp
-    outcome = iterations_used_up
-    step = 0.0_wp
-    do m = 1, size(multiplier)
+  end subroutine find_residual
+
+  !> Compute first multipliers: one by one, those that leave least of the residual.
+  function first_change(b, r, space) result(change)
+    !> B and residual on the active nodes
+    real(wp), intent(in), contiguous :: b(:, :), r(:)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: change(size(b, 2))
+    integer :: m
+
+    do m = 1, size(change)
       change(m) = -space%dot(b(:, m), r)/space%dot(b(:, m), b(:, m))
     end do
-    multiplier = change
-    do
-      ! The share of the constraints is taken out of the residual before it is
-      ! preconditioned: it is the larger part by far, and its rounding errors would stay.
-      ! The rest is normal to M B, so that the projected preconditioner is
-      ! symmetric even if the given M B is only about M times B.
-      call advance_residual(-step, z, change, b, m_b, r, along, space)
-      change = -matmul(along, inverse)
-      multiplier = multiplier + change
-      call add_constraints(change, b, r, residual, space)
-      largest = max(largest, residual)
-      if (residual <= tolerance .or. iterations >= max_iterations) exit
-      call system%precondition_packed(nodes, size(x), r, z, error)
-      if (allocated(error)) return
-      call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
-      call recurrence%last_share(rz, share, anew)
-      call combine(1.0_wp, z, merge(0.0_wp, share, anew), d, space)
-      call system%product_packed(nodes, d, onto, error)
-      if (allocated(error)) return
-      call nodes%pack(onto, z)
-      step = recurrence%step_length(space%dot(d, z))
-      if (.not. step > 0.0_wp) then
-        outcome = solution_broke_off
-        exit
-      end if
-      call nodes%add(step, d, x)
-      call combine(step, onto, 1.0_wp, ax, space)
-      change = 0.0_wp
-      iterations = iterations + 1
-    end do
-    call system%release()
-    if (residual <= tolerance) outcome = solution_accurate
-    ! the largest of several numbers hides one that is not a number
-    if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
-    if (present(drift)) drift = epsilon(1.0_wp)*largest
-  end subroutine projected_cg
+  end function first_change
 
   !> Compute r <- r + step A d + B change, and C^T r.
   subroutine advance_residual(step, ad, change, b, c, r, along, space)

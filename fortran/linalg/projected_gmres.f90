@@ -16,7 +16,8 @@ module hc_projected_gmres
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
   use hc_field_space, only: field_space_t
-  use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, iterations_used_up, &
+    solution_broke_off
   implicit none
   private
 
@@ -24,39 +25,25 @@ module hc_projected_gmres
 
 contains
 
-  !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly.
-  subroutine projected_gmres(system, nodes, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, max_directions, &
-                             multiplier, independent, residual, iterations, outcome, error, drift)
+  !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly; the norm of a residual is that of
+  !> Euclid, with the weights.
+  subroutine projected_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns
     type(active_set_t), intent(in) :: nodes
-    !> B, along which the multipliers act, M B, and C of the constraints at these nodes (n_active, number of constraints)
-    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
-    !> Weights of the residuals, one for each part of the vectors; the parts are equally long
-    real(wp), intent(in) :: weight(:)
+    !> Constraints; their multipliers are on entry a start
+    type(constraints_t), intent(inout) :: constraints
     !> Right-hand side (n), freed once there is a copy of its active part
     real(wp), allocatable, intent(inout) :: rhs(:)
     !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere
     real(wp), intent(inout), contiguous :: ax(:)
-    !> Euclidean norm of the weighted residuals on the active nodes that is allowed
-    real(wp), intent(in) :: tolerance
-    !> Iterations allowed, and directions that are stored: after as many the iteration begins anew with the residual that is left
-    integer, intent(in) :: max_iterations, max_directions
-    !> Multipliers of the constraints, on entry a start
-    real(wp), intent(inout) :: multiplier(:)
-    !> False where the constraints depend on each other: nothing was done
-    logical, intent(out) :: independent
-    !> Euclidean norm of the weighted residuals that is left, but for rounding errors
-    real(wp), intent(out) :: residual
-    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
-    integer, intent(out) :: iterations, outcome
+    !> How far it may go, and how it ended
+    type(iteration_t), intent(inout) :: iteration
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> What rounding errors may have left in A x, in that norm
-    real(wp), intent(out), optional :: drift
 
     type :: direction_t
       !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
@@ -64,66 +51,72 @@ contains
       real(wp), allocatable :: v(:), z(:), beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
-    type(direction_t) :: basis(max_directions + 1)
-    type(active_set_t) :: others, of_part
+    type(direction_t) :: basis(iteration%most_directions + 1)
+    type(active_set_t) :: others
     !> On the active nodes; a product over all nodes
     real(wp), allocatable :: packed(:), image(:)
     !> Places of the last active nodes of the parts
-    integer :: last(0:size(weight))
+    integer :: last(0:size(iteration%weight))
     !> H, and after rotations
-    real(wp), dimension(max_directions + 1, max_directions) :: arnoldi, h
-    real(wp) :: g(max_directions + 1), c(max_directions), s(max_directions), left(max_directions + 1)
-    real(wp) :: y(max_directions), share(size(multiplier), max_directions), length, began
-    real(wp) :: inverse(size(multiplier), size(multiplier))
+    real(wp), dimension(iteration%most_directions + 1, iteration%most_directions) :: arnoldi, h
+    real(wp), dimension(iteration%most_directions + 1) :: g, left
+    real(wp), dimension(iteration%most_directions) :: c, s, y
+    real(wp) :: share(size(constraints%multiplier), iteration%most_directions), length, began
+    real(wp) :: inverse(size(constraints%multiplier), size(constraints%multiplier))
     !> Norms of the columns, with the weights of the residual
-    real(wp) :: along(size(multiplier))
-    integer :: i, part, directions
+    real(wp) :: along(size(constraints%multiplier))
+    integer :: directions
     type(field_space_t) :: space
 
-    iterations = 0
-    residual = huge(1.0_wp)
-    if (present(drift)) drift = 0.0_wp
-    outcome = solution_broke_off
     space = system%space
-    others = nodes%complement(size(x))
-    call invert_gram(rows, mb, inverse, independent, space)
-    if (.not. independent) return
-    associate (n => nodes%n_active)
-      allocate (basis(1)%v(n), packed(n))
-    end associate
-    part = size(x)/size(weight)
-    last(0) = 0
-    do i = 1, size(weight)
-      of_part = nodes%slice((i - 1)*part + 1, i*part)
-      last(i) = last(i - 1) + of_part%n_active
-    end do
-    do i = 1, size(along)
-      packed = columns(:, i)
-      call weigh(weight, packed)
-      along(i) = sqrt(space%dot(packed, packed))
-    end do
-    call nodes%pack(rhs, basis(1)%v)
-    deallocate (rhs)
-    call nodes%pack(ax, packed)
-    basis(1)%v = basis(1)%v - packed
-    call space%add_columns(columns, multiplier, basis(1)%v)
-    call weigh(weight, basis(1)%v)
-    length = sqrt(space%dot(basis(1)%v, basis(1)%v))
-    residual = length
-    if (present(drift)) drift = epsilon(1.0_wp)*length
-    if (length <= 0.0_wp) outcome = solution_accurate
+    iteration%made = 0
+    iteration%residual = huge(1.0_wp)
+    iteration%drift = 0.0_wp
+    iteration%outcome = solution_broke_off
+    call constraints%invert(space, inverse, iteration%independent)
+    if (.not. iteration%independent) return
+    call begin()
+    if (length <= 0.0_wp) iteration%outcome = solution_accurate
     if (.not. length > 0.0_wp) return
-    outcome = iterations_used_up
-
-    do while (outcome == iterations_used_up .and. iterations < max_iterations .and. length > 0.0_wp)
-      call search(min(max_directions, max_iterations - iterations))
+    iteration%outcome = iterations_used_up
+    do while (iteration%outcome == iterations_used_up .and. iteration%made < iteration%most .and. length > 0.0_wp)
+      call search(min(iteration%most_directions, iteration%most - iteration%made))
       if (allocated(error)) return
       call take_step()
-      iterations = iterations + directions
+      iteration%made = iteration%made + directions
     end do
     call system%release()
 
   contains
+
+    !> Compute the weighted residual of the start, the first direction.
+    subroutine begin()
+      type(active_set_t) :: of_part
+      integer :: i, part
+
+      others = nodes%complement(size(x))
+      allocate (basis(1)%v(nodes%n_active), packed(nodes%n_active))
+      part = size(x)/size(iteration%weight)
+      last(0) = 0
+      do i = 1, size(iteration%weight)
+        of_part = nodes%slice((i - 1)*part + 1, i*part)
+        last(i) = last(i - 1) + of_part%n_active
+      end do
+      do i = 1, size(along)
+        packed = constraints%columns(:, i)
+        call weigh(iteration%weight, packed)
+        along(i) = sqrt(space%dot(packed, packed))
+      end do
+      call nodes%pack(rhs, basis(1)%v)
+      deallocate (rhs)
+      call nodes%pack(ax, packed)
+      basis(1)%v = basis(1)%v - packed
+      call space%add_columns(constraints%columns, constraints%multiplier, basis(1)%v)
+      call weigh(iteration%weight, basis(1)%v)
+      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
+      iteration%residual = length
+      iteration%drift = epsilon(1.0_wp)*length
+    end subroutine begin
 
     !> Find directions, and the combination of them that reduces the residual most.
     subroutine search(most)
@@ -149,17 +142,17 @@ contains
           return
         end if
         call space%copy(basis(k)%v, packed)
-        call weigh(1.0_wp/weight, packed)
+        call weigh(1.0_wp/iteration%weight, packed)
         call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
         if (allocated(error)) return
-        share(:, k) = -matmul(inverse, space%dots(rows, basis(k)%z))
-        call space%add_columns(mb, share(:, k), basis(k)%z)
+        share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k)%z))
+        call space%add_columns(constraints%mb, share(:, k), basis(k)%z)
         call system%product_packed(nodes, basis(k)%z, image, error)
         if (allocated(error)) return
         call nodes%pack(image, basis(k + 1)%v)
         call others%pack(image, basis(k)%beyond)
-        call space%add_columns(columns, -share(:, k), basis(k + 1)%v)
-        call weigh(weight, basis(k + 1)%v)
+        call space%add_columns(constraints%columns, -share(:, k), basis(k + 1)%v)
+        call weigh(iteration%weight, basis(k + 1)%v)
         do i = 1, k
           h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
           basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
@@ -173,18 +166,18 @@ contains
           h(i, k) = rotated
         end do
         length = hypot(h(k, k), h(k + 1, k))
-        if (.not. length > 0.0_wp) outcome = solution_broke_off
-        if (outcome == solution_broke_off) exit
+        if (.not. length > 0.0_wp) iteration%outcome = solution_broke_off
+        if (iteration%outcome == solution_broke_off) exit
         directions = k
         c(k) = h(k, k)/length
         s(k) = h(k + 1, k)/length
         h(k, k) = length
         g(k + 1) = -s(k)*g(k)
         g(k) = c(k)*g(k)
-        residual = abs(g(k + 1))
-        if (residual <= tolerance) exit
+        iteration%residual = abs(g(k + 1))
+        if (iteration%residual <= iteration%tolerance) exit
       end do
-      if (residual <= tolerance) outcome = solution_accurate
+      if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
@@ -194,12 +187,11 @@ contains
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do
-      if (present(drift)) then
-        ! where nodes slip far, or motions are all but free, the terms of A x are large and cancel
-        do i = 1, directions
-          drift = drift + epsilon(1.0_wp)*abs(y(i))*(norm2(arnoldi(:i + 1, i)) + dot_product(abs(share(:, i)), along))
-        end do
-      end if
+      ! where nodes slip far, or motions are all but free, the terms of A x are large and cancel
+      do i = 1, directions
+        iteration%drift = iteration%drift + epsilon(1.0_wp)*abs(y(i))*(norm2(arnoldi(:i + 1, i)) &
+                                                                       + dot_product(abs(share(:, i)), along))
+      end do
       ! solution and product from the same directions: the preconditioner is of single precision, and where a node
       ! slips far the matrix would make displacements of its rounding errors
       left = 0.0_wp
@@ -208,15 +200,15 @@ contains
         left(i) = -dot_product(arnoldi(i, :directions), y(:directions))
         packed = packed - left(i)*basis(i)%v
       end do
-      call weigh(1.0_wp/weight, packed)
-      call space%add_columns(columns, matmul(share(:, :directions), y(:directions)), packed)
+      call weigh(1.0_wp/iteration%weight, packed)
+      call space%add_columns(constraints%columns, matmul(share(:, :directions), y(:directions)), packed)
       call nodes%add(1.0_wp, packed, ax)
       do i = 1, directions
         call nodes%add(y(i), basis(i)%z, x)
         call others%add(y(i), basis(i)%beyond, ax)
       end do
-      multiplier = multiplier + matmul(share(:, :directions), y(:directions))
-      if (outcome /= iterations_used_up) return
+      constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
+      if (iteration%outcome /= iterations_used_up) return
       left(1) = left(1) + began
       basis(1)%v = left(1)*basis(1)%v
       do i = 2, directions + 1

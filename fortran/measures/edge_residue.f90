@@ -15,7 +15,7 @@ module hc_edge_residue
   use hc_flexibility, only: blocks, block_index
   use hc_field_space, only: field_space_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, solution_accurate
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
@@ -134,10 +134,12 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(means_t) :: means
-    real(wp) :: weight(-2*self%samples:2*self%samples, -2*self%samples:2*self%samples), residual, none(0)
-    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :)
+    real(wp) :: weight(-2*self%samples:2*self%samples, -2*self%samples:2*self%samples)
+    real(wp), allocatable :: x(:), ax(:), rhs(:)
+    type(constraints_t) :: none
+    type(iteration_t) :: iteration
     type(active_set_t) :: nodes
-    integer :: i, j, k, col, row, component, iterations, outcome
+    integer :: i, j, k, col, row, component
 
     associate (m => self%samples, n => self%lattice%extent)
       weight = smooth_weights(m)
@@ -172,11 +174,11 @@ contains
         call means%product(x, ax, error)
         if (allocated(error)) return
         call new_active_set(nodes, spread(.true., 1, size(x)), space)
-        if (.not. allocated(mb)) allocate (constraint(size(x), 0), mb(size(x), 0))
-        call projected_cg(means, nodes, constraint, mb, rhs, x, ax, accuracy*maxval(abs(rhs)), &
-                          most_iterations, none, residual, iterations, outcome, error)
+        if (.not. allocated(none%mb)) allocate (none%columns(size(x), 0), none%mb(size(x), 0))
+        iteration = iteration_t(tolerance=accuracy*maxval(abs(rhs)), most=most_iterations)
+        call projected_cg(means, nodes, none, rhs, x, ax, iteration, error)
         if (allocated(error)) return
-        if (outcome /= solution_accurate) then
+        if (iteration%outcome /= solution_accurate) then
           call raise(error, status%no_convergence, not_found)
           return
         end if

@@ -20,7 +20,7 @@ module hc_edge_tractions
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, solution_accurate, precondition_constraints, satisfy_constraints
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
   use hc_traction_field, only: traction_field_t, new_traction_field
@@ -231,12 +231,13 @@ contains
     real(wp), intent(inout) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :)
+    real(wp), allocatable :: x(:), ax(:), rhs(:)
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
     logical, allocatable :: active(:)
     type(active_set_t) :: set
-    real(wp) :: multiplier(size(change, 3)), residual
     logical :: independent
-    integer :: k, iterations, outcome
+    integer :: k
 
     if (.not. any(nodes)) return
     associate (n => size(nodes))
@@ -244,21 +245,20 @@ contains
       x = reshape(change, [size(change)])
       rhs = merge(-reshape(moved, [size(change)]), 0.0_wp, active)
       call new_active_set(set, active, system%space)
-      allocate (constraint(set%n_active, size(change, 3)), source=0.0_wp)
+      allocate (constraints%columns(set%n_active, size(change, 3)), source=0.0_wp)
       allocate (ax(size(x)))
       do k = 1, size(change, 3)
-        constraint((k - 1)*count(nodes) + 1:k*count(nodes), k) = 1.0_wp
+        constraints%columns((k - 1)*count(nodes) + 1:k*count(nodes), k) = 1.0_wp
       end do
-      call precondition_constraints(system, set, size(x), constraint, mb, error)
+      call precondition_constraints(system, set, size(x), constraints%columns, constraints%mb, error)
       if (allocated(error)) return
-      call satisfy_constraints(constraint, mb, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, system%space, set)
+      call constraints%satisfy(system%space, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, set)
       call system%product(x, ax, error)
       if (allocated(error)) return
-      residual = maxval(abs(rhs - ax), mask=active)
-      call projected_cg(system, set, constraint, mb, rhs, x, ax, options%accuracy*residual, options%max_iterations, multiplier, &
-                        residual, iterations, outcome, error)
+      iteration = iteration_t(tolerance=options%accuracy*maxval(abs(rhs - ax), mask=active), most=options%max_iterations)
+      call projected_cg(system, set, constraints, rhs, x, ax, iteration, error)
       if (allocated(error)) return
-      if (outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)
+      if (iteration%outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)
       change = reshape(x, shape(change))
     end associate
   end subroutine settle

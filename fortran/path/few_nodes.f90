@@ -8,7 +8,7 @@
 module hc_few_nodes
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
@@ -27,7 +27,7 @@ contains
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: start
     !> Displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals
@@ -60,7 +60,8 @@ contains
         call problem%extract_part(low, high, part)
         call new_direct_friction(direct, part, error)
         if (allocated(error)) return
-        call solve_part(solver, direct, low, high, start, reference, target, tolerance, max_sweeps, found, solved, error)
+        call solve_part(solver, direct, reshape([low, high], [2, 2]), start, &
+                        load_step_t(target, reference, tolerance, max_sweeps), found, solved, error)
         if (allocated(error) .or. .not. solved) return
         if (found%converged) then
           found%sweeps = state%sweeps + found%sweeps

@@ -17,7 +17,7 @@ module test_direct_friction
   use hc_block_cholesky, only: solve_blocks
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_direct_iterate, only: ring
-  use hc_area_factors, only: area_factors_t
+  use hc_area_factors, only: area_factors_t, factored_area_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_lapack, only: dposv
   use hc_options, only: direct_options_t
@@ -201,7 +201,7 @@ contains
       matrix(n_1 + 1:, :n_1) = 0.7_wp*base(n_1 + 1:, :n_1)
       matrix(:n_1, 3) = matrix(:n_1, 3) + 0.1_wp*coupling(i)      ! friction makes the first block unsymmetric
       first = real(base(:n_1, :n_1), real32)
-      call solve_blocks(n, n_1, 3, first, matrix, matmul(matrix, x), unknown, solved)
+      call solve_blocks(n, n_1, first, matrix, matmul(matrix, x), unknown, solved)
       call check_true(error, solved .eqv. (i < 3), 'solved as long as the coupling is weak')
       if (allocated(error)) return
       do j = 1, merge(3, 0, solved)
@@ -211,7 +211,7 @@ contains
     end do
     ! pressures alone
     first = real(base(:n_1, :n_1), real32)
-    call solve_blocks(n_1, n_1, 1, first, base(:n_1, :n_1), matmul(base(:n_1, :n_1), x(:n_1, :1)), unknown(:n_1, :1), solved)
+    call solve_blocks(n_1, n_1, first, base(:n_1, :n_1), matmul(base(:n_1, :n_1), x(:n_1, :1)), unknown(:n_1, :1), solved)
     call check_true(error, solved, 'one block')
     if (allocated(error)) return
     call check(error, unknown(:n_1, 1), x(:n_1, 1), 1.0e-13_wp, 'one block')
@@ -219,17 +219,17 @@ contains
     ! a slip node that carries nothing, with a compliance beyond single precision
     matrix(n, n) = 1.0e50_wp
     first = real(base(:n_1, :n_1), real32)
-    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call solve_blocks(n, n_1, first, matrix, x, unknown, solved)
     call check_true(error, .not. solved, 'too large for single precision')
     if (allocated(error)) return
     matrix(n, n) = -1.0_wp
     first = real(base(:n_1, :n_1), real32)
-    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call solve_blocks(n, n_1, first, matrix, x, unknown, solved)
     call check_true(error, .not. solved, 'second block not positive definite')
     if (allocated(error)) return
     matrix(n, n) = base(n, n)
     first(n_1, n_1) = -1.0_real32
-    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call solve_blocks(n, n_1, first, matrix, x, unknown, solved)
     call check_true(error, .not. solved, 'first block not positive definite')
   end subroutine test_blocks
 
@@ -278,8 +278,9 @@ contains
       sliding = pack(contact, contact <= 100 .and. [(all(stuck /= contact(a)), a=1, size(contact))])
       n = size(contact)
       s = size(stuck)
-      call factors%factorize(flexibility, unit, shear, direct_options_t(), contact, stuck, stuck <= last_sure, sliding, &
-                             across(:, sliding), spring(sliding), done, error)
+      call factors%factorize(flexibility, unit, shear, direct_options_t(), &
+                             factored_area_t(contact, stuck, stuck <= last_sure, sliding, across(:, sliding), spring(sliding)), &
+                             done, error)
       if (allocated(error)) return
       call check_true(error, done, what//': positive definite')
       if (allocated(error)) return

@@ -16,6 +16,7 @@ module test_friction
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_active_set, only: active_set_t, new_active_set
+  use hc_linear_system, only: constraints_t, iteration_t
   use hc_projected_cg, only: projected_cg
   use hc_elastic_operators, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
@@ -488,11 +489,12 @@ contains
     type(operators_t), target :: operators
     type(shear_system_t), target :: system
     type(elastic_pair_t) :: pair
-    real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :), m_none(:, :)
+    real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:)
     logical, allocatable :: active(:)
     type(active_set_t) :: nodes
-    real(wp) :: no_multiplier(0), residual
-    integer :: level, side, n, iterations, outcome
+    type(constraints_t) :: none
+    type(iteration_t) :: iteration
+    integer :: level, side, n
 
     pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp)
     do level = 1, 2
@@ -502,8 +504,8 @@ contains
       if (allocated(error)) return
       call new_operators(operators, lattice, pair, field_space_t(), error)
       if (allocated(error)) return
-      if (allocated(x)) deallocate (x, y, unknown, image, none, m_none)
-      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0), m_none(2*n, 0))
+      if (allocated(x)) deallocate (x, y, unknown, image, none%columns, none%mb)
+      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n))
       call lattice%coordinates(x, y)
       call new_shear_system(system, operators)
       ! compliances from nothing to that of the whole contact, as they grow across a slip zone
@@ -516,10 +518,11 @@ contains
       rhs = merge(1.0_wp, 0.0_wp, active)
       call new_active_set(nodes, active, system%space)
       call nodes%pair(2*n)
-      call projected_cg(system, nodes, none(:nodes%n_active, :), m_none(:nodes%n_active, :), rhs, unknown, &
-                        image, 1.0e-6_wp, 100, no_multiplier, residual, iterations, outcome, error)
+      allocate (none%columns(nodes%n_active, 0), none%mb(nodes%n_active, 0))
+      iteration = iteration_t(tolerance=1.0e-6_wp, most=100)
+      call projected_cg(system, nodes, none, rhs, unknown, image, iteration, error)
       if (allocated(error)) return
-      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 9, 'iterations')
+      call check_true(error, iteration%residual <= 1.0e-6_wp .and. iteration%made <= 9, 'iterations')
       if (allocated(error)) return
     end do
   end subroutine test_slip_preconditioner

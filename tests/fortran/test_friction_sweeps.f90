@@ -4,8 +4,8 @@ module test_friction_sweeps
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    along_x, along_y, slip
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, force_control, &
+    displacement_control, along_x, along_y, slip
   use hc_contact_residuals, only: tangential_compliances
   use hc_contact_problem, only: near_reach
   use hc_coulomb, only: coulomb_t
@@ -52,7 +52,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
     type(operators_t) :: operators
-    type(contact_state_t) :: state
+    type(contact_state_t), target :: state
     type(friction_iterate_t) :: now
     real(wp) :: before
     integer :: sweep
@@ -64,8 +64,9 @@ contains
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
-    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
-                   load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    call now%set_start(contact%problem, operators, state, &
+                       load_step_t(load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), &
+                                   state%relative_displacement, 1.0e-9_wp), error)
     if (allocated(error)) return
     before = huge(1.0_wp)
     do sweep = 1, len(order)
@@ -134,7 +135,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t), target :: contact
     type(operators_t), target :: operators
-    type(contact_state_t) :: state
+    type(contact_state_t), target :: state
     type(friction_iterate_t) :: now
     real(wp) :: residual
     integer :: sweep
@@ -144,8 +145,9 @@ contains
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
-    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
-                       load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    call now%set_start(contact%problem, operators, state, &
+                       load_step_t(load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), &
+                                   state%relative_displacement, 1.0e-9_wp), error)
     if (allocated(error)) return
     do sweep = 1, 6
       if (sweep == 4) contact%problem%options%newton%displacement_rounding = 0.0_wp
@@ -163,7 +165,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
     type(operators_t) :: operators
-    type(contact_state_t) :: state
+    type(contact_state_t), target :: state
     type(friction_iterate_t) :: now
     real(wp), parameter :: approach = 0.3_wp
 
@@ -172,8 +174,9 @@ contains
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
-    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
-                       load_target_t([d, f, f, f], [approach, 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    call now%set_start(contact%problem, operators, state, &
+                       load_step_t(load_target_t([d, f, f, f], [approach, 0.0_wp, 0.0_wp, 0.0_wp]), &
+                                   state%relative_displacement, 1.0e-9_wp), error)
     if (allocated(error)) return
     associate (overlap => reshape(contact%problem%initial_gap < approach, [size(now%p)]))
       call check_true(error, any(overlap) .and. .not. all(overlap), 'the bodies overlap somewhere')
@@ -189,7 +192,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t), target :: contact
     type(operators_t), target :: operators
-    type(contact_state_t) :: start, solution
+    type(contact_state_t), target :: start
+    type(contact_state_t) :: solution
     type(friction_iterate_t), target :: now
     type(load_target_t) :: target
     real(wp), allocatable :: q(:)
@@ -206,7 +210,7 @@ contains
     end do
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
-    call now%set_start(contact%problem, operators, start, start%relative_displacement, target, 1.0e-8_wp, error)
+    call now%set_start(contact%problem, operators, start, load_step_t(target, start%relative_displacement, 1.0e-8_wp), error)
     if (allocated(error)) return
     call staggered_sweep(now, error)
     if (allocated(error)) return
@@ -261,8 +265,8 @@ contains
       reference = start%relative_displacement
       reference(at(1), at(2), 1) = contact%problem%tangential_compliance
       now = fresh
-      call now%set_start(contact%problem, operators, start, reference, &
-                         load_target_t([f, d, d, d], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+      call now%set_start(contact%problem, operators, start, &
+                       load_step_t(load_target_t([f, d, d, d], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), reference, 1.0e-9_wp), error)
       if (allocated(error)) return
       now%first = .false.
       call relax_fronts(now)

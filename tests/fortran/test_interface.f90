@@ -8,6 +8,8 @@ module test_interface
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, normal, &
     along_x
   use hc_coulomb, only: coulomb_t
+  use hc_normal_law, only: tangent_t
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
@@ -47,6 +49,7 @@ contains
       new_test('direct_as_fft', test_direct), &
       new_test('rigid_flat', test_flat), &
       new_test('nodal_springs', test_nodal_springs), &
+      new_test('springs_of_a_window', test_window), &
       new_test('soft_layer', test_soft), &
       new_test('first_order', test_first_order), &
       new_test('stiff_layer', test_stiff), &
@@ -187,7 +190,8 @@ contains
     call check_true(error, law%is_compliant(), 'springs')
     if (allocated(error)) return
     ! of the nodes 3 to 5
-    call law%linearize(3, 1.0_wp, 5.0_wp, [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, compliance, offset)
+    call law%linearize(3, tangent_t(1.0_wp, 5.0_wp), [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, &
+                       compliance, offset)
     call check(error, [compliance, offset], [2.0_wp, 0.0_wp, 5.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'compliances and offsets')
     if (allocated(error)) return
     ! C p + min(d_n p, g) with d_n = 0.5: 2 - 2; 3*2 + min(1, -4) = 2; the last node is no candidate
@@ -199,6 +203,43 @@ contains
     call law%violation(1, 0.5_wp, [0.0_wp], [1.0_wp], [.true.], worst)
     call check(error, worst, 5.0_wp, 0.0_wp, 'a smaller violation than before')
   end subroutine test_nodal_springs
+
+  !> A window is linearised row by row, with friction and without: each node has its own spring, and none off the contact. Where the
+  !> law calls for no node, the nearest of those that may touch are in contact.
+  subroutine test_window(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n(2) = [3, 2]
+    real(wp), parameter :: gap(3, 2) = reshape([3.0_wp, 1.0_wp, 2.0_wp, 4.0_wp, 2.0_wp, 5.0_wp], n)
+    logical, parameter :: candidate(3, 2) = reshape([.true., .false., .true., .true., .true., .true.], n)
+    type(nodal_springs_t) :: law
+    type(lattice_t) :: lattice
+    type(normal_problem_t) :: alone
+    type(friction_problem_t) :: sheared
+    real(wp), dimension(3, 2) :: p, compliance, offset
+    logical :: contact(3, 2)
+    integer :: i
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], n, error)
+    if (allocated(error)) return
+    law%spring = [(1.0_wp*i, i=1, 6)]
+    call new_normal_problem(alone, lattice, pair, gap, candidate, error, law)
+    if (allocated(error)) return
+    call new_friction_problem(sheared, lattice, pair, gap, candidate, coulomb_t(0.3_wp), .false., error, law)
+    if (allocated(error)) return
+    p = 0.0_wp
+    call alone%find_contact(0, p, gap, candidate, contact)
+    call check_true(error, all(contact .eqv. reshape([.false., .false., .true., .false., .true., .false.], n)), 'nearest nodes')
+    if (allocated(error)) return
+    p = 1.0e6_wp
+    call sheared%find_contact(6, p, gap, candidate, contact)
+    call check_true(error, all(contact .eqv. candidate), 'nodes under pressure')
+    if (allocated(error)) return
+    call sheared%linearize(sheared%normal_classification_parameter(5), p, gap, contact, compliance, offset)
+    call check(error, [compliance], [1.0_wp, 0.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp], 0.0_wp, 'springs with friction')
+    if (allocated(error)) return
+    call alone%linearize(alone%normal_classification_parameter(5), p, gap, contact, compliance, offset)
+    call check(error, [compliance], [1.0_wp, 0.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp], 0.0_wp, 'springs without friction')
+  end subroutine test_window
 
   !> A stiff layer adds (m/(m+1)) (p0/c)^(1/m) to the approach of a sphere, to the first order: the rest falls faster.
   subroutine test_first_order(error)

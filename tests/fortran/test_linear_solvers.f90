@@ -7,8 +7,9 @@ module test_linear_solvers
   use hc_projected_cg, only: freeing_cg => projected_cg
   use hc_projected_gmres, only: freeing_gmres => projected_gmres
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: linear_system_t, precondition_packed_constraints => precondition_constraints, &
-    satisfy_constraints, step_ahead, solution_accurate, iterations_used_up, solution_broke_off
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, &
+    precondition_packed_constraints => precondition_constraints, step_ahead, solution_accurate, iterations_used_up, &
+    solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none
   private
@@ -86,15 +87,22 @@ contains
     integer, intent(out) :: iterations, outcome
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out), optional :: drift
-    real(wp), allocatable :: b(:, :), m_b(:, :), right(:)
+    real(wp), allocatable :: right(:)
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
     type(active_set_t) :: nodes
 
     call new_active_set(nodes, active, system%space)
-    call pack_columns(nodes, constraint, b)
-    call pack_columns(nodes, mb, m_b)
+    call pack_columns(nodes, constraint, constraints%columns)
+    call pack_columns(nodes, mb, constraints%mb)
     allocate (right, source=rhs)
-    call freeing_cg(system, nodes, b, m_b, right, x, ax, tolerance, max_iterations, multiplier, residual, iterations, &
-                    outcome, error, drift)
+    iteration = iteration_t(tolerance=tolerance, most=max_iterations)
+    call freeing_cg(system, nodes, constraints, right, x, ax, iteration, error)
+    multiplier = constraints%multiplier
+    residual = iteration%residual
+    iterations = iteration%made
+    outcome = iteration%outcome
+    if (present(drift)) drift = iteration%drift
   end subroutine projected_cg
 
   !> M B over all nodes, zero off the active ones.
@@ -149,20 +157,27 @@ contains
     real(wp), intent(out), optional :: drift
     !> Directions that are stored; absent: all of them
     integer, intent(in), optional :: max_directions
-    real(wp), allocatable :: b(:, :), m_b(:, :), c(:, :), right(:)
+    real(wp), allocatable :: right(:)
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
     type(active_set_t) :: nodes
-    integer :: most
-
-    most = max_iterations
-    if (present(max_directions)) most = max_directions
 
     call new_active_set(nodes, active, system%space)
-    call pack_columns(nodes, columns, b)
-    call pack_columns(nodes, mb, m_b)
-    call pack_columns(nodes, rows, c)
+    call pack_columns(nodes, columns, constraints%columns)
+    call pack_columns(nodes, mb, constraints%mb)
+    call pack_columns(nodes, rows, constraints%rows)
+    constraints%multiplier = multiplier
     allocate (right, source=rhs)
-    call freeing_gmres(system, nodes, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, most, multiplier, &
-                       independent, residual, iterations, outcome, error, drift)
+    iteration = iteration_t(tolerance=tolerance, most=max_iterations, most_directions=max_iterations)
+    if (present(max_directions)) iteration%most_directions = max_directions
+    iteration%weight = weight
+    call freeing_gmres(system, nodes, constraints, right, x, ax, iteration, error)
+    multiplier = constraints%multiplier
+    independent = iteration%independent
+    residual = iteration%residual
+    iterations = iteration%made
+    outcome = iteration%outcome
+    if (present(drift)) drift = iteration%drift
   end subroutine projected_gmres
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
@@ -391,6 +406,7 @@ contains
   subroutine test_three_constraints(error)
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
+    type(constraints_t) :: constraints
     real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
     real(wp), allocatable :: mb(:, :)
     real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
@@ -411,7 +427,9 @@ contains
     call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
     if (allocated(error)) return
     x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
-    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
+    constraints%columns = constraint
+    constraints%mb = mb
+    call constraints%satisfy(field_space_t(), wanted, x, independent)
     call check_true(error, independent, 'independent constraints')
     if (allocated(error)) return
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
@@ -431,7 +449,9 @@ contains
     call precondition_constraints(system, active, constraint, mb, error)
     if (allocated(error)) return
     ax = x
-    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
+    constraints%columns = constraint
+    constraints%mb = mb
+    call constraints%satisfy(field_space_t(), wanted, x, independent)
     call check_true(error, .not. independent, 'constraints that depend on each other')
     if (allocated(error)) return
     call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
@@ -442,8 +462,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
     type(active_set_t) :: nodes
-    real(wp) :: x(5), before(5), ax(5), r(5), z(5), columns(5, 1), rows(5, 1), multiplier(1)
-    real(wp), allocatable :: mb(:, :), b(:, :), m_b(:, :), c(:, :)
+    real(wp) :: x(5), before(5), ax(5), r(5), z(5), columns(5, 1), rows(5, 1)
+    real(wp), allocatable :: mb(:, :)
+    type(constraints_t) :: constraints
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], length = 0.6_wp
     logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
     integer :: i
@@ -454,7 +475,7 @@ contains
     end do
     columns(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
     rows(:, 1) = [1.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
-    multiplier = 0.5_wp
+    allocate (constraints%multiplier(1), source=0.5_wp)
     call precondition_constraints(system, active, columns, mb, error)
     if (allocated(error)) return
     x = [1.0_wp, 0.0_wp, 2.0_wp, -1.0_wp, 3.0_wp]
@@ -462,10 +483,10 @@ contains
     x(3) = 2.1_wp
     before = x
     call new_active_set(nodes, active, system%space)
-    call pack_columns(nodes, columns, b)
-    call pack_columns(nodes, mb, m_b)
-    call pack_columns(nodes, rows, c)
-    call step_ahead(system, nodes, b, m_b, c, rhs, ax, multiplier, length, x, error)
+    call pack_columns(nodes, columns, constraints%columns)
+    call pack_columns(nodes, mb, constraints%mb)
+    call pack_columns(nodes, rows, constraints%rows)
+    call step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
     if (allocated(error)) return
     r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)
     z = r/[(1.0_wp + i, i=1, 5)]
@@ -475,7 +496,8 @@ contains
     call check(error, dot_product(rows(:, 1), x), dot_product(rows(:, 1), before), 1.0e-13_wp, 'constraint')
     if (allocated(error)) return
     before = x
-    call step_ahead(system, nodes, b, m_b, 0.0_wp*c, rhs, ax, multiplier, length, x, error)
+    constraints%rows = 0.0_wp*constraints%rows
+    call step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
     if (allocated(error)) return
     call check(error, x, before, 0.0_wp, 'no step where constraints depend on each other')
   end subroutine test_step_ahead

@@ -93,7 +93,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(short_sighted_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -418,7 +418,7 @@ contains
   subroutine record_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(recorder_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -635,7 +635,7 @@ contains
   subroutine accurate_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(demanding_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps

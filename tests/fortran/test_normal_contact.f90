@@ -19,7 +19,7 @@ module test_normal_contact
   use hc_options, only: preconditioner_options_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
-  use hc_normal_rows, only: classify_row, residual_row, sum_row, projected_row, direction_row
+  use hc_normal_rows, only: limits_t, classification_t, classify_row, residual_row, sum_row, projected_row, direction_row
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use test_flexibility, only: undone
   use testing, only: test_t, new_test, check, check_true, largest
@@ -58,26 +58,19 @@ contains
     logical, parameter :: candidate(5) = [.true., .true., .true., .false., .true.]
     logical, parameter :: active(5) = [.true., .true., .false., .false., .false.]
     real(sp), parameter :: z(5) = [1.0_sp, -8.0_sp, 4.0_sp, 2.0_sp, 1.0_sp], punch(5) = [2.0_sp, 1.0_sp, 0.0_sp, 0.0_sp, 0.0_sp]
-    real(wp) :: h(5), p_max, worst, worst_active, total, product
+    real(wp) :: h(5), total, product
     real(sp) :: r(5), d(5)
-    integer :: n_next, n_changed
-    logical :: next(5), finite
+    type(classification_t) :: found
+    logical :: next(5)
 
     h = [0.5_wp, 1.0_wp, 0.25_wp, ieee_value(1.0_wp, ieee_positive_inf), 1.25_wp]
-    p_max = 0.0_wp
-    worst = 0.0_wp
-    worst_active = 0.0_wp
-    n_next = 0
-    n_changed = 0
-    finite = .true.
     ! gaps of -0.5, 0.5, -1, infinite, -0.25 under an approach of 1.5
-    call classify_row(5, 2.0_wp, 4.0_wp, 1.5_wp, h, p, w, candidate, active, next, p_max, worst, worst_active, n_next, n_changed, &
-                      finite)
+    call classify_row(limits_t(2.0_wp, 4.0_wp, 1.5_wp), h, p, w, candidate, active, next, found)
     call check_true(error, all(next .eqv. [.true., .false., .true., .false., .true.]), 'set')
     if (allocated(error)) return
-    call check_true(error, n_next == 3 .and. n_changed == 3 .and. finite, 'numbers of nodes')
+    call check_true(error, found%n_next == 3 .and. found%n_changed == 3 .and. found%finite, 'numbers of nodes')
     if (allocated(error)) return
-    call check(error, [p_max, worst, worst_active], [2.0_wp, 4.0_wp, 0.5_wp], 0.0_wp, 'pressure and residuals')
+    call check(error, [found%p_max, found%worst, found%worst_active], [2.0_wp, 4.0_wp, 0.5_wp], 0.0_wp, 'pressure and residuals')
     if (allocated(error)) return
 
     r = 7.0_sp
@@ -92,22 +85,23 @@ contains
     call check(error, real(d, wp), [2.0_wp, -7.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'direction')
     if (allocated(error)) return
 
-    call projected_row(5, 0.5_wp, p, active, d, total)
+    call projected_row(0.5_wp, p, active, d, total)
     call check(error, [real(d, wp), total], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.0_wp], 0.0_wp, 'no step')
     if (allocated(error)) return
-    call projected_row(5, 0.5_wp, p, active, d, total, 0.5_wp, z)
+    call projected_row(0.5_wp, p, active, d, total, [0.5_wp, 0.0_wp], z)
     call check(error, [real(d, wp), total], [0.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 4.5_wp], 0.0_wp, 'step')
     if (allocated(error)) return
-    call projected_row(5, 0.5_wp, p, active, d, total, 0.5_wp, z, -1.0_wp, punch)
+    call projected_row(0.5_wp, p, active, d, total, [0.5_wp, -0.5_wp], z, punch)
     call check(error, [real(d, wp), total], [1.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.5_wp], 0.0_wp, 'step by load')
   end subroutine test_rows
 
   !> A pressure or closing that is not finite is found, on any node; a build that traps such numbers stops before.
   subroutine test_rows_not_finite(error)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: p(3), w(3), odd(2), p_max, worst, worst_active
-    integer :: i, n_next, n_changed
-    logical :: next(3), finite
+    real(wp) :: p(3), w(3), odd(2)
+    type(classification_t) :: found
+    integer :: i
+    logical :: next(3)
 
     if (debug_checks) return
     odd = [ieee_value(1.0_wp, ieee_quiet_nan), ieee_value(1.0_wp, ieee_positive_inf)]
@@ -116,15 +110,9 @@ contains
       w = 0.0_wp
       if (i < 2) p(2) = odd(1 + modulo(i, 2))
       if (i >= 2) w(3) = odd(1 + modulo(i, 2))
-      finite = .true.
-      n_next = 0
-      n_changed = 0
-      p_max = 0.0_wp
-      worst = 0.0_wp
-      worst_active = 0.0_wp
-      call classify_row(3, 1.0_wp, 1.0_wp, 0.5_wp, [0.0_wp, 0.0_wp, 0.0_wp], p, w, [.true., .true., .false.], &
-                        [.true., .true., .false.], next, p_max, worst, worst_active, n_next, n_changed, finite)
-      call check_true(error, .not. finite, 'not finite')
+      call classify_row(limits_t(1.0_wp, 1.0_wp, 0.5_wp), [0.0_wp, 0.0_wp, 0.0_wp], p, w, [.true., .true., .false.], &
+                        [.true., .true., .false.], next, found)
+      call check_true(error, .not. found%finite, 'not finite')
       if (allocated(error)) return
     end do
   end subroutine test_rows_not_finite

@@ -12,7 +12,7 @@ module test_preconditioner
   use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_preconditioner, only: preconditioner_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_coulomb, only: coulomb_t
   use hc_elastic_operators, only: operators_t, new_operators
@@ -21,6 +21,7 @@ module test_preconditioner
   use hc_lattice_solver, only: solve_on_lattice
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_problem, only: new_normal_problem
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_pressure_kernel, only: normal_kernel_t
   use test_friction, only: new_sphere, precondition_shear
@@ -272,7 +273,8 @@ contains
     type(operators_t) :: usual, other
     type(dense_flexibility_t), allocatable :: dense
     type(diagonal_preconditioner_t), allocatable :: diagonal
-    type(contact_state_t) :: start, again, expected, found
+    type(contact_state_t), target :: start
+    type(contact_state_t) :: again, expected, found
     type(load_target_t) :: target
 
     call new_sphere(contact, 10, 0.2_wp, beta, coulomb_t(mu), error, n_threads=1)
@@ -293,9 +295,10 @@ contains
       target = load_target_t(spread(force_control, 1, 4), [1.0_wp, 0.15_wp*mu, 0.1_wp*mu, 0.05_wp*mu])
       call new_friction_state(start, problem%lattice)
       again = start
-      call solve_on_lattice(problem, usual, start, start%relative_displacement, target, 1.0e-10_wp, 60, expected, error)
+      call solve_on_lattice(problem, usual, start, load_step_t(target, start%relative_displacement, 1.0e-10_wp, 60), &
+                            expected, error)
       if (allocated(error)) return
-      call solve_on_lattice(problem, other, again, start%relative_displacement, target, 1.0e-10_wp, 60, found, error)
+      call solve_on_lattice(problem, other, again, load_step_t(target, start%relative_displacement, 1.0e-10_wp, 60), found, error)
       if (allocated(error)) return
     end associate
     call check_true(error, expected%converged .and. found%converged, 'both converge')
@@ -324,11 +327,10 @@ contains
     call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.0_wp), error, n_threads=1)
     if (allocated(error)) return
     do k = 1, 2
-      level(k)%lattice = contact%problem%lattice
-      level(k)%initial_gap = contact%problem%initial_gap
-      level(k)%candidate = contact%problem%candidate
-      allocate (level(k)%law, source=contact%problem%normal_law)
-      level(k)%pair = contact%problem%pair
+      associate (problem => contact%problem)
+        call new_normal_problem(level(k), problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+      end associate
+      if (allocated(error)) return
       call level(k)%prepare(kernel, .true., .true., field_space_t(), error)
       if (allocated(error)) return
       if (k == 2) then
@@ -340,7 +342,7 @@ contains
       end if
       allocate (state(k)%pressure, mold=level(k)%initial_gap)
       state(k)%pressure = merge(1.0_wp, 0.0_wp, level(k)%candidate)
-      call solve_on_normal_lattice(level(k), now(k), force_control, 1.0_wp, 1.0e-10_wp, 400, state(k), error)
+      call solve_on_normal_lattice(level(k), now(k), load_target_t([force_control], [1.0_wp]), 1.0e-10_wp, 400, state(k), error)
       if (allocated(error)) return
       call check_true(error, state(k)%converged, 'converged')
       if (allocated(error)) return

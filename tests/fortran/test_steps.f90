@@ -19,8 +19,8 @@ module test_steps
   use hc_contact_residuals, only: normal_self_compliance
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_wear_ahead, only: energy_ahead, worn_cycle_t
-  use hc_normal_law, only: unilateral_t
   use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by, wear_left
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring, turning_error
@@ -566,6 +566,7 @@ contains
     real(wp), dimension(n, n) :: energy, path, pressure, gap, friction, ahead
     logical :: carries(n, n)
     type(lattice_t) :: lattice
+    type(normal_problem_t) :: problem
     integer :: k
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [n, n], error)
@@ -577,9 +578,10 @@ contains
     pressure = merge(1.0_wp + 0.1_wp*reshape([(mod(5*k, 13), k=1, n*n)], [n, n]), 0.0_wp, carries)
     energy = friction*pressure*path
     gap = merge(0.0_wp, 10.0_wp, carries)
-    call energy_ahead(worn_cycle_t(energy, path, pressure, gap, carries, friction, .true.), lattice, &
-                      elastic_pair_t(1.0e-5_wp, 0.0_wp, 0.0_wp), unilateral_t(), 0.01_wp, 100.0_wp, 1.0e-9_wp, ahead, error, &
-                      field_space_t())
+    call new_normal_problem(problem, lattice, elastic_pair_t(1.0e-5_wp, 0.0_wp, 0.0_wp), gap, carries, error)
+    if (allocated(error)) return
+    call energy_ahead(worn_cycle_t(energy, path, pressure, gap, carries, friction, .true.), problem, 0.01_wp*100.0_wp, 1.0e-9_wp, &
+                      ahead, error)
     if (allocated(error)) return
     ! the load stays: p = P/(A path) over the mean of 1/path
     pressure = merge(sum(pressure)/sum(1.0_wp/path, mask=carries)/path, 0.0_wp, carries)

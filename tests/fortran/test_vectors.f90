@@ -6,7 +6,7 @@ module test_vectors
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_coulomb, only: coulomb_t
-  use hc_disc_law, only: cone_row, residual_row, zone_row
+  use hc_disc_law, only: cone_row
   use hc_frame_rows, only: slip_compliance_row, turn_row, plane_row, add_springs_row, take_off_row
   use hc_contact_residuals, only: normal_residual
   use hc_contact_state, only: separated, stick, slip
@@ -365,6 +365,7 @@ contains
     integer, parameter :: n = 301
     type(coulomb_t), parameter :: no_slip = coulomb_t(no_slip=.true.)
     real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp, compliance = 3.0e-13_wp
+    type(coulomb_t), parameter :: law = coulomb_t(mu)
     real(wp), dimension(n) :: p, qx, qy, dsx, dsy, cut_x, cut_y
     integer :: zone(n), expected, i
     real(wp) :: unit, largest, worst, q(2), ds(2), cut(2), lack
@@ -377,9 +378,9 @@ contains
     unit = 1.0_wp/maxval(p)
     largest = 0.0_wp
     worst = 0.0_wp
-    call zone_row(n, unit, mu, r, p, qx, qy, dsx, dsy, zone)
+    call law%find_zones(1, unit, r, p, qx, qy, dsx, dsy, zone)
     call cone_row(n, unit, mu, p, qx, qy, cut_x, cut_y)
-    call residual_row(n, unit, mu, 1.0_wp/compliance, p, qx, qy, dsx, dsy, largest, worst)
+    call law%violation(1, unit, 1.0_wp/compliance, p, qx, qy, dsx, dsy, largest, worst)
     lack = 0.0_wp
     do i = 1, n
       q = [qx(i), qy(i)]

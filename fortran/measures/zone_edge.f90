@@ -45,7 +45,7 @@ module hc_zone_edge
     !> Number of points and of triangles
     integer :: n_point = 0, n_triangle = 0
   contains
-    procedure, private :: add_point, add_polygon, add_star
+    procedure, private :: add_point, add_polygon, add_star, trim
   end type zone_mesh_t
 
 contains
@@ -374,9 +374,7 @@ contains
                 part = 0.5_wp  ! the edge of the cells
                 value = field(node(1), node(2))
                 if (touches) then
-                  associate (one => distance(band%place(node(1), node(2))), other => distance(band%place(beyond(1), beyond(2))))
-                    part = one/(one - other)
-                  end associate
+                  part = part_inside(distance([band%place(node(1), node(2)), band%place(beyond(1), beyond(2))]))
                   if (vanishes) then
                     value = 0.0_wp
                   else if (padded(node(1) - link(1), node(2) - link(2)) /= 0) then
@@ -397,10 +395,23 @@ contains
         end do
       end do
     end do
+    call mesh%trim()
+  end function mesh_of_zone
+
+  !> Return the part of a link that is inside, from the distances of the node inside and the one beyond.
+  pure real(wp) function part_inside(distance)
+    !> Distances from the edge, positive inside
+    real(wp), intent(in) :: distance(2)
+    part_inside = distance(1)/(distance(1) - distance(2))
+  end function part_inside
+
+  !> Free the room for points and triangles that were not needed.
+  pure subroutine trim(mesh)
+    class(zone_mesh_t), intent(inout) :: mesh
     mesh%points = mesh%points(:, :mesh%n_point)
     mesh%values = mesh%values(:mesh%n_point)
     mesh%triangles = mesh%triangles(:, :mesh%n_triangle)
-  end function mesh_of_zone
+  end subroutine trim
 
   !> Add a point to a mesh.
   pure subroutine add_point(mesh, point, value, number)

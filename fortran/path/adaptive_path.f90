@@ -23,13 +23,15 @@
 module hc_adaptive_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached
+  use hc_lattice, only: lattice_t
+  use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_edges, only: contact_edges_t
   use hc_zone_edge, only: zone_edge_t
   use hc_load_path, only: advance, join_steps, step_settings_t
   use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, outgrown, rejected
+  use hc_window_growth, only: extend_state, grown_window
   use hc_step_error, only: compare_halves, edges_of, shear_free, step_change_t
   implicit none
   private
@@ -66,6 +68,8 @@ module hc_adaptive_path
     integer :: verdict = rejected
     !> Part of the segment where the last solution ends
     real(wp) :: reached = 0.0_wp
+    !> Window that an outgrown attempt needs
+    type(lattice_t) :: larger
     !> What the halves of the last load step changed
     type(step_change_t) :: change
     !> Bounds on the errors by the size of all load steps: of the stick area [m^2], of the shear tractions over what friction
@@ -103,6 +107,8 @@ module hc_adaptive_path
     procedure :: initialize
     !> Advance by one load step
     procedure :: advance => advance_path
+    !> Go on with the solver of a larger window
+    procedure :: carry
     procedure, private :: target_at
   end type adaptive_path_t
 
@@ -265,7 +271,10 @@ contains
     if (.not. solved) return
     self%sweeps = self%sweeps + next%sweeps
     self%operator_applications = self%operator_applications + next%operator_applications
-    if (self%grows .and. next%clipped) self%verdict = outgrown
+    if (self%grows .and. next%clipped) then
+      self%verdict = outgrown
+      self%larger = grown_window(solver%problem%lattice, next%zone /= separated)
+    end if
     solved = next%converged .and. self%verdict /= outgrown
   end subroutine solve_part
 
@@ -313,7 +322,7 @@ contains
     type(step_settings_t), intent(in) :: settings
     !> Allocated on failure. No failure: `state` is not converged, and says why, if the smallest step does not converge or
     !> the contact reaches the rim of a window that does not grow; the path ends there. If one that grows is too small
-    !> the verdict is `outgrown`, and `state` that before the step, which goes on with the solver of a larger one.
+    !> the verdict is `outgrown`, and `state` that before the step, which goes on after `carry` to the window `larger`.
     type(error_t), allocatable, intent(out) :: error
     !> Largest load step, as a part of the segment
     real(wp), intent(in), optional :: largest
@@ -352,6 +361,26 @@ contains
     if (associated(after%whole)) allocate (self%whole, source=after%whole)
     call after%free()
   end subroutine advance_path
+
+  !> Go on with the solver of a larger window, at the present attempt.
+  subroutine carry(self, solver, lattice, error)
+    class(adaptive_path_t), intent(inout) :: self
+    !> Method on the larger window
+    class(friction_solver_t), intent(inout) :: solver
+    !> The smaller window
+    type(lattice_t), intent(in) :: lattice
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: extended
+
+    if (allocated(self%whole)) then
+      call extend_state(solver, lattice, self%whole, extended, error)
+      if (allocated(error)) return
+      self%whole = extended
+    end if
+    call extend_state(solver, lattice, self%state, extended, error)
+    if (.not. allocated(error)) self%state = extended
+  end subroutine carry
 
   !> Return the target at a part of the segment.
   pure type(load_target_t) function target_at(self, target, fraction) result(goal)

@@ -8,11 +8,11 @@ module test_steps
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_coulomb, only: coulomb_t
   use hc_field_space, only: field_space_t
-  use hc_frictional_contact, only: frictional_contact_t
+  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_load_path, only: advance, step_settings_t
   use hc_options, only: step_options_t
   use hc_step_error, only: compare_halves, shear_free, step_change_t
-  use hc_step_control, only: accepted, failed, limited, rejected, step_attempt_t, step_control_t
+  use hc_step_control, only: accepted, failed, limited, outgrown, rejected, step_attempt_t, step_control_t
   use hc_adaptive_path, only: adaptive_path_t
   use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
@@ -48,6 +48,7 @@ contains
       new_test('halving', test_halving), &
       new_test('path', test_path), &
       new_test('path_to_the_rim', test_rim), &
+      new_test('path_on_a_growing_window', test_growing), &
       new_test('nodal_residuals', test_nodal_residuals), &
       new_test('energy', test_energy), &
       new_test('limits_of_error', test_limits), &
@@ -419,6 +420,83 @@ contains
     if (allocated(error)) return
     call check_true(error, path%state%clipped .or. path%state%stopped == rim_reached, 'contact at the rim')
   end subroutine test_rim
+
+  !> A path on a window that grows is that on a large window: its steps, its tractions and the slip of all its nodes.
+  subroutine test_growing(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact, large
+    type(adaptive_path_t) :: path, reference
+    type(contact_state_t) :: state
+    type(lattice_t) :: small
+    type(load_target_t) :: target
+    integer :: n_grown, low(2), high(2)
+
+    call new_sphere(contact, 8, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    small = contact%problem%lattice
+    small%first = 2*small%first
+    small%extent = 2*small%extent - 1
+    call on_window(contact%problem, small, large, error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call path%initialize(state, 2.0_wp*pi)
+    call new_friction_state(state, small)
+    call reference%initialize(state, 2.0_wp*pi)
+    path%grows = .true.
+    ! so large that the step which needs a larger window is not made smaller there
+    path%tolerance = 10.0_wp
+    reference%tolerance = 10.0_wp
+    n_grown = 0
+    target = load_target_t(value=[load])
+    do
+      call path%advance(contact, target, step_settings_t(max_sweeps=60), error)
+      if (allocated(error)) return
+      if (path%verdict == outgrown) then
+        n_grown = n_grown + 1
+        small = contact%problem%lattice
+        call on_window(contact%problem, path%larger, contact, error)
+        if (.not. allocated(error)) call path%carry(contact, small, error)
+        if (allocated(error)) return
+        cycle
+      end if
+      call reference%advance(large, target, step_settings_t(max_sweeps=60), error)
+      if (allocated(error)) return
+      call check(error, path%fraction, reference%fraction, 1.0e-6_wp, 'end of the step')
+      if (allocated(error)) return
+      if (path%fraction < 1.0_wp) cycle
+      if (target%value(normal) > load) exit
+      ! the first window held the contact so far
+      call check(error, n_grown, 0, 'growth')
+      if (allocated(error)) return
+      target%value(normal) = 6.0_wp*load
+    end do
+    call check_true(error, n_grown > 0 .and. all(path%state%zone(1, :) == separated), 'the window grew')
+    if (allocated(error)) return
+    low = contact%problem%lattice%first - large%problem%lattice%first + 1
+    high = low + contact%problem%lattice%extent - 1
+    associate (whole => reference%state, part => path%state)
+      call check(error, largest(part%traction - whole%traction(low(1):high(1), low(2):high(2), :)), 0.0_wp, 1.0e-6_wp, 'tractions')
+      if (allocated(error)) return
+      call check(error, largest(part%accumulated_slip - whole%accumulated_slip(low(1):high(1), low(2):high(2))), 0.0_wp, &
+                 1.0e-6_wp, 'slip')
+      if (allocated(error)) return
+      call check(error, part%dissipated_energy, whole%dissipated_energy, 1.0e-6_wp, 'energy')
+    end associate
+  end subroutine test_growing
+
+  !> The same sphere on another window.
+  subroutine on_window(problem, lattice, contact, error)
+    type(friction_problem_t), intent(in) :: problem
+    type(lattice_t), intent(in) :: lattice
+    type(frictional_contact_t), intent(inout) :: contact
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: same
+    real(wp) :: x(lattice%extent(1), lattice%extent(2)), y(lattice%extent(1), lattice%extent(2))
+
+    call lattice%coordinates(x, y)
+    call new_friction_problem(same, lattice, problem%pair, 0.5_wp*(x**2 + y**2), x < 100.0_wp, problem%friction, .false., error)
+    if (.not. allocated(error)) call new_frictional_contact(contact, same, error)
+  end subroutine on_window
 
   !> The largest of them are the residuals of the state; away from the contact they are zero.
   subroutine test_nodal_residuals(error)

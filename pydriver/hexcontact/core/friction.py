@@ -345,23 +345,11 @@ class FrictionalContact(Contact):
         lattice
             The smaller window.
         """
-        arrays: dict[str, Any] = {
-            name: lattice.embed(getattr(state, name), self.lattice, 0.0) for name in _FIELDS
-        }
-        loaded = bool(np.any(state.pressure > 0))
-        known = lattice.embed(np.ones(lattice.shape), self.lattice, 0.0).astype(bool)
-        motion = [getattr(state, name) for name in MOTION]
-        if loaded or any(motion):
-            traction = [arrays[name] for name in ("pressure", "traction_x", "traction_y")]
-            closing, s_x, s_y = flat.relative_displacement(self, traction, motion)
-            arrays["gap"] = np.where(known, arrays["gap"], self._gap + closing)
-            arrays["relative_displacement_x"] = np.where(known, arrays["relative_displacement_x"], s_x)
-            arrays["relative_displacement_y"] = np.where(known, arrays["relative_displacement_y"], s_y)
-        else:
-            arrays["gap"] = self._gap.copy()
-        arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
-        zone = lattice.embed(state.zone, self.lattice, 0)
-        return dataclasses.replace(state, **arrays, zone=zone.astype(np.int8), touches_rim=False)
+        start = state.held
+        handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
+        found = self._masked(self._found(ContactState, handle))
+        fields = {name: getattr(found, name) for name in (*_FIELDS, "zone")}
+        return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)
 
 
 def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: Lattice) -> FrictionLaw:

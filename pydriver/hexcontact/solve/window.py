@@ -20,7 +20,6 @@ from ..core.steps import AdaptiveSteps
 from ..errors import DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
-from ..problem.window import grown, rim_sides
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, STATE, names_where
 from .events import Listener
@@ -92,7 +91,7 @@ class Window(ABC, Generic[S]):
             )
         del self._contact  # its memory goes before that of the next comes
         self._bodies.clear()
-        larger = grown(self.lattice, rim_sides(solution.zone > 0))
+        larger = self.lattice.grown(solution.zone > 0)
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return type(self)(self.case, larger, self.steps_held, self.listener)
 

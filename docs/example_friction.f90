@@ -1,7 +1,7 @@
 program press_and_shear
   use hexcontact, only: wp, pi, error_t, material_t, elastic_pair_t, new_elastic_pair, lattice_t, new_lattice, &
     equilateral_basis, coulomb_t, friction_problem_t, new_friction_problem, frictional_contact_t, &
-    new_frictional_contact, contact_state_t, new_friction_state, load_target_t, adaptive_path_t, &
+    new_frictional_contact, contact_state_t, new_friction_state, load_target_t, adaptive_path_t, step_settings_t, &
     contact_edges_t, new_contact_edges, zone_edge_t, stick, normal, along_x
   implicit none
   type(elastic_pair_t) :: pair
@@ -27,12 +27,13 @@ program press_and_shear
   if (allocated(error)) error stop error%message
   call new_friction_state(state, lattice)
   call path%initialize(state, pi*(0.13e-3_wp)**2)       ! the contact will be about that large
+  path%tolerance = 0.05_wp                              ! what a load step may change
   do segment = 1, 2
     target%value(normal) = 15.0_wp                      ! first up to 15 N,
     if (segment == 2) target%value(along_x) = 3.0_wp    ! then up to 3 N along x
     steps = 0
     do
-      call path%advance(contact, target, step_tolerance=0.05_wp, tolerance=1.0e-8_wp, max_sweeps=40, max_cuts=6, error=error)
+      call path%advance(contact, target, step_settings_t(tolerance=1.0e-8_wp), error)
       if (allocated(error)) error stop error%message
       if (.not. path%state%converged) error stop 'no convergence'
       steps = steps + 1

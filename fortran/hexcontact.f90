@@ -44,9 +44,10 @@ module hexcontact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
-  use hc_load_path, only: advance
-  use hc_adaptive_path, only: adaptive_path_t
-  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed
+  use hc_load_path, only: advance, step_settings_t
+  use hc_window_growth, only: grown_window, extend_state
+  use hc_adaptive_path, only: adaptive_path_t, adaptive_steps_t, two_paths_t
+  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown
   use hc_step_error, only: step_change_t, compare_halves
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
   use hc_expected_error, only: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, &

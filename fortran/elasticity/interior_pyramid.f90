@@ -52,6 +52,14 @@ module hc_interior_pyramid
     procedure :: fields
   end type interior_pyramid_t
 
+  !> Points far from the node, for its moment series.
+  type :: far_points_t
+    !> Number of points, highest order of the moments
+    integer :: n = 0, order = 0
+    !> Cosine of the angle from the axis; powers of 1/(2R)^2
+    real(wp) :: c(most_points), inverse(most_points, 0:max_order/2)
+  end type far_points_t
+
 contains
 
   !> Set up creases and moments of the pyramid of a lattice.
@@ -232,16 +240,18 @@ contains
     !> Derivatives
     real(wp), intent(out) :: d(n, n_derivative)
 
-    !> Powers of w; powers of 1/(2R); sums by degree, real and imaginary parts of their factor; derivatives S(degree, order)
-    real(wp) :: power(most_points, 2, 0:max_harmonic), inverse(most_points, 0:max_order/2)
+    !> Powers of w; sums by degree, real and imaginary parts of their factor; derivatives S(degree, order)
+    real(wp) :: power(most_points, 2, 0:max_harmonic)
     real(wp) :: re(most_points, 0:2, 0:3), im(most_points, 0:2, 0:3), radial(most_points, 0:2, 2)
-    real(wp) :: scale(most_points), factor(most_points), c(most_points)
+    real(wp) :: scale(most_points), factor(most_points)
+    type(far_points_t) :: points
     integer :: m, k, p, l, harmonic
     logical :: complex_moments
 
-    inverse(:n, 0) = 1.0_wp
     scale(:n) = 1.0_wp/radius
-    c(:n) = z*scale(:n)
+    points%n = n
+    points%order = order
+    points%c(:n) = z*scale(:n)
     power(:n, 1, 0) = 1.0_wp
     power(:n, 2, 0) = 0.0_wp
     power(:n, 1, 1) = x*scale(:n)
@@ -250,9 +260,10 @@ contains
       power(:n, 1, p) = power(:n, 1, p - 1)*power(:n, 1, 1) - power(:n, 2, p - 1)*power(:n, 2, 1)
       power(:n, 2, p) = power(:n, 1, p - 1)*power(:n, 2, 1) + power(:n, 2, p - 1)*power(:n, 1, 1)
     end do
-    inverse(:n, 1) = 0.25_wp*scale(:n)**2
+    points%inverse(:n, 0) = 1.0_wp
+    points%inverse(:n, 1) = 0.25_wp*scale(:n)**2
     do p = 2, order/2
-      inverse(:n, p) = inverse(:n, p - 1)*inverse(:n, 1)
+      points%inverse(:n, p) = points%inverse(:n, p - 1)*points%inverse(:n, 1)
     end do
 
     re = 0.0_wp
@@ -261,7 +272,7 @@ contains
       do k = merge(0, -order/self%fold*self%fold, m == 0), order, self%fold
         associate (moment => self%moment(abs(k):order:2, k, m))
           complex_moments = any(abs(aimag(moment)) > 1.0e-14_wp*abs(real(moment, wp)))
-          call radial_sums(n, m, k, order, c, inverse, moment, complex_moments, radial)
+          call radial_sums(points, m, k, moment, complex_moments, radial)
         end associate
         harmonic = abs(m + k)
         do l = merge(1, 0, m == 3), 2
@@ -285,6 +296,19 @@ contains
       end do
       factor(:n) = -factor(:n)*scale(:n)
     end do
+    call sum_derivatives(n, z, re, im, d)
+  end subroutine far_potentials
+
+  !> Combine the derivatives S(degree, order) to those of the potentials.
+  pure subroutine sum_derivatives(n, z, re, im, d)
+    !> Number of points
+    integer, intent(in) :: n
+    !> Their depth, in longest edges
+    real(wp), intent(in) :: z(n)
+    !> Real and imaginary parts of S(degree, order)
+    real(wp), intent(in) :: re(most_points, 0:2, 0:3), im(most_points, 0:2, 0:3)
+    !> Derivatives
+    real(wp), intent(out) :: d(n, n_derivative)
 
     d(:, psi) = re(:n, 0, 0)
     d(:, psi_z) = re(:n, 1, 0)
@@ -312,14 +336,14 @@ contains
     d(:, omega_xxy) = 0.5_wp*im(:n, 1, 1) - 2.0_wp*im(:n, 1, 3)
     d(:, omega_xyy) = -2.0_wp*re(:n, 1, 3) - 0.5_wp*re(:n, 1, 1)
     d(:, omega_yyy) = 2.0_wp*im(:n, 1, 3) + 1.5_wp*im(:n, 1, 1)
-  end subroutine far_potentials
+  end subroutine sum_derivatives
 
   !> Sum the moments of one harmonic: moment/(2R)^N H(l + N, |m + k|) over sin^|m + k|, for l = 0, 1, 2.
-  pure subroutine radial_sums(n, m, k, order, c, inverse, moment, complex_moments, radial)
-    !> Number of points, order of the derivative, harmonic of the moments, their highest order
-    integer, intent(in) :: n, m, k, order
-    !> Cosine of the angle from the axis; powers of 1/(2R)^2
-    real(wp), intent(in) :: c(most_points), inverse(most_points, 0:max_order/2)
+  pure subroutine radial_sums(points, m, k, moment, complex_moments, radial)
+    !> The points
+    type(far_points_t), intent(in) :: points
+    !> Order of the derivative, harmonic of the moments
+    integer, intent(in) :: m, k
     !> Moments of the orders |k|, |k| + 2, ...
     complex(wp), intent(in) :: moment(0:)
     !> Have they imaginary parts?
@@ -330,30 +354,32 @@ contains
     real(wp) :: h(most_points), before(most_points), next(most_points)
     integer :: degree, harmonic, l, i, order_now
 
-    harmonic = abs(m + k)
-    radial(:n, :, :) = 0.0_wp
-    ! degrees below the harmonic occur for k >= 0 only
-    do degree = merge(harmonic - min(m, 2), harmonic, k >= 0), order + 2
-      if (degree < harmonic) then
-        if (degree == harmonic - 2 .or. m == 1) before(:n) = first_below(harmonic, c(:n))
-        h(:n) = before(:n)
-        if (degree == harmonic - 2) h(:n) = odd_factorial(harmonic)/(2*harmonic - 1) - c(:n)*before(:n)
-      else if (degree == harmonic) then
-        h(:n) = odd_factorial(harmonic)
-        before(:n) = 0.0_wp
-      else
-        next(:n) = (2*degree - 1)*c(:n)*h(:n) - real((degree - 1 - harmonic)*(degree - 1 + harmonic), wp)*before(:n)
-        before(:n) = h(:n)
-        h(:n) = next(:n)
-      end if
-      do l = 0, 2
-        order_now = degree - l
-        if (order_now < abs(k) .or. order_now > order .or. modulo(order_now, 2) /= 0) cycle
-        i = (order_now - abs(k))/2
-        radial(:n, l, 1) = radial(:n, l, 1) + real(moment(i), wp)*inverse(:n, order_now/2)*h(:n)
-        if (complex_moments) radial(:n, l, 2) = radial(:n, l, 2) + aimag(moment(i))*inverse(:n, order_now/2)*h(:n)
+    associate (n => points%n, order => points%order, c => points%c, inverse => points%inverse)
+      harmonic = abs(m + k)
+      radial(:n, :, :) = 0.0_wp
+      ! degrees below the harmonic occur for k >= 0 only
+      do degree = merge(harmonic - min(m, 2), harmonic, k >= 0), order + 2
+        if (degree < harmonic) then
+          if (degree == harmonic - 2 .or. m == 1) before(:n) = first_below(harmonic, c(:n))
+          h(:n) = before(:n)
+          if (degree == harmonic - 2) h(:n) = odd_factorial(harmonic)/(2*harmonic - 1) - c(:n)*before(:n)
+        else if (degree == harmonic) then
+          h(:n) = odd_factorial(harmonic)
+          before(:n) = 0.0_wp
+        else
+          next(:n) = (2*degree - 1)*c(:n)*h(:n) - real((degree - 1 - harmonic)*(degree - 1 + harmonic), wp)*before(:n)
+          before(:n) = h(:n)
+          h(:n) = next(:n)
+        end if
+        do l = 0, 2
+          order_now = degree - l
+          if (order_now < abs(k) .or. order_now > order .or. modulo(order_now, 2) /= 0) cycle
+          i = (order_now - abs(k))/2
+          radial(:n, l, 1) = radial(:n, l, 1) + real(moment(i), wp)*inverse(:n, order_now/2)*h(:n)
+          if (complex_moments) radial(:n, l, 2) = radial(:n, l, 2) + aimag(moment(i))*inverse(:n, order_now/2)*h(:n)
+        end do
       end do
-    end do
+    end associate
   end subroutine radial_sums
 
   !> Compute H(m - 1, m) over sin^m: all terms are positive.

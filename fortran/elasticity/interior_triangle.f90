@@ -32,11 +32,11 @@ module hc_interior_triangle
 contains
 
   !> Compute displacement times the shear modulus, and stress, by the same linear load in the directions p, q_x, q_y.
-  subroutine triangle_fields(corner, value, x, y, z, poisson_ratio, displacement, stress, error)
+  subroutine triangle_fields(corner, value, points, poisson_ratio, displacement, stress, error)
     !> Vertices as columns [m], and the load there
     real(wp), intent(in) :: corner(2, 3), value(3)
-    !> Points [m]
-    real(wp), intent(in) :: x(:), y(:), z(:)
+    !> Points, x, y and depth (3, n) [m]
+    real(wp), intent(in) :: points(:, :)
     real(wp), intent(in) :: poisson_ratio
     !> Direction x, y, z; load p, q_x, q_y; point
     real(wp), intent(out) :: displacement(:, :, :)
@@ -49,14 +49,14 @@ contains
     integer :: i
 
     call check_triangle(corner, error)
-    if (.not. allocated(error)) call check_interior(x, y, z, poisson_ratio, error)
+    if (.not. allocated(error)) call check_interior(points(1, :), points(2, :), points(3, :), poisson_ratio, error)
     if (allocated(error)) return
     size_of = unit_length(corner)
     near = next_to*longest_edge(corner)
-    !$omp parallel do schedule(dynamic, 16) private(d, u, s) if (size(x) > 64)
-    do i = 1, size(x)
-      d(1, :) = potentials(corner, value, [x(i), y(i), z(i)], near)
-      call displacements(1, d, d, d, [z(i)/size_of], poisson_ratio, u)
+    !$omp parallel do schedule(dynamic, 16) private(d, u, s) if (size(points, 2) > 64)
+    do i = 1, size(points, 2)
+      d(1, :) = potentials(corner, value, points(:, i), near)
+      call displacements(1, d, d, d, [points(3, i)/size_of], poisson_ratio, u)
       call stresses(1, d, d, d, poisson_ratio, s)
       displacement(:, :, i) = size_of*u(1, :, :)
       stress(:, :, i) = s(1, :, :)
@@ -65,13 +65,13 @@ contains
   end subroutine triangle_fields
 
   !> Compute displacement times the shear modulus, and stress, by tractions that are linear on each triangle of a set.
-  subroutine mesh_fields(corner, traction, x, y, z, poisson_ratio, displacement, stress, error)
+  subroutine mesh_fields(corner, traction, points, poisson_ratio, displacement, stress, error)
     !> Vertices (direction, vertex, triangle) [m]
     real(wp), intent(in) :: corner(:, :, :)
     !> Pressure and traction on the body along x and y (component, vertex, triangle) [Pa]
     real(wp), intent(in) :: traction(:, :, :)
-    !> Points [m]
-    real(wp), intent(in) :: x(:), y(:), z(:)
+    !> Points, x, y and depth (3, n) [m]
+    real(wp), intent(in) :: points(:, :)
     real(wp), intent(in) :: poisson_ratio
     !> Displacement times the shear modulus (direction, point) [Pa m], stress (component, point) [Pa]
     real(wp), intent(out) :: displacement(:, :), stress(:, :)
@@ -90,19 +90,19 @@ contains
     if (.not. all(ieee_is_finite(traction))) then
       call raise(error, status%invalid_input, 'the tractions: finite numbers expected')
     else
-      call check_interior(x, y, z, poisson_ratio, error)
+      call check_interior(points(1, :), points(2, :), points(3, :), poisson_ratio, error)
     end if
     if (allocated(error)) return
     displacement = 0.0_wp
     stress = 0.0_wp
-    !$omp parallel do schedule(dynamic, 4) private(d, u, s, t, k, size_of) if (size(x) > 4)
-    do i = 1, size(x)
+    !$omp parallel do schedule(dynamic, 4) private(d, u, s, t, k, size_of) if (size(points, 2) > 4)
+    do i = 1, size(points, 2)
       do t = 1, size(corner, 3)
         size_of = unit_length(corner(:, :, t))
         do k = 1, 3
-          d(1, :, k) = potentials(corner(:, :, t), traction(k, :, t), [x(i), y(i), z(i)], near)
+          d(1, :, k) = potentials(corner(:, :, t), traction(k, :, t), points(:, i), near)
         end do
-        call displacements(1, d(:, :, 1), d(:, :, 2), d(:, :, 3), [z(i)/size_of], poisson_ratio, u)
+        call displacements(1, d(:, :, 1), d(:, :, 2), d(:, :, 3), [points(3, i)/size_of], poisson_ratio, u)
         call stresses(1, d(:, :, 1), d(:, :, 2), d(:, :, 3), poisson_ratio, s)
         displacement(:, i) = displacement(:, i) + size_of*sum(u(1, :, :), dim=2)
         stress(:, i) = stress(:, i) + sum(s(1, :, :), dim=2)

@@ -23,7 +23,7 @@ contains
   !> Displacement and stress at points for a history of load steps.
   !>
   !> The influence of a pyramid on a point is worked out once for all steps.
-  subroutine fields_at_points(lattice, traction, body, poisson_ratio, x, y, depth, displacement, stress, error, space)
+  subroutine fields_at_points(lattice, traction, body, poisson_ratio, points, displacement, stress, error, space)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
@@ -31,8 +31,8 @@ contains
     !> Number of the body, 1 or 2, and its Poisson's ratio
     integer, intent(in) :: body
     real(wp), intent(in) :: poisson_ratio
-    !> Points, and their depths below the surface of the body [m]
-    real(wp), intent(in) :: x(:), y(:), depth(:)
+    !> Points, x, y and depth below the surface of the body (3, n) [m]
+    real(wp), intent(in) :: points(:, :)
     !> Displacement times the shear modulus (direction, point, step) [Pa m]
     real(wp), intent(out) :: displacement(:, :, :)
     !> Stress (component xx, yy, zz, xy, yz, xz; point; step) [Pa]
@@ -51,7 +51,7 @@ contains
 
     call check_lattice(lattice, error)
     if (.not. allocated(error)) call check_body(body, error)
-    if (.not. allocated(error)) call check_interior(x, y, depth, poisson_ratio, error)
+    if (.not. allocated(error)) call check_interior(points(1, :), points(2, :), points(3, :), poisson_ratio, error)
     if (.not. allocated(error)) call loaded_nodes(lattice, traction, body, node, load, error)
     if (allocated(error)) return
     shared = space_over(lattice%extent)
@@ -63,12 +63,12 @@ contains
       return
     end if
 
-    !$omp parallel do num_threads(shared%threads) schedule(dynamic) private(u, s, zeta, step, k, thread) if (size(x) > 1)
-    do i = 1, size(x)
+    !$omp parallel do num_threads(shared%threads) schedule(dynamic) private(u, s, zeta, step, k, thread) if (size(points, 2) > 1)
+    do i = 1, size(points, 2)
       thread = 1
       !$ thread = omp_get_thread_num() + 1
-      call sum_pyramids(pyramid, node, load, [x(i), y(i), depth(i)], sums(:, :, thread))
-      zeta = depth(i)/pyramid%spacing
+      call sum_pyramids(pyramid, node, load, points(:, i), sums(:, :, thread))
+      zeta = points(3, i)/pyramid%spacing
       do step = 1, size(traction, 4)
         k = 3*(step - 1)
         associate (p => reshape(sums(:, k + 1, thread), [1, n_derivative]), &

@@ -35,6 +35,8 @@ module hc_edge_tractions
   type, extends(linear_system_t) :: elastic_part_t
     type(fft_flexibility_t), pointer :: flexibility => null()
     integer, allocatable :: component(:)
+    !> Accuracy and iterations of the solution
+    type(edge_options_t) :: options
   contains
     procedure :: product => elastic_product
   end type elastic_part_t
@@ -99,6 +101,7 @@ contains
     type(traction_field_t) :: edge_shape
     type(edge_residue_t) :: residue
     type(fft_flexibility_t), target :: flexibility
+    type(elastic_part_t) :: system
     real(wp), allocatable :: hats(:, :, :), change(:, :, :), at_nodes(:, :, :)
     integer :: pass, k, n
 
@@ -106,19 +109,22 @@ contains
     n = 1
     if (all(friction > 0.0_wp .and. friction <= huge(1.0_wp))) n = 3
     if (n == 3) then
-      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, friction, options=tuning)
+      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, spread(friction, 3, 1), tuning)
     else
       call new_traction_field(edge_shape, lattice, edges, traction(:, :, 1:1), contact, stick, options=tuning)
     end if
     call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=n == 1, space=space, cache=cache)
     if (allocated(error)) return
+    system%flexibility => flexibility
+    system%space = space
+    system%options = tuning
     allocate (change(lattice%extent(1), lattice%extent(2), n))
     do pass = 1, tuning%passes
       call sample(edge_shape, tuning%samples, n, residue, at_nodes)
       call residue%hats(space, hats, error)
       if (allocated(error)) return
       call residue%take_off(hats)
-      call solve_again(flexibility, pair, tuning, residue, contact, stick, friction, edge_shape, space, hats, change, error)
+      call solve_again(system, pair, residue, contact, edge_shape, hats, change, error)
       if (allocated(error)) return
       if (pass == tuning%passes) exit
       at_nodes = traction(:, :, :n) + change + at_nodes - hats
@@ -168,61 +174,50 @@ contains
   end subroutine sample
 
   !> Compute the change of the nodal tractions that leaves the displacements of the nodes in contact as they are, (I18).
-  subroutine solve_again(flexibility, pair, options, residue, contact, stick, friction, shape_of, space, hats, change, error)
+  subroutine solve_again(system, pair, residue, contact, shape_of, hats, change, error)
     !> Elastic operator
-    type(fft_flexibility_t), intent(inout), target :: flexibility
+    type(elastic_part_t), intent(inout) :: system
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
-    !> Tuning numbers
-    type(edge_options_t), intent(in) :: options
     !> What is between the nodes, less the hats
     type(edge_residue_t), intent(in) :: residue
-    !> Nodes in contact, and those of them that stick (n_col, n_row)
-    logical, intent(in) :: contact(:, :), stick(:, :)
-    !> Coefficient of friction
-    real(wp), intent(in) :: friction(:, :)
+    !> Nodes in contact (n_col, n_row)
+    logical, intent(in) :: contact(:, :)
     !> The shape
     type(traction_field_t), intent(in) :: shape_of
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
     !> Hats that stand for the shape (n_col, n_row, component) [Pa]
     real(wp), intent(in) :: hats(:, :, :)
     !> Change of the tractions, the hats included (n_col, n_row, component) [Pa]
     real(wp), intent(out) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    type(elastic_part_t) :: system
     real(wp), allocatable :: by_pressure(:, :, :)
     integer :: k
 
     change = hats
-    system%flexibility => flexibility
-    system%space = space
     system%component = [normal]
-    call settle(system, options, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
+    call settle(system, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
     if (allocated(error) .or. size(hats, 3) == 1) return
     do k = 2, 3
-      where (contact .and. .not. stick)
-        change(:, :, k) = hats(:, :, k) + friction*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
+      where (contact .and. .not. shape_of%stick)
+        change(:, :, k) = hats(:, :, k) + shape_of%friction*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
       end where
     end do
-    if (.not. any(stick)) return
+    if (.not. any(shape_of%stick)) return
     system%component = [along_x, along_y]
     allocate (by_pressure(size(contact, 1), size(contact, 2), 2), source=0.0_wp)
     if (abs(pair%lambda_2) > 0.0_wp) then
-      call flexibility%apply([normal], change(:, :, 1:1), system%component, by_pressure, error)
+      call system%flexibility%apply([normal], change(:, :, 1:1), system%component, by_pressure, error)
       if (allocated(error)) return
     end if
-    call settle(system, options, stick, residue%displacements(pair, stick, system%component) + by_pressure, change(:, :, 2:3), &
-                error)
+    call settle(system, shape_of%stick, residue%displacements(pair, shape_of%stick, system%component) + by_pressure, &
+                change(:, :, 2:3), error)
   end subroutine solve_again
 
   !> Change tractions of some nodes so that displacements become alike all over them, without any load.
-  subroutine settle(system, options, nodes, moved, change, error)
+  subroutine settle(system, nodes, moved, change, error)
     !> The operator of the components
     type(elastic_part_t), intent(inout) :: system
-    !> Tuning numbers
-    type(edge_options_t), intent(in) :: options
     !> The nodes (n_col, n_row)
     logical, intent(in) :: nodes(:, :)
     !> Displacements by anything else (n_col, n_row, component) [m]
@@ -255,7 +250,8 @@ contains
       call constraints%satisfy(system%space, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, set)
       call system%product(x, ax, error)
       if (allocated(error)) return
-      iteration = iteration_t(tolerance=options%accuracy*maxval(abs(rhs - ax), mask=active), most=options%max_iterations)
+      iteration = iteration_t(tolerance=system%options%accuracy*maxval(abs(rhs - ax), mask=active), &
+                              most=system%options%max_iterations)
       call projected_cg(system, set, constraints, rhs, x, ax, iteration, error)
       if (allocated(error)) return
       if (iteration%outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)

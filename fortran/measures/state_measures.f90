@@ -204,8 +204,7 @@ contains
     logical, allocatable :: zone(:, :)
     integer :: row
 
-    call measure_contact(lattice, initial_gap, candidate, state%zone /= separated, state%pressure, state%gap, &
-                         state%motion(normal), space, found, edges)
+    call measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
     if (.not. allocated(state%traction)) return
     found%elastic_energy = found%elastic_energy + shear_energy(lattice, state)
     allocate (reserve, mold=initial_gap)
@@ -229,17 +228,15 @@ contains
   end function measure_state
 
   !> Measure the area of contact, the pressure and its energy.
-  subroutine measure_contact(lattice, initial_gap, candidate, contact, pressure, gap, approach, space, found, edges)
+  subroutine measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Gap before loading (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that can touch, and nodes in contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :), contact(:, :)
-    !> Pressure [Pa] and gap [m] (n_col, n_row)
-    real(wp), intent(in) :: pressure(:, :), gap(:, :)
-    !> Approach [m]
-    real(wp), intent(in) :: approach
+    !> Nodes that can touch (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> State, of which pressure, gap, zones and approach matter
+    type(contact_state_t), intent(in) :: state
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> What is found; nothing about shear
@@ -250,12 +247,14 @@ contains
 
     allocate (x, y, mold=initial_gap)
     call lattice%coordinates(x, y)
-    found%pressure_center = pressure_center(x, y, pressure)
+    found%pressure_center = pressure_center(x, y, state%pressure)
     deallocate (x, y)                                                          ! before the edges, which take as much
-    call new_contact_edges(edges, lattice, pressure, gap, contact, candidate)
-    found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
-    found%max_pressure = space%max(pressure)
-    found%elastic_energy = normal_energy(lattice, initial_gap, contact, pressure, gap, approach)
+    associate (contact => state%zone /= separated)
+      call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
+      found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
+      found%elastic_energy = normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, state%motion(normal))
+    end associate
+    found%max_pressure = space%max(state%pressure)
   end subroutine measure_contact
 
   !> Measure a zone with this edge.

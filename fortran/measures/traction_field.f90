@@ -58,7 +58,7 @@ module hc_traction_field
 contains
 
   !> Set up the tractions of a contact.
-  pure subroutine new_traction_field(field, lattice, edges, traction, contact, stick, friction, bound, options)
+  pure subroutine new_traction_field(field, lattice, edges, traction, contact, stick, limits, options)
     !> Field to be set up
     type(traction_field_t), intent(out) :: field
     !> Lattice and window
@@ -69,11 +69,9 @@ contains
     real(wp), intent(in) :: traction(:, :, :)
     !> Nodes in contact, and those of them that stick (n_col, n_row)
     logical, intent(in) :: contact(:, :), stick(:, :)
-    !> Coefficient of friction, at least 0 (n_col, n_row); unless it is there the shear traction is that of the nodes, joined
-    !> linearly
-    real(wp), intent(in), optional :: friction(:, :)
-    !> Bound of the shear traction; absent: none (n_col, n_row) [Pa]
-    real(wp), intent(in), optional :: bound(:, :)
+    !> Coefficient of friction, at least 0, and the bound of the shear traction [Pa] if there is one (n_col, n_row, 1 or 2);
+    !> absent: the shear traction is that of the nodes, joined linearly
+    real(wp), intent(in), optional :: limits(:, :, :)
     !> Tuning numbers; absent: the usual ones
     type(edge_options_t), intent(in), optional :: options
     type(edge_options_t) :: tuning
@@ -83,14 +81,12 @@ contains
     field%lattice = lattice
     field%nodal = traction
     field%squares = edges%squares()
-    field%limited = size(traction, 3) == 3 .and. present(friction)
+    field%limited = size(traction, 3) == 3 .and. present(limits)
     if (field%limited) then
-      field%friction = friction
-      if (present(bound)) then
-        if (any(bound < no_bound)) field%bound = min(bound, no_bound)
-      end if
+      field%friction = limits(:, :, 1)
+      if (any(limits(:, :, 2:) < no_bound)) field%bound = min(limits(:, :, 2), no_bound)
       field%stick = stick
-      limit = friction*traction(:, :, 1)
+      limit = field%friction*traction(:, :, 1)
       if (allocated(field%bound)) limit = min(limit, field%bound)
       field%reserve = merge(max(limit - norm2(traction(:, :, 2:3), dim=3), 0.0_wp), 0.0_wp, stick)
       field%direction = directions(traction(:, :, 2:3), limit, contact)

@@ -45,7 +45,7 @@ module hc_zone_edge
     !> Number of points and of triangles
     integer :: n_point = 0, n_triangle = 0
   contains
-    procedure, private :: add_point, add_polygon
+    procedure, private :: add_point, add_polygon, add_star, trim
   end type zone_mesh_t
 
 contains
@@ -333,7 +333,7 @@ contains
     integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
     logical, allocatable :: can_touch(:)
     integer, allocatable :: at_node(:, :), at_cut(:, :, :)
-    integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, leaving, middle, col, row, half, k
+    integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, leaving, col, row, half, k
     real(wp) :: part, value
     logical :: is_rim, touches
 
@@ -374,13 +374,12 @@ contains
                 part = 0.5_wp  ! the edge of the cells
                 value = field(node(1), node(2))
                 if (touches) then
-                  associate (one => distance(band%place(node(1), node(2))), other => distance(band%place(beyond(1), beyond(2))))
-                    part = one/(one - other)
-                  end associate
-                  if (padded(node(1) - link(1), node(2) - link(2)) /= 0) then
+                  part = part_inside(distance([band%place(node(1), node(2)), band%place(beyond(1), beyond(2))]))
+                  if (vanishes) then
+                    value = 0.0_wp
+                  else if (padded(node(1) - link(1), node(2) - link(2)) /= 0) then
                     value = value + part*(value - field(node(1) - link(1), node(2) - link(2)))
                   end if
-                  if (vanishes) value = 0.0_wp
                 end if
                 call mesh%add_point(position(lattice, node + part*link), value, at_cut(base(1), base(2), kind))
               end if
@@ -389,20 +388,30 @@ contains
           end do
           if (length == 0) cycle
           if (is_rim) then
-            middle = 0
-            call mesh%add_point(position(lattice, [col, row] + sum(corner(:, :, half), dim=2)/3.0_wp), &
-                                sum(mesh%values(polygon(:length)))/length, middle)
-            call mesh%add_polygon([middle, cshift(polygon(:length), leaving)])
+            call mesh%add_star(polygon(:length), leaving, position(lattice, [col, row] + sum(corner(:, :, half), dim=2)/3.0_wp))
           else
             call mesh%add_polygon(polygon(:length))
           end if
         end do
       end do
     end do
+    call mesh%trim()
+  end function mesh_of_zone
+
+  !> Return the part of a link that is inside, from the distances of the node inside and the one beyond.
+  pure real(wp) function part_inside(distance)
+    !> Distances from the edge, positive inside
+    real(wp), intent(in) :: distance(2)
+    part_inside = distance(1)/(distance(1) - distance(2))
+  end function part_inside
+
+  !> Free the room for points and triangles that were not needed.
+  pure subroutine trim(mesh)
+    class(zone_mesh_t), intent(inout) :: mesh
     mesh%points = mesh%points(:, :mesh%n_point)
     mesh%values = mesh%values(:mesh%n_point)
     mesh%triangles = mesh%triangles(:, :mesh%n_triangle)
-  end function mesh_of_zone
+  end subroutine trim
 
   !> Add a point to a mesh.
   pure subroutine add_point(mesh, point, value, number)
@@ -417,6 +426,19 @@ contains
     mesh%points(:, number) = point
     mesh%values(number) = value
   end subroutine add_point
+
+  !> Add the triangles of a polygon, all with a point inside it, where the field is the mean of the corners.
+  pure subroutine add_star(mesh, corners, leaving, middle)
+    class(zone_mesh_t), intent(inout) :: mesh
+    !> Numbers of its corners, counterclockwise, and how many are before the edge
+    integer, intent(in) :: corners(:), leaving
+    !> The point [m]
+    real(wp), intent(in) :: middle(2)
+    integer :: number
+
+    call mesh%add_point(middle, sum(mesh%values(corners))/size(corners), number)
+    call mesh%add_polygon([number, cshift(corners, leaving)])
+  end subroutine add_star
 
   !> Add the triangles of a polygon, all with its first corner.
   pure subroutine add_polygon(mesh, corners)

@@ -103,7 +103,7 @@ contains
       fall = profile(r, n_ring)/profile(r - 1, n_ring)
       !$omp do schedule(static)
       do k = self%ring(r), self%ring(r + 1) - 1
-        call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), self%inner(:, k), self%beside(:, k), &
+        call list_neighbors(node(k), step, mark, self%ring(r:r + 1), self%inner(:, k), self%beside(:, k), &
                             self%n_inner(k), self%n_beside(k))
         self%node(k) = in_window(node(k))
         self%inner(:self%n_inner(k), k) = in_window(self%inner(:self%n_inner(k), k))
@@ -258,13 +258,13 @@ contains
   end subroutine next_ring
 
   !> List the neighbors of a node in the ring before and in its own.
-  pure subroutine list_neighbors(node, step, mark, own, after, inner, beside, n_inner, n_beside)
+  pure subroutine list_neighbors(node, step, mark, first, inner, beside, n_inner, n_beside)
     !> The node, and steps to its neighbors
     integer, intent(in) :: node, step(6)
     !> Marks of all nodes
     integer, intent(in) :: mark(:)
     !> First marks of its own ring and of the next
-    integer, intent(in) :: own, after
+    integer, intent(in) :: first(2)
     !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
     integer, intent(out) :: inner(6), beside(7)
     !> Their numbers
@@ -276,11 +276,11 @@ contains
     beside(1) = mark(node)
     do k = 1, size(step)
       near = node + step(k)
-      if (mark(near) < own) then
+      if (mark(near) < first(1)) then
         ! no neighbor is further in than the ring before
         n_inner = n_inner + 1
         inner(n_inner) = near
-      else if (mark(near) < after) then
+      else if (mark(near) < first(2)) then
         n_beside = n_beside + 1
         beside(n_beside) = mark(near)
       end if

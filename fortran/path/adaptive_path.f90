@@ -6,60 +6,298 @@
 !>     call path%initialize(state, largest_contact_area)
 !>     do segment = 1, n
 !>       do
-!>         call path%advance(solver, target(segment), step_tolerance, tolerance, max_sweeps, max_cuts, error)
+!>         call path%advance(solver, target(segment), settings, error)
 !>         if (allocated(error) .or. .not. path%state%converged .or. path%fraction >= 1) exit
 !>       end do
+!>     end do
+!>
+!> A program with loads of another kind, or with a window that grows, makes the attempts itself:
+!>
+!>     call steps%begin(largest)
+!>     do
+!>       call steps%attempt_step(solver, [target half-way, target at the end], settings, before, after, error)
+!>       if (allocated(error) .or. steps%verdict /= rejected) exit
 !>     end do
 !>
 !> Equations: docs/theory/step_control.md, (S1) to (S4).
 module hc_adaptive_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
   use hc_contact_solver, only: friction_solver_t
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_edges, only: contact_edges_t
   use hc_zone_edge, only: zone_edge_t
-  use hc_load_path, only: advance, join_steps
-  use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, rejected
-  use hc_step_error, only: compare_halves, shear_free, step_change_t
+  use hc_load_path, only: advance, join_steps, step_settings_t
+  use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, outgrown, rejected
+  use hc_window_growth, only: extend_state, grown_window
+  use hc_step_error, only: compare_halves, edges_of, shear_free, step_change_t
   implicit none
   private
 
-  public :: adaptive_path_t
+  public :: adaptive_path_t, adaptive_steps_t, two_paths_t
 
-  !> The two paths, and the control of their load steps.
-  type :: adaptive_path_t
-    !> End of the last load step; its slip is that of both halves, and its R_t is of this slip
-    type(contact_state_t) :: state
+  !> Ends of the two paths.
+  type :: two_paths_t
+    !> That of the path in halves; the slip of its last load step is that of both halves, and its R_t is of this slip
+    type(contact_state_t), pointer :: halves => null()
+    !> That of the path in whole steps; none: both paths are one
+    type(contact_state_t), pointer :: whole => null()
+  contains
+    !> End of the path in whole steps
+    procedure :: end_of_whole
+    !> Free both
+    procedure :: free
+  end type two_paths_t
+
+  !> Choice of the load steps.
+  type :: adaptive_steps_t
+    !> What a load step may change, over the largest contact area
+    real(wp) :: tolerance = 0.02_wp
+    !> The window grows: an attempt that reaches its rim is made again on a larger one
+    logical :: grows = .false.
     !> Part of the present segment that is done
     real(wp) :: fraction = 1.0_wp
-    !> Bound on the error of the stick area by the size of all load steps [m^2]
-    real(wp) :: stick_area_error = 0.0_wp
-    !> The same of the shear tractions, over what friction can carry
-    real(wp) :: traction_error = 0.0_wp
+    !> Largest contact area of the history [m^2]
+    real(wp) :: area = 0.0_wp
+    !> Size of the steps
+    type(step_control_t) :: control
+    !> Present attempt, and what becomes of it: accepted, rejected (the next one follows), limited, failed or outgrown
+    type(step_attempt_t) :: attempt
+    integer :: verdict = rejected
+    !> Part of the segment where the last solution ends
+    real(wp) :: reached = 0.0_wp
+    !> Window that an outgrown attempt needs
+    type(lattice_t) :: larger
     !> What the halves of the last load step changed
     type(step_change_t) :: change
+    !> Bounds on the errors by the size of all load steps: of the stick area [m^2], of the shear tractions over what friction
+    !> can carry
+    real(wp) :: stick_area_error = 0.0_wp, traction_error = 0.0_wp
+    !> Work of all attempts at the load step
+    integer :: sweeps = 0
+    real(wp) :: operator_applications = 0.0_wp
+  contains
+    !> Begin a load step
+    procedure :: begin
+    !> Parts of the segment where the present attempt has its middle and its end
+    procedure :: parts
+    !> Make an attempt
+    procedure :: attempt_step
+    !> Go on after a load step of given size
+    procedure :: forget
+    procedure, private :: solve_halves, solve_part, accept
+  end type adaptive_steps_t
+
+  !> The two paths, and the choice of their load steps.
+  type, extends(adaptive_steps_t) :: adaptive_path_t
+    !> End of the last load step; its slip is that of both halves, and its R_t is of this slip
+    type(contact_state_t) :: state
     !> Attempts at the last load step that were rejected
     integer :: n_rejected = 0
     !> The last load step changes more than the tolerance, and smaller ones are of no use
     logical :: limited = .false.
-    type(step_control_t), private :: control
-    !> End of the path in whole steps; the same as `state` where they are one
-    type(contact_state_t), private :: whole
-    logical, private :: one_path = .true.
-    !> Largest contact area of the history [m^2]
-    real(wp), private :: area = 0.0_wp
+    !> End of the path in whole steps, unless both are one
+    type(contact_state_t), allocatable, private :: whole
     !> Loads and motions at the beginning of the segment
     real(wp), private :: load(n_motion) = 0.0_wp, motion(n_motion) = 0.0_wp
   contains
     !> Start a load history
     procedure :: initialize
     !> Advance by one load step
-    procedure :: advance => advance_step
-    procedure, private :: solve_attempt, solve_part
+    procedure :: advance => advance_path
+    !> Go on with the solver of a larger window
+    procedure :: carry
+    procedure, private :: target_at
   end type adaptive_path_t
 
 contains
+
+  !> Return the end of the path in whole steps.
+  function end_of_whole(self) result(state)
+    class(two_paths_t), intent(in) :: self
+    type(contact_state_t), pointer :: state
+
+    state => self%whole
+    if (.not. associated(state)) state => self%halves
+  end function end_of_whole
+
+  !> Free both ends.
+  subroutine free(self)
+    class(two_paths_t), intent(inout) :: self
+
+    if (associated(self%halves)) deallocate (self%halves)
+    if (associated(self%whole)) deallocate (self%whole)
+  end subroutine free
+
+  !> Begin a load step; at the beginning of a segment its size follows from the segment before.
+  pure subroutine begin(self, largest)
+    class(adaptive_steps_t), intent(inout) :: self
+    !> Largest load step, as a part of the segment
+    real(wp), intent(in) :: largest
+
+    if (self%fraction >= 1.0_wp) self%fraction = 0.0_wp
+    if (self%fraction <= 0.0_wp) call self%control%start_segment()
+    self%attempt = self%control%first_attempt(self%fraction, largest)
+    self%verdict = rejected
+    self%sweeps = 0
+    self%operator_applications = 0.0_wp
+  end subroutine begin
+
+  !> Return the parts of the segment where the present attempt has its middle and its end.
+  pure function parts(self)
+    class(adaptive_steps_t), intent(in) :: self
+    real(wp) :: parts(2)
+    parts = [0.5_wp*(self%attempt%start + self%attempt%end), self%attempt%end]
+  end function parts
+
+  !> Go on after a load step of given size: both paths are one, and nothing is known about changes.
+  pure subroutine forget(self)
+    class(adaptive_steps_t), intent(inout) :: self
+    type(step_control_t) :: control
+
+    control%size = self%control%size
+    control%first = self%control%first
+    control%options = self%control%options
+    self%control = control
+  end subroutine forget
+
+  !> Make the present attempt at a load step, and decide what becomes of it.
+  subroutine attempt_step(self, solver, targets, settings, before, after, error)
+    class(adaptive_steps_t), intent(inout) :: self
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> Loads or motions in the middle and at the end of the attempt, `parts`
+    type(load_target_t), intent(in) :: targets(2)
+    !> How its parts are solved
+    type(step_settings_t), intent(in) :: settings
+    !> Ends of the paths before the load step
+    type(two_paths_t), intent(in) :: before
+    !> Ends after it. Unless the step is accepted or limited, the end of the path in halves is the last solution, which did not
+    !> converge, or reached the rim.
+    type(two_paths_t), intent(out) :: after
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    logical :: converged
+
+    self%control%options = solver%problem%options%steps
+    self%area = max(self%area, solver%problem%lattice%cell_area())
+    self%verdict = rejected
+    call self%solve_halves(solver, targets, settings, before, after, error)
+    if (allocated(error)) then
+      call after%free()
+    else if (self%verdict /= outgrown) then
+      converged = after%halves%converged
+      call self%control%decide(self%attempt, converged, self%change, self%tolerance, self%verdict)
+      ! a window that does not grow ends the path
+      if (.not. self%grows .and. after%halves%stopped == rim_reached) self%verdict = failed
+    end if
+    if (allocated(error)) return
+    if (any(self%verdict == [outgrown, rejected, failed])) then
+      if (associated(after%whole)) deallocate (after%whole)
+    else
+      call self%accept(solver%problem, after%halves)
+    end if
+  end subroutine attempt_step
+
+  !> Solve a load step as a whole and in halves, and compare them; the last solution is that where one fails.
+  subroutine solve_halves(self, solver, targets, settings, before, after, error)
+    class(adaptive_steps_t), intent(inout) :: self
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> Loads or motions in the middle and at the end
+    type(load_target_t), intent(in) :: targets(2)
+    !> How the parts are solved
+    type(step_settings_t), intent(in) :: settings
+    !> Ends of the paths before the load step, and after it
+    type(two_paths_t), intent(in) :: before
+    type(two_paths_t), intent(inout) :: after
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t), pointer :: whole_before, half
+    real(wp) :: ends(2)
+    logical :: solved
+
+    self%change = step_change_t()
+    ends = self%parts()
+    self%reached = ends(2)
+    whole_before => before%end_of_whole()
+    call self%solve_part(solver, whole_before, targets(2), settings, after%halves, solved, error)
+    if (.not. solved) return
+    if (.not. associated(before%whole)) then
+      associate (space => solver%problem%space, options => self%control%options)
+        solved = shear_free(before%halves, space, options)
+        if (solved) solved = shear_free(after%halves, space, options)
+      end associate
+      ! without shear there is no history
+      if (solved) return
+    end if
+    after%whole => after%halves
+    self%reached = ends(1)
+    call self%solve_part(solver, before%halves, targets(1), settings, after%halves, solved, error)
+    if (.not. solved) return
+    half => after%halves
+    self%reached = ends(2)
+    call self%solve_part(solver, half, targets(2), settings, after%halves, solved, error)
+    if (solved) then
+      call join_steps(solver%problem, half, after%halves)
+      call compare_halves(solver%problem, after%whole, half, after%halves, whole_before, before%halves, self%area, self%change)
+    end if
+    deallocate (half)
+  end subroutine solve_halves
+
+  !> Solve a part of a load step.
+  subroutine solve_part(self, solver, state, target, settings, next, solved, error)
+    class(adaptive_steps_t), intent(inout) :: self
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> State to go on from
+    type(contact_state_t), intent(in) :: state
+    !> Loads or motions at its end
+    type(load_target_t), intent(in) :: target
+    !> How it is solved
+    type(step_settings_t), intent(in) :: settings
+    !> The new state
+    type(contact_state_t), pointer, intent(out) :: next
+    !> It converged, and the window is large enough
+    logical, intent(out) :: solved
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    allocate (next)
+    call advance(solver, state, target, settings, next, error)
+    solved = .not. allocated(error)
+    if (.not. solved) return
+    self%sweeps = self%sweeps + next%sweeps
+    self%operator_applications = self%operator_applications + next%operator_applications
+    if (self%grows .and. next%clipped) then
+      self%verdict = outgrown
+      self%larger = grown_window(solver%problem%lattice, next%zone /= separated)
+    end if
+    solved = next%converged .and. self%verdict /= outgrown
+  end subroutine solve_part
+
+  !> Take over an attempt, with the work of all attempts, and bound the errors by the size of the load steps.
+  subroutine accept(self, problem, state)
+    class(adaptive_steps_t), intent(inout) :: self
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> End of the load step
+    type(contact_state_t), intent(inout) :: state
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge
+
+    state%sweeps = self%sweeps
+    state%operator_applications = self%operator_applications
+    self%fraction = self%attempt%end
+    call self%control%accept(self%attempt, self%change, self%tolerance, self%verdict)
+    call edges_of(problem, state, edges)
+    edge = edges%contact_edge()
+    self%area = max(self%area, edge%area)
+    self%stick_area_error = min(self%control%bound(self%change)*self%area, edge%area)
+    self%traction_error = self%control%traction_bound(self%tolerance)
+  end subroutine accept
 
   !> Start a load history.
   subroutine initialize(self, state, area)
@@ -70,159 +308,92 @@ contains
     real(wp), intent(in) :: area
 
     self%state = state
-    self%whole = state
     self%area = area
   end subroutine initialize
 
   !> Advance by one load step towards the end of a segment; after its end a new one begins.
-  subroutine advance_step(self, solver, target, step_tolerance, tolerance, max_sweeps, max_cuts, error, largest)
-    class(adaptive_path_t), intent(inout) :: self
+  subroutine advance_path(self, solver, target, settings, error, largest)
+    class(adaptive_path_t), intent(inout), target :: self
     !> Method
     class(friction_solver_t), intent(inout) :: solver
     !> Loads or motions at the end of the segment
     type(load_target_t), intent(in) :: target
-    !> What a load step may change, over the largest contact area
-    real(wp), intent(in) :: step_tolerance
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Active sets that may be tried, times that a part of a step may be halved
-    integer, intent(in) :: max_sweeps, max_cuts
+    !> How the parts of the load step are solved
+    type(step_settings_t), intent(in) :: settings
     !> Allocated on failure. No failure: `state` is not converged, and says why, if the smallest step does not converge or
-    !> the contact reaches the rim of the window; the path ends there.
+    !> the contact reaches the rim of a window that does not grow; the path ends there. If one that grows is too small
+    !> the verdict is `outgrown`, and `state` that before the step, which goes on after `carry` to the window `larger`.
     type(error_t), allocatable, intent(out) :: error
     !> Largest load step, as a part of the segment
     real(wp), intent(in), optional :: largest
-    type(contact_state_t) :: whole, halves
-    type(contact_edges_t) :: edges
-    type(zone_edge_t) :: edge
-    type(step_attempt_t) :: attempt
-    real(wp) :: most, work
-    logical :: one_path
-    integer :: verdict
+    type(two_paths_t) :: before, after
+    real(wp) :: most, parts(2)
 
     most = 1.0_wp
     if (present(largest)) most = largest
-    if (.not. (step_tolerance > 0.0_wp .and. most > 0.0_wp)) then
+    if (.not. (self%tolerance > 0.0_wp .and. most > 0.0_wp)) then
       call raise(error, status%invalid_input, 'tolerance and largest size of load steps: numbers above 0 expected')
       return
     end if
-    self%control%options = solver%problem%options%steps
     if (self%fraction >= 1.0_wp) then
-      self%fraction = 0.0_wp
       self%load = self%state%load
       self%motion = self%state%motion
-      call self%control%start_segment()
     end if
-    self%area = max(self%area, solver%problem%lattice%cell_area())
-
-    attempt = self%control%first_attempt(self%fraction, most)
-    work = 0.0_wp
+    if (self%verdict /= outgrown) call self%begin(most)
+    before%halves => self%state
+    if (allocated(self%whole)) before%whole => self%whole
     do
-      call self%solve_attempt(solver, target, attempt, tolerance, max_sweeps, max_cuts, whole, halves, one_path, error)
+      parts = self%parts()
+      call self%attempt_step(solver, [self%target_at(target, parts(1)), self%target_at(target, parts(2))], settings, before, &
+                             after, error)
       if (allocated(error)) return
-      work = work + halves%operator_applications
-      call self%control%decide(attempt, halves%converged, self%change, step_tolerance, verdict)
-      if (halves%stopped == rim_reached) verdict = failed
-      if (verdict /= rejected) exit
+      if (self%verdict /= rejected) exit
+      call after%free()
     end do
-    halves%operator_applications = work
-    self%state = halves
-    self%n_rejected = attempt%n_rejected
-    self%limited = verdict == limited
-    if (verdict == failed) return
-    self%whole = whole
-    self%one_path = one_path
-    self%fraction = attempt%end
-    call self%control%accept(attempt, self%change, step_tolerance, verdict)
-    associate (problem => solver%problem)
-      call new_contact_edges(edges, problem%lattice, halves%pressure, halves%gap, halves%zone /= separated, problem%candidate, &
-                             problem%options%edges)
-    end associate
-    edge = edges%contact_edge()
-    self%area = max(self%area, edge%area)
-    self%stick_area_error = min(self%control%bound(self%change)*self%area, edge%area)
-    self%traction_error = self%control%traction_bound(step_tolerance)
-  end subroutine advance_step
-
-  !> Solve a load step as a whole and in halves, and compare them.
-  subroutine solve_attempt(self, solver, target, attempt, tolerance, max_sweeps, max_cuts, whole, halves, one_path, error)
-    class(adaptive_path_t), intent(inout) :: self
-    !> Method
-    class(friction_solver_t), intent(inout) :: solver
-    !> Loads or motions at the end of the segment
-    type(load_target_t), intent(in) :: target
-    !> Where the step begins and ends
-    type(step_attempt_t), intent(in) :: attempt
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Active sets that may be tried, times that a part of a step may be halved
-    integer, intent(in) :: max_sweeps, max_cuts
-    !> End of both paths, the second one with the slip of both halves and the work of all; not converged: the part that failed
-    type(contact_state_t), intent(out) :: whole, halves
-    !> Both are the same: without shear there is no history
-    logical, intent(out) :: one_path
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    type(contact_state_t) :: half
-    real(wp) :: work
-
-    call self%solve_part(solver, self%whole, target, attempt%end, tolerance, max_sweeps, max_cuts, whole, error)
-    one_path = .false.
-    if (allocated(error)) return
-    halves = whole
-    if (.not. whole%converged) return
-    self%change = step_change_t()
-    associate (space => solver%problem%space, options => self%control%options)
-      if (self%one_path) one_path = shear_free(self%state, space, options)
-      if (one_path) one_path = shear_free(whole, space, options)
-    end associate
-    if (one_path) return
-    work = whole%operator_applications
-    call self%solve_part(solver, self%state, target, 0.5_wp*(attempt%start + attempt%end), tolerance, max_sweeps, max_cuts, &
-                         half, error)
-    if (allocated(error)) return
-    work = work + half%operator_applications
-    halves = half
-    if (half%converged) then
-      call self%solve_part(solver, half, target, attempt%end, tolerance, max_sweeps, max_cuts, halves, error)
-      if (allocated(error)) return
-      work = work + halves%operator_applications
+    if (self%verdict == outgrown) then
+      call after%free()
+      return
     end if
-    halves%operator_applications = work
-    if (.not. halves%converged) return
-    call join_steps(solver%problem, half, halves)
-    associate (problem => solver%problem)
-      call compare_halves(problem%lattice, problem%candidate, problem%friction, whole, half, halves, self%whole, self%state, &
-                          self%area, self%change, problem%space, problem%options)
-    end associate
-  end subroutine solve_attempt
+    self%state = after%halves
+    self%n_rejected = self%attempt%n_rejected
+    self%limited = self%verdict == limited
+    if (self%verdict /= failed .and. allocated(self%whole)) deallocate (self%whole)
+    if (associated(after%whole)) allocate (self%whole, source=after%whole)
+    call after%free()
+  end subroutine advance_path
 
-  !> Advance a state to a part of a segment.
-  subroutine solve_part(self, solver, state, target, fraction, tolerance, max_sweeps, max_cuts, next, error)
-    class(adaptive_path_t), intent(in) :: self
-    !> Method
+  !> Go on with the solver of a larger window, at the present attempt.
+  subroutine carry(self, solver, lattice, error)
+    class(adaptive_path_t), intent(inout) :: self
+    !> Method on the larger window
     class(friction_solver_t), intent(inout) :: solver
-    !> State to go on from
-    type(contact_state_t), intent(in) :: state
-    !> Loads or motions at the end of the segment
-    type(load_target_t), intent(in) :: target
-    !> Part of the segment that is done then
-    real(wp), intent(in) :: fraction
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Active sets that may be tried, times that the step may be halved
-    integer, intent(in) :: max_sweeps, max_cuts
-    !> The new state
-    type(contact_state_t), intent(out) :: next
+    !> The smaller window
+    type(lattice_t), intent(in) :: lattice
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    type(load_target_t) :: goal
+    type(contact_state_t) :: extended
+
+    if (allocated(self%whole)) then
+      call extend_state(solver, lattice, self%whole, extended, error)
+      if (allocated(error)) return
+      self%whole = extended
+    end if
+    call extend_state(solver, lattice, self%state, extended, error)
+    if (.not. allocated(error)) self%state = extended
+  end subroutine carry
+
+  !> Return the target at a part of the segment.
+  pure type(load_target_t) function target_at(self, target, fraction) result(goal)
+    class(adaptive_path_t), intent(in) :: self
+    !> Loads or motions at the end of the segment
+    type(load_target_t), intent(in) :: target
+    !> Part of the segment
+    real(wp), intent(in) :: fraction
 
     goal = target
     associate (start => merge(self%load, self%motion, target%control == force_control))
       if (fraction < 1.0_wp) goal%value = start + fraction*(target%value - start)
     end associate
-    call advance(solver, state, goal, .false., tolerance, max_sweeps, max_cuts, next, error)
-  end subroutine solve_part
+  end function target_at
 
 end module hc_adaptive_path

@@ -25,7 +25,31 @@ module hc_load_path
   implicit none
   private
 
-  public :: advance, join_steps
+  public :: step_settings_t, advance, join_steps
+
+  !> How a load step is solved.
+  type :: step_settings_t
+    !> Bound of all residuals
+    real(wp) :: tolerance = 1.0e-8_wp
+    !> Active sets that may be tried
+    integer :: max_sweeps = 40
+    !> Times that a step may be halved
+    integer :: max_cuts = 6
+    !> The load is applied to the undeformed bodies at once
+    logical :: static = .false.
+    !> Slip of a node that enters counts from where it stood when its gap closed, not from the beginning of the step
+    logical :: interpolated = .false.
+  end type step_settings_t
+
+  !> The way through the parts of a load step.
+  type :: way_t
+    !> Part of the step that is done, and size of the next one
+    real(wp) :: done = 0.0_wp, part = 1.0_wp
+    !> Work so far, in applications of the full operator
+    real(wp) :: work = 0.0_wp
+    !> Times that the step was halved; active sets that were tried
+    integer :: cuts = 0, sweeps = 0
+  end type way_t
 
   !> Traction over its bound from which a node slips
   real(wp), parameter :: at_bound = 1.0_wp - 1.0e-6_wp
@@ -33,124 +57,137 @@ module hc_load_path
 contains
 
   !> Advance a state to given loads or motions.
-  subroutine advance(solver, state, target, static, tolerance, max_sweeps, max_cuts, next, error, interpolated)
+  subroutine advance(solver, state, target, settings, next, error)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
     !> State to go on from
     type(contact_state_t), intent(in), target :: state
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> The load is applied to the undeformed bodies at once
-    logical, intent(in) :: static
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Active sets that may be tried
-    integer, intent(in) :: max_sweeps
-    !> Times that a step may be halved
-    integer, intent(in) :: max_cuts
+    !> How the step is solved
+    type(step_settings_t), intent(in) :: settings
     !> The new state; not converged: the attempt that failed, or a part of the step that reached the rim of the window,
     !> where nothing was gone on with (stopped is rim_reached, and the residuals of the loads are those of the whole step)
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Slip of a node that enters counts from where it stood when its gap closed; default: from the beginning of the step
-    logical, intent(in), optional :: interpolated
 
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
-    real(wp), allocatable :: reference(:, :, :), slipped(:, :, :)
-    logical :: from_entry, at_once, pressed
-    real(wp) :: done, part, work
-    integer :: cuts, sweeps
+    real(wp), allocatable :: slipped(:, :, :)
+    logical :: at_once
+    type(way_t) :: way
 
-    call check_target(target%control, target%value, tolerance, max_sweeps, error)
+    call check_step(solver, state, target, settings, error)
     if (allocated(error)) return
-    if (max_cuts < 0) then
-      call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
-      return
-    end if
-    call check_state(state, solver%problem%lattice, error)
-    if (allocated(error)) return
-    from_entry = .false.
-    if (present(interpolated)) from_entry = interpolated
-    pressed = solver%problem%space%max(state%pressure) > 0.0_wp
-    at_once = static .or. .not. (from_entry .or. pressed)
-    if (static) allocate (reference, source=0.0_wp*state%relative_displacement)
-    if (from_entry) then
-      allocate (slipped, source=0.0_wp*state%relative_displacement)
-    else
-      allocate (slipped(0, 0, 0))
-    end if
+    at_once = settings%static
+    if (.not. (at_once .or. settings%interpolated)) at_once = .not. solver%problem%space%max(state%pressure) > 0.0_wp
+    allocate (slipped(0, 0, 0))
+    if (settings%interpolated) slipped = 0.0_wp*state%relative_displacement
     from => state
-    done = 0.0_wp
-    part = 1.0_wp
-    work = 0.0_wp
-    cuts = 0
-    sweeps = 0
     do
-      associate (goal => between(state, target, done + part))
-        if (static) then
-          call solve_step(solver, from, reference, goal, tolerance, max_sweeps, next, error)
-        else if (at_once) then
-          call solve_step(solver, from, state%relative_displacement, goal, tolerance, max_sweeps, next, error)
-        else if (from_entry) then
-          call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
-        else
-          call solve_step(solver, from, from%relative_displacement, goal, tolerance, max_sweeps, next, error)
-        end if
-      end associate
+      call solve_part(solver, state, from, between(state, target, way%done + way%part), settings, at_once, next, error)
       ! it is one of the whole step, and no second attempt begins with it
       if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
-      work = work + next%operator_applications
-      sweeps = sweeps + next%sweeps
+      way%work = way%work + next%operator_applications
+      way%sweeps = way%sweeps + next%sweeps
       if (next%converged) then
         if (at_once) then
-          call add_slip(solver%problem, state, static, next)
+          call add_slip(solver%problem, state, settings%static, next)
         else
-          call add_slip(solver%problem, from, static, next)
+          call add_slip(solver%problem, from, settings%static, next)
         end if
-        if (from_entry) slipped = slipped + next%slip_increment
-        done = done + part
-        if (done >= 1.0_wp .or. next%clipped) exit
+        if (settings%interpolated) slipped = slipped + next%slip_increment
+        way%done = way%done + way%part
+        if (way%done >= 1.0_wp .or. next%clipped) exit
         now = next
         from => now
       else
         ! where an attempt that failed has pressure means nothing
         next%clipped = .false.
         ! no path leads to loads that full sliding does not carry
-        if (next%sliding .and. done + part >= 1.0_wp) exit
-        if (cuts >= max_cuts) then
+        if (next%sliding .and. way%done + way%part >= 1.0_wp) exit
+        if (way%cuts >= settings%max_cuts) then
           ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
-          if (static .or. .not. at_once .or. max_cuts == 0 .or. next%sliding) exit
+          if (settings%static .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
           at_once = .false.
           from => state
-          done = 0.0_wp
-          part = 1.0_wp
-          cuts = 0
+          way%done = 0.0_wp
+          way%part = 1.0_wp
+          way%cuts = 0
         end if
-        cuts = cuts + 1
-        part = 0.5_wp*part
+        way%cuts = way%cuts + 1
+        way%part = 0.5_wp*way%part
       end if
     end do
-    next%cuts = cuts
-    next%sweeps = sweeps
-    next%operator_applications = work
-    if (.not. at_once .and. cuts > 0 .and. next%converged) then
+    next%cuts = way%cuts
+    next%sweeps = way%sweeps
+    next%operator_applications = way%work
+    if (.not. next%converged) return
+    if (.not. at_once .and. way%cuts > 0) then
       ! the slip of the step is that of all its parts
-      if (from_entry) then
-        next%slip_increment = slipped
-      else
-        next%slip_increment = next%relative_displacement - state%relative_displacement
-      end if
+      next%slip_increment = next%relative_displacement - state%relative_displacement
+      if (settings%interpolated) next%slip_increment = slipped
       call find_slip_residual(solver%problem, next)
     end if
-    if (next%converged .and. done < 1.0_wp) then
-      next%converged = .false.
-      next%stopped = rim_reached
-      call solver%problem%find_load_residuals(target, next)
-    end if
+    if (way%done >= 1.0_wp) return
+    next%converged = .false.
+    next%stopped = rim_reached
+    call solver%problem%find_load_residuals(target, next)
   end subroutine advance
+
+  !> Refuse a load step whose target, settings or state are of no use.
+  subroutine check_step(solver, state, target, settings, error)
+    !> Method
+    class(friction_solver_t), intent(in) :: solver
+    !> State to go on from
+    type(contact_state_t), intent(in) :: state
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> How the step is solved
+    type(step_settings_t), intent(in) :: settings
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_target(target%control, target%value, settings%tolerance, settings%max_sweeps, error)
+    if (allocated(error)) return
+    if (settings%max_cuts < 0) then
+      call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
+      return
+    end if
+    call check_state(state, solver%problem%lattice, error)
+  end subroutine check_step
+
+  !> Solve a part of a load step.
+  subroutine solve_part(solver, state, from, goal, settings, at_once, next, error)
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> State at the beginning of the step, and at that of the part
+    type(contact_state_t), intent(in) :: state, from
+    !> Loads or motions at its end
+    type(load_target_t), intent(in) :: goal
+    !> How the step is solved
+    type(step_settings_t), intent(in) :: settings
+    !> Parts before only serve as starts
+    logical, intent(in) :: at_once
+    !> State at its end, converged or not
+    type(contact_state_t), intent(out) :: next
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: undeformed(:, :, :)
+
+    if (settings%static) then
+      allocate (undeformed, source=0.0_wp*state%relative_displacement)
+      call solve_step(solver, from, undeformed, goal, settings%tolerance, settings%max_sweeps, next, error)
+    else if (at_once) then
+      call solve_step(solver, from, state%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
+    else if (settings%interpolated) then
+      call solve_with_entry(solver, from, goal, settings%tolerance, settings%max_sweeps, next, error)
+    else
+      call solve_step(solver, from, from%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
+    end if
+  end subroutine solve_part
 
   !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.
   subroutine join_steps(problem, first, last)

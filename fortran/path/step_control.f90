@@ -20,11 +20,11 @@ module hc_step_control
   implicit none
   private
 
-  public :: step_control_t, step_attempt_t, rejected, accepted, limited, failed
+  public :: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown
 
   !> What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones are of no
-  !> use; it did not converge, and is the smallest there is.
-  integer, parameter :: rejected = 0, accepted = 1, limited = 2, failed = 3
+  !> use; it did not converge, and is the smallest there is; it reached the rim of a window that grows.
+  integer, parameter :: rejected = 0, accepted = 1, limited = 2, failed = 3, outgrown = 4
 
   !> One attempt at a load step.
   type :: step_attempt_t

@@ -6,10 +6,11 @@
 !> Equations: docs/theory/step_control.md, (S1).
 module hc_step_error
   use hc_precision, only: wp
-  use hc_options, only: options_t, step_options_t
+  use hc_options, only: step_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, separated, slip, stick
+  use hc_contact_problem, only: friction_problem_t
   use hc_friction_law, only: friction_law_t
   use hc_contact_residuals, only: least_traction
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
@@ -17,7 +18,7 @@ module hc_step_error
   implicit none
   private
 
-  public :: step_change_t, compare_halves, stick_edge_of, shear_free, turned_part
+  public :: step_change_t, compare_halves, edges_of, shear_free, turned_part
 
   !> What the halves of a load step change.
   type :: step_change_t
@@ -38,14 +39,9 @@ module hc_step_error
 contains
 
   !> Compare the two solutions at the end of a load step.
-  subroutine compare_halves(lattice, candidate, friction, whole, half, halves, whole_before, halves_before, area, change, &
-                            space, options)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
-    !> Friction law
-    class(friction_law_t), intent(in) :: friction
+  subroutine compare_halves(problem, whole, half, halves, whole_before, halves_before, area, change)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
     !> End of the path in whole steps, middle and end of the one in halves
     type(contact_state_t), intent(in) :: whole, half, halves
     !> Both paths at the beginning of the step
@@ -54,19 +50,14 @@ contains
     real(wp), intent(in) :: area
     !> What the halves change
     type(step_change_t), intent(out) :: change
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    !> Tuning numbers; absent: the usual ones
-    type(options_t), intent(in), optional :: options
-    type(options_t) :: tuning
     type(contact_edges_t) :: edges
     type(zone_edge_t) :: contact, sticking
     real(wp) :: carried, scale, grown, loaded
     integer :: entered
 
-    if (present(options)) tuning = options
-    associate (spacing => lattice%spacing(), steps => tuning%steps)
-      call edges_of(lattice, candidate, halves, tuning, edges)
+    associate (spacing => problem%lattice%spacing(), steps => problem%options%steps, space => problem%space, &
+               friction => problem%friction)
+      call edges_of(problem, halves, edges)
       contact = edges%contact_edge()
       sticking = stick_edge_of(edges, friction, halves)
       entered = space%count((halves%zone /= separated) .neqv. (halves_before%zone /= separated))
@@ -87,19 +78,19 @@ contains
       change%traction = scale*space%sum(norm2(whole%traction - halves%traction, dim=3))
       change%added = scale*space%sum(norm2(whole%traction - halves%traction &
                                            - (whole_before%traction - halves_before%traction), dim=3))
+
+      if (friction%is_bounded()) then
+        change%spent = space%sum(shear(half)*slipped(halves_before, half) + shear(halves)*slipped(half, halves))
+        ! nodes that turn one way and others that turn the other way do so under a load that keeps its direction
+        change%turned = abs(space%sum(turned(halves_before, half)*slipped(halves_before, half) &
+                                      + turned(half, halves)*slipped(half, halves)))
+      end if
+
+      grown = abs(sticking%area - stick_area(problem, half))/area
+      loaded = scale*space%sum(norm2(half%traction - halves%traction, dim=3))
+      if (loaded > 0.0_wp) change%gain = min(max(1.0_wp, grown/loaded), steps%most_gain)
     end associate
-
-    if (friction%is_bounded()) then
-      change%spent = space%sum(shear(half)*slipped(halves_before, half) + shear(halves)*slipped(half, halves))
-      ! nodes that turn one way and others that turn the other way do so under a load that keeps its direction
-      change%turned = abs(space%sum(turned(halves_before, half)*slipped(halves_before, half) &
-                                    + turned(half, halves)*slipped(half, halves)))
-    end if
-
-    grown = abs(sticking%area - stick_area(lattice, candidate, friction, half, tuning))/area
-    loaded = scale*space%sum(norm2(half%traction - halves%traction, dim=3))
-    if (loaded > 0.0_wp) change%gain = min(max(1.0_wp, grown/loaded), tuning%steps%most_gain)
-    change%stick = (sticking%area - stick_area(lattice, candidate, friction, whole, tuning))/area
+    change%stick = (sticking%area - stick_area(problem, whole))/area
   end subroutine compare_halves
 
   !> Return whether states have no shear tractions: their path has no history.
@@ -113,20 +104,22 @@ contains
     shear_free = space%max(shear(state)) <= options%shear_rounding*max(space%max(state%pressure), tiny(1.0_wp))
   end function shear_free
 
-  !> Find the edges of a contact at the end of a load step.
-  pure subroutine edges_of(lattice, candidate, state, options, edges)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
+  !> Find the edges of a contact at the end of a load step, in a window about the origin.
+  pure subroutine edges_of(problem, state, edges)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
     !> State
     type(contact_state_t), intent(in) :: state
-    !> Tuning numbers
-    type(options_t), intent(in) :: options
     !> Its edges
     type(contact_edges_t), intent(out) :: edges
-    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone /= separated, candidate, &
-                           options%edges)
+    type(lattice_t) :: here
+
+    ! lengths do not depend on where the window lies and how it grew, not even in their last digit
+    here = problem%lattice
+    here%first = 0
+    here%origin = 0.0_wp
+    call new_contact_edges(edges, here, state%pressure, state%gap, state%zone /= separated, problem%candidate, &
+                           problem%options%edges)
   end subroutine edges_of
 
   !> Find the edge of the stick area of a state.
@@ -153,22 +146,16 @@ contains
   end function stick_edge_of
 
   !> Compute the stick area of a state [m^2].
-  pure real(wp) function stick_area(lattice, candidate, friction, state, options)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
-    !> Friction law
-    class(friction_law_t), intent(in) :: friction
+  pure real(wp) function stick_area(problem, state)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
     !> State
     type(contact_state_t), intent(in) :: state
-    !> Tuning numbers
-    type(options_t), intent(in) :: options
     type(contact_edges_t) :: edges
     type(zone_edge_t) :: edge
 
-    call edges_of(lattice, candidate, state, options, edges)
-    edge = stick_edge_of(edges, friction, state)
+    call edges_of(problem, state, edges)
+    edge = stick_edge_of(edges, problem%friction, state)
     stick_area = edge%area
   end function stick_area
 

@@ -7,7 +7,7 @@
 !>
 !>     call energy_ahead(cycle, ..., cycles, ..., energy)
 !>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
-!>     call jump_change(..., energy, that of the second jump, that of one jump of both, ..., slower, change)
+!>     call jump_change(lattice, pair, law, two_jumps_t(energy, that of the second jump, that of one jump of both, cycles), ...)
 !>
 !> Equations: docs/theory/wear.md, (V1) to (V6), (V9).
 module hc_wear_jumps
@@ -20,7 +20,23 @@ module hc_wear_jumps
   implicit none
   private
 
-  public :: archard_depth, wear_by, wear_left, jump_change, energy_of_second_jump, expect_end, remember_end
+  public :: wear_law_t, two_jumps_t, archard_depth, wear_by, wear_left, jump_change, energy_of_second_jump, expect_end, remember_end
+
+  !> How much of the surfaces friction wears off.
+  type :: wear_law_t
+    !> Coefficient of wear of both bodies together, k [m^2/N]
+    real(wp) :: coefficient = 0.0_wp
+    !> Coefficient of friction (n_col, n_row)
+    real(wp), allocatable :: friction(:, :)
+  end type wear_law_t
+
+  !> Two equal jumps, and one that is as long as both.
+  type :: two_jumps_t
+    !> Energy by area of each cycle in the first and the second jump, and in the long one (n_col, n_row) [J/m^2]
+    real(wp), allocatable :: first(:, :), second(:, :), both(:, :)
+    !> Cycles of each of the two
+    real(wp) :: cycles = 0.0_wp
+  end type two_jumps_t
 
 contains
 
@@ -90,19 +106,15 @@ contains
 
   !> Compute what two jumps change in comparison with one of both, (V6): the depth, and its root mean square over what the
   !> largest pressure indents one node, as tractions that the step adds.
-  pure subroutine jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, change)
+  pure subroutine jump_change(lattice, pair, law, jumps, p_max, slower, change)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants
     type(elastic_pair_t), intent(in) :: pair
-    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both (n_col, n_row) [J/m^2]
-    real(wp), intent(in) :: first(:, :), second(:, :), both(:, :)
-    !> Coefficient of wear [m^2/N]
-    real(wp), intent(in) :: coefficient
-    !> Coefficient of friction (n_col, n_row)
-    real(wp), intent(in) :: friction(:, :)
-    !> Cycles of each of the two jumps
-    real(wp), intent(in) :: cycles
+    !> How the surfaces wear
+    type(wear_law_t), intent(in) :: law
+    !> The jumps
+    type(two_jumps_t), intent(in) :: jumps
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
     !> By how much the two wear more (n_col, n_row) [m]
@@ -111,44 +123,47 @@ contains
     type(step_change_t), intent(out) :: change
     type(step_options_t) :: options
 
-    slower = cycles*archard_depth((first - both) + (second - both), coefficient, friction)
-    associate (n_wearing => count(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp))
-      if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(slower**2)/n_wearing) &
-                                                              /(normal_self_compliance(lattice, pair)*p_max)
+    associate (first => jumps%first, second => jumps%second, both => jumps%both)
+      slower = jumps%cycles*archard_depth((first - both) + (second - both), law%coefficient, law%friction)
+      associate (n_wearing => count(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp))
+        if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(slower**2)/n_wearing) &
+                                                                /(normal_self_compliance(lattice, pair)*p_max)
+      end associate
     end associate
   end subroutine jump_change
 
   !> Correct the energy by which the second of two equal jumps wears, (V5).
   !>
   !> Never more than what the pressure that is left indents a node, and never less than nothing.
-  pure subroutine energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
+  pure subroutine energy_of_second_jump(lattice, pair, law, jumps, path, corrected)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants
     type(elastic_pair_t), intent(in) :: pair
+    !> How the surfaces wear
+    type(wear_law_t), intent(in) :: law
+    !> The jumps
+    type(two_jumps_t), intent(in) :: jumps
     !> Path of slip of the cycle between the two (n_col, n_row) [m]
     real(wp), intent(in) :: path(:, :)
-    !> Coefficient of wear [m^2/N]
-    real(wp), intent(in) :: coefficient
-    !> Cycles of each jump
-    real(wp), intent(in) :: cycles
-    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both (n_col, n_row) [J/m^2]
-    real(wp), intent(in) :: first(:, :), second(:, :), both(:, :)
     !> That of the second jump, corrected (n_col, n_row) [J/m^2]
     real(wp), intent(out) :: corrected(:, :)
     real(wp) :: node, most
     integer :: col, row
 
     node = normal_self_compliance(lattice, pair)
-    do row = 1, size(corrected, 2)
-      do col = 1, size(corrected, 1)
-        corrected(col, row) = second(col, row)
-        if (.not. (second(col, row) > 0.0_wp .and. path(col, row) > 0.0_wp .and. cycles > 0.0_wp)) cycle
-        ! d_n p mu/(n k) with p = e/(mu S)
-        most = node*second(col, row)/(path(col, row)*cycles*coefficient)
-        corrected(col, row) = max(second(col, row) + min(first(col, row) + second(col, row) - 2.0_wp*both(col, row), most), 0.0_wp)
+    associate (first => jumps%first, second => jumps%second, both => jumps%both)
+      do row = 1, size(corrected, 2)
+        do col = 1, size(corrected, 1)
+          corrected(col, row) = second(col, row)
+          if (.not. (second(col, row) > 0.0_wp .and. path(col, row) > 0.0_wp .and. jumps%cycles > 0.0_wp)) cycle
+          ! d_n p mu/(n k) with p = e/(mu S)
+          most = node*second(col, row)/(path(col, row)*jumps%cycles*law%coefficient)
+          corrected(col, row) = second(col, row) + min(first(col, row) + second(col, row) - 2.0_wp*both(col, row), most)
+          corrected(col, row) = max(corrected(col, row), 0.0_wp)
+        end do
       end do
-    end do
+    end associate
   end subroutine energy_of_second_jump
 
   !> Expect the end of a load step of the next cycle, to start it from: the end in the cycle before, extrapolated linearly in the

@@ -105,8 +105,7 @@ contains
 
     edges = edges_of(lattice, fields, zones)
     if (size(parts, 3) > 5) then
-      call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3), limits(:, :, 1), &
-                              limits(:, :, 2))
+      call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3), limits)
     else
       call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3))
     end if

@@ -18,7 +18,7 @@ module test_arguments
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
-  use hc_load_path, only: advance
+  use hc_load_path, only: advance, step_settings_t
   use testing, only: test_t, new_test, check, check_true, check_raised
   implicit none
   private
@@ -313,7 +313,7 @@ contains
     call small_contact(contact, state, error)
     if (allocated(error)) return
     do i = 1, size(target)
-      call advance(contact, state, target(i), .false., tolerance(i), sweeps(i), cuts(i), next, caught)
+      call advance(contact, state, target(i), step_settings_t(tolerance(i), sweeps(i), cuts(i)), next, caught)
       call check_raised(error, caught, status%invalid_input, 'target of a step')
       if (allocated(error)) return
     end do
@@ -367,7 +367,7 @@ contains
       case default
         state%pressure = virgin%pressure(2:, :)
       end select
-      call advance(contact, state, target, .false., 1.0e-8_wp, 40, 6, next, caught)
+      call advance(contact, state, target, step_settings_t(), next, caught)
       call check_raised(error, caught, status%invalid_input, 'state to go on from')
       if (allocated(error)) return
     end do
@@ -464,7 +464,7 @@ contains
       call check_true(error, state%converged .and. (state%clipped .eqv. clipped), 'a matrix without friction')
       if (allocated(error)) return
       target%value(normal) = load
-      call advance(friction, virgin, target, .false., 1.0e-8_wp, 60, 6, state, error)
+      call advance(friction, virgin, target, step_settings_t(1.0e-8_wp, 60, 6), state, error)
       if (allocated(error)) return
       call check_true(error, state%clipped .eqv. clipped, 'friction')
       if (allocated(error)) return
@@ -503,10 +503,10 @@ contains
     target%value(normal) = 0.05_wp
     call contact%solve(displacement_control, 0.05_wp, 1.0e-8_wp, 60, state(1), error)
     if (.not. allocated(error)) call direct%solve(force_control, 0.05_wp, 1.0e-8_wp, 60, state(2), error)
-    if (.not. allocated(error)) call advance(friction, virgin, target, .false., 1.0e-8_wp, 60, 0, state(3), error)
+    if (.not. allocated(error)) call advance(friction, virgin, target, step_settings_t(1.0e-8_wp, 60, 0), state(3), error)
     if (.not. allocated(error)) call contact%solve(force_control, 0.05_wp, 1.0e-12_wp, 1, state(4), error)
     if (.not. allocated(error)) call direct%solve(force_control, 0.05_wp, 1.0e-8_wp, 1, state(5), error)
-    if (.not. allocated(error)) call advance(friction, virgin, target, .false., 1.0e-8_wp, 1, 0, state(6), error)
+    if (.not. allocated(error)) call advance(friction, virgin, target, step_settings_t(1.0e-8_wp, 1, 0), state(6), error)
     if (allocated(error)) return
     call check_true(error, all(state(:3)%converged) .and. .not. any(state(4:)%converged), 'three that converge, three that do not')
     if (allocated(error)) return

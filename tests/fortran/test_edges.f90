@@ -446,7 +446,7 @@ contains
     traction(:, :, 2) = shear(r)
     mu = 0.0_wp*x + coefficient
     call new_contact_edges(edges, lattice, traction(:, :, 1), max(r - radius, 0.0_wp)**1.5_wp, r < radius, x < huge(1.0_wp))
-    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, mu)
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, spread(mu, 3, 1))
     reserve = merge(coefficient*pressure(r) - shear(r), 0.0_wp, r < stick)
     call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve of the nodes that stick')
     if (allocated(error)) return
@@ -460,7 +460,8 @@ contains
     end do
     ! a bound below mu p in the middle
     traction(:, :, 2) = min(traction(:, :, 2), bound - 0.1_wp)
-    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, mu, mu/coefficient*bound)
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, &
+                            reshape([mu, mu/coefficient*bound], [shape(mu), 2]))
     reserve = merge(min(coefficient*pressure(r), bound) - traction(:, :, 2), 0.0_wp, r < stick)
     call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve below a bound')
 

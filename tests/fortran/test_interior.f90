@@ -104,7 +104,7 @@ contains
       if (stat /= 0) exit
       n_row = n_row + 1
       value = load(1) + load(2)*corner(1, :) + load(3)*corner(2, :)
-      call triangle_fields(corner, value, at(1:1), at(2:2), at(3:3), nu, u, s, raised)
+      call triangle_fields(corner, value, reshape(at, [3, 1]), nu, u, s, raised)
       radius = norm2(at - [sum(corner, dim=2)/3.0_wp, 0.0_wp])
       volume = 0.5_wp*abs((corner(1, 2) - corner(1, 1))*(corner(2, 3) - corner(2, 1)) &
                           - (corner(1, 3) - corner(1, 1))*(corner(2, 2) - corner(2, 1)))*maxval(abs(value))
@@ -168,7 +168,7 @@ contains
           do load = 1, 3
             traction = 0.0_wp
             traction(load, :, :) = height
-            call mesh_fields(corner, traction, at(1:1), at(2:2), depth(j:j), 0.3_wp, u_sum, s_sum, raised)
+            call mesh_fields(corner, traction, reshape([at, depth(j)], [3, 1]), 0.3_wp, u_sum, s_sum, raised)
             call check(error, [u(:, load, 1), s(:, load, 1)], [u_sum(:, 1), s_sum(:, 1)], 1.0e-12_wp, 'sum of triangles')
             if (allocated(error)) return
           end do
@@ -226,7 +226,7 @@ contains
           depth = 0.15_wp*k
           call planes%set_depth(depth(1), raised)
           call planes%apply(traction(:, :, :, 1), plane, raised)
-          call fields_at_points(lattice, traction, body, 0.25_wp, reshape(x, [54]), reshape(y, [54]), depth, u, s, raised)
+          call fields_at_points(lattice, traction, body, 0.25_wp, transpose(reshape([x, y, depth], [54, 3])), u, s, raised)
           call check(error, reshape(plane, [54*6]), reshape(transpose(s(:, :, 1)), [54*6]), 1.0e-13_wp, 'stress on a plane')
           if (allocated(error)) return
         end do
@@ -247,7 +247,7 @@ contains
     call random_number(traction)
     at = matmul(lattice%basis, [2.0_wp, 1.0_wp])
     do body = 1, 2
-      call fields_at_points(lattice, traction, body, 0.2_wp, at(1:1), at(2:2), [0.0_wp], u, s, raised)
+      call fields_at_points(lattice, traction, body, 0.2_wp, reshape([at, 0.0_wp], [3, 1]), u, s, raised)
       call check(error, reshape(s([zz, xz, yz], 1, :), [6]), reshape(-traction(3, 2, :, :), [6]), thr, 'surface')
       if (allocated(error)) return
     end do

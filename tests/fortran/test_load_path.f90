@@ -14,7 +14,9 @@ module test_load_path
   use hc_frictional_contact, only: frictional_contact_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_contact_entry, only: entry_displacement
-  use hc_load_path, only: advance
+  use hc_load_path, only: advance, step_settings_t
+  use hc_adaptive_path, only: adaptive_path_t
+  use hc_step_control, only: accepted, failed, outgrown
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true, largest, coordinate
   implicit none
@@ -78,6 +80,8 @@ contains
       new_test('motions', test_motions), &
       new_test('rim', test_rim), &
       new_test('half_steps', test_half_steps), &
+      new_test('adaptive_reach', test_adaptive_reach), &
+      new_test('adaptive_rim', test_adaptive_rim), &
       new_test('any_start', test_any_start), &
       new_test('part_of_window', test_part_of_window), &
       new_test('entry_ring', test_entry_ring), &
@@ -159,12 +163,12 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
-    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [3.0_wp, 9.0_wp], 1.0e-14_wp, 'first step')
     if (allocated(error)) return
     state = next
-    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     ! another 4 m back, at the load -1
     area = solver%problem%lattice%cell_area()
@@ -192,7 +196,7 @@ contains
     ! contact, without any load
     state%pressure(2, 2) = tiny(1.0_wp)
     solver%reach = 2.5_wp
-    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     call check_true(error, next%converged, 'converged')
     if (allocated(error)) return
@@ -231,7 +235,7 @@ contains
     state%accumulated_slip = 0.5_wp
     state%dissipated_energy = 2.0_wp
     solver%reach = 2.5_wp
-    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     call check(error, solver%value(2, :solver%calls), [4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, 'starts')
     if (allocated(error)) return
@@ -243,7 +247,8 @@ contains
     if (allocated(error)) return
     solver%calls = 0
     solver%only_near = .true.
-    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(1.0e-8_wp, 40, 3), next, &
+                 error)
     if (allocated(error)) return
     call check_true(error, next%converged .and. next%cuts == 2, 'a path')
     if (allocated(error)) return
@@ -259,12 +264,13 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
-    call advance(solver, state, load_target_t(value=[1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     state = next
     solver%calls = 0
     solver%reach = 0.1_wp
-    call advance(solver, state, load_target_t(value=[9.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    call advance(solver, state, load_target_t(value=[9.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(1.0e-8_wp, 40, 3), next, &
+                 error)
     if (allocated(error)) return
     call check_true(error, .not. next%converged, 'not converged')
     if (allocated(error)) return
@@ -288,12 +294,12 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
-    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     state = next
     solver%calls = 0
     solver%reach = 2.0_wp
-    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(static=.true.), next, error)
     if (allocated(error)) return
     call check_true(error, next%converged .and. all(solver%from_zero(:solver%calls)), 'counted from zero')
     if (allocated(error)) return
@@ -302,6 +308,66 @@ contains
     call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
                [1.0_wp, 1.0_wp, 1.0_wp], 1.0e-14_wp, 'slip, path and energy')
   end subroutine test_static
+
+  !> Adaptive load steps are made smaller until they converge, and grow again; the smallest ends the path.
+  subroutine test_adaptive_reach(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state
+    type(adaptive_path_t) :: path
+    real(wp) :: ends(5)
+    integer :: step
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    solver%reach = 3.0_wp
+    call path%initialize(state, 1.0_wp)
+    do step = 1, size(ends)
+      call path%advance(solver, load_target_t(value=[8.0_wp]), step_settings_t(max_cuts=0), error)
+      if (allocated(error)) return
+      ends(step) = path%fraction
+    end do
+    ! all at once fails, and so does what is left as one step; a quarter of either converges, and so do steps of its size
+    call check(error, ends, [0.25_wp, 0.5_wp, 0.625_wp, 0.75_wp, 1.0_wp], 1.0e-14_wp, 'ends of the steps')
+    if (allocated(error)) return
+    call check(error, [path%state%load(normal), path%state%operator_applications], [8.0_wp, 2.0_wp], 1.0e-14_wp, 'last step')
+    if (allocated(error)) return
+    solver%reach = 1.0e-3_wp
+    call path%advance(solver, load_target_t(value=[16.0_wp]), step_settings_t(max_cuts=0), error)
+    if (allocated(error)) return
+    call check_true(error, .not. path%state%converged .and. path%verdict == failed, 'no convergence')
+    if (allocated(error)) return
+    call check(error, [path%reached, path%fraction], [1.0e-3_wp, 0.0_wp], 1.0e-14_wp, 'the smallest step')
+  end subroutine test_adaptive_reach
+
+  !> An attempt that reaches the rim of a window that grows is made again, with the work of both.
+  subroutine test_adaptive_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state
+    type(adaptive_path_t) :: path
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    solver%reach = 5.0_wp
+    solver%rim_load = 1.5_wp
+    call path%initialize(state, 1.0_wp)
+    path%grows = .true.
+    call path%advance(solver, load_target_t(value=[8.0_wp]), step_settings_t(max_cuts=0), error)
+    if (allocated(error)) return
+    call check_true(error, path%verdict == outgrown .and. path%attempt%n_rejected == 1, 'the second attempt reaches the rim')
+    if (allocated(error)) return
+    call check(error, [path%state%load(normal), path%fraction], [0.0_wp, 0.0_wp], 0.0_wp, 'the path is where it was')
+    if (allocated(error)) return
+    solver%rim_load = huge(1.0_wp)
+    call path%advance(solver, load_target_t(value=[8.0_wp]), step_settings_t(max_cuts=0), error)
+    if (allocated(error)) return
+    call check_true(error, path%verdict == accepted .and. path%n_rejected == 1, 'the same attempt again')
+    if (allocated(error)) return
+    call check(error, [path%state%load(normal), path%fraction], [2.0_wp, 0.25_wp], 1.0e-14_wp, 'the step')
+    if (allocated(error)) return
+    call check(error, path%state%sweeps, 9, 'sweeps of three solutions')
+  end subroutine test_adaptive_rim
 
   !> Motions are interpolated from the motions of the state, loads from its loads.
   subroutine test_motions(error)
@@ -314,8 +380,7 @@ contains
     state%load(:4) = [2.0_wp, 7.0_wp, 0.0_wp, -3.0_wp]
     state%motion(:4) = [5.0_wp, 0.0_wp, 1.0_wp, 2.0_wp]
     solver%reach = 2.0_wp
-    call advance(solver, state, load_target_t([f, d, f, d], [4.0_wp, 4.0_wp, -2.0_wp, 3.0_wp]), .false., 1.0e-8_wp, 40, 6, &
-                 next, error)
+    call advance(solver, state, load_target_t([f, d, f, d], [4.0_wp, 4.0_wp, -2.0_wp, 3.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     call check(error, solver%value(:, 2), [3.0_wp, 2.0_wp, -1.0_wp, 2.5_wp], 0.0_wp, 'half of the way')
     if (allocated(error)) return
@@ -334,7 +399,7 @@ contains
     if (allocated(error)) return
     solver%reach = 2.5_wp
     solver%rim_load = 3.0_wp
-    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(), next, error)
     if (allocated(error)) return
     call check_true(error, touches_rim(next) .and. .not. touches_rim(state), 'contact at the rim')
     if (allocated(error)) return
@@ -346,7 +411,8 @@ contains
     if (allocated(error)) return
     ! an attempt that failed may have pressure anywhere
     solver%reach = 0.5_wp
-    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 0, next, error)
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(1.0e-8_wp, 40, 0), next, &
+                 error)
     if (allocated(error)) return
     call check_true(error, touches_rim(next) .and. .not. (next%clipped .or. next%converged), 'not clipped, but not converged')
   end subroutine test_rim
@@ -363,12 +429,13 @@ contains
     call new_sphere(contact%frictional_contact_t, 10, 0.4_wp, -0.07_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(virgin, contact%problem%lattice)
-    call advance(contact, virgin, load_target_t(value=[load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, pressed, error)
+    call advance(contact, virgin, load_target_t(value=[load, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(tolerance, 60, 0), pressed, &
+                 error)
     if (allocated(error)) return
     target = load_target_t([f, f, f, d], [1.3_wp*load, 0.6_wp*mu*load, 0.5_wp*mu*load, 0.0_wp])
     do sweeps = 2, 59
       contact%n_done = 0
-      call advance(contact, pressed, target, .false., tolerance, sweeps, 6, cut, error)
+      call advance(contact, pressed, target, step_settings_t(tolerance, sweeps, 6), cut, error)
       if (allocated(error)) return
       if (cut%converged) exit
     end do
@@ -380,7 +447,7 @@ contains
       if (allocated(error)) return
       do i = 1, size(done, 2)
         target%value(:4) = done(:, i)
-        call advance(contact, parts, target, .false., tolerance, 60, 0, next, error)
+        call advance(contact, parts, target, step_settings_t(tolerance, 60, 0), next, error)
         if (allocated(error)) return
         call check_true(error, next%converged, 'an explicit part')
         if (allocated(error)) return
@@ -409,7 +476,7 @@ contains
     call check_true(error, cut%converged .and. cut%residual_tangential > 1.0e-3_wp, 'a residual that is not hidden')
     if (allocated(error)) return
     ! and it is another solution than that of the whole step
-    call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)
+    call advance(contact, pressed, target, step_settings_t(tolerance, 60, 0), next, error)
     if (allocated(error)) return
     call check_true(error, largest(next%traction - parts%traction) > 1.0e-4_wp*mu, 'the size of a step matters')
   end subroutine test_half_steps
@@ -442,15 +509,15 @@ contains
     call new_sphere(contact, 10, 0.4_wp, -0.25_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(virgin, contact%problem%lattice)
-    call advance(contact, virgin, load_target_t(value=[1.3_wp*load, -0.7_wp*mu*load, 0.0_wp, 0.0_wp]), .false., 1.0e-10_wp, 60, 6, &
-                 other, error)
+    call advance(contact, virgin, load_target_t(value=[1.3_wp*load, -0.7_wp*mu*load, 0.0_wp, 0.0_wp]), &
+                 step_settings_t(1.0e-10_wp, 60, 6), other, error)
     if (allocated(error)) return
     target = load_target_t(value=[load, 0.3_wp*mu*load, 0.5_wp*mu*load, 0.0_wp])
-    call advance(contact, virgin, target, .true., 1.0e-10_wp, 60, 6, state(1), error)
+    call advance(contact, virgin, target, step_settings_t(1.0e-10_wp, 60, 6, static=.true.), state(1), error)
     if (allocated(error)) return
-    call advance(contact, other, target, .true., 1.0e-10_wp, 60, 6, state(2), error)
+    call advance(contact, other, target, step_settings_t(1.0e-10_wp, 60, 6, static=.true.), state(2), error)
     if (allocated(error)) return
-    call advance(contact, other, target, .false., 1.0e-10_wp, 60, 6, next, error)
+    call advance(contact, other, target, step_settings_t(1.0e-10_wp, 60, 6), next, error)
     if (allocated(error)) return
     call check_true(error, state(1)%converged .and. state(2)%converged .and. next%converged, 'converged')
     if (allocated(error)) return
@@ -573,8 +640,8 @@ contains
     do i = 1, 2
       call new_friction_state(state, solver%problem%lattice)
       do step = 1, 3
-        call advance(solver, state, load_target_t(value=(step/3.0_wp)**3*load*[1.0_wp, ratio, 0.0_wp, 0.0_wp]), .false., &
-                     1.0e-8_wp, 40, 6, next, error, interpolated=i == 2)
+        call advance(solver, state, load_target_t(value=(step/3.0_wp)**3*load*[1.0_wp, ratio, 0.0_wp, 0.0_wp]), &
+                     step_settings_t(interpolated=i == 2), next, error)
         if (allocated(error)) return
         call check_true(error, next%converged, 'converged')
         if (allocated(error)) return
@@ -666,7 +733,7 @@ contains
     call new_sphere(solver%frictional_contact_t, 10, 0.3_wp, 0.1_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(virgin, plain%problem%lattice)
-    call advance(plain, virgin, load_target_t(value=[0.4_wp*load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, &
+    call advance(plain, virgin, load_target_t(value=[0.4_wp*load, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(tolerance, 60, 0), &
                  pressed, error)
     if (allocated(error)) return
     ! under load and under approach: both say whether nodes will enter
@@ -676,11 +743,11 @@ contains
         target%control(normal) = d
         target%value(normal) = expected%motion(normal)
       end if
-      call advance(plain, pressed, target, .false., tolerance, 60, 0, expected, error, interpolated=.true.)
+      call advance(plain, pressed, target, step_settings_t(tolerance, 60, 0, interpolated=.true.), expected, error)
       if (allocated(error)) return
       solver%loosest = tolerance
       solver%failures = 0
-      call advance(solver, pressed, target, .false., tolerance, 60, 0, next, error, interpolated=.true.)
+      call advance(solver, pressed, target, step_settings_t(tolerance, 60, 0, interpolated=.true.), next, error)
       if (allocated(error)) return
       call check_true(error, expected%converged .and. next%converged, 'converged')
       if (allocated(error)) return
@@ -692,7 +759,7 @@ contains
 
     solver%loosest = 0.0_wp
     solver%calls = 0
-    call advance(solver, pressed, target, .false., tolerance, 60, 2, next, error, interpolated=.true.)
+    call advance(solver, pressed, target, step_settings_t(tolerance, 60, 2, interpolated=.true.), next, error)
     if (allocated(error)) return
     call check_true(error, .not. next%converged .and. next%cuts == 2, 'halved in vain')
     if (allocated(error)) return
@@ -742,8 +809,8 @@ contains
     if (allocated(error)) return
     call new_friction_state(virgin, solver%problem%lattice)
     solver%content = .true.
-    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), .false., unreachable, 3, 0, &
-                 next, error, interpolated=.true.)
+    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), &
+                 step_settings_t(unreachable, 3, 0, interpolated=.true.), next, error)
     if (allocated(error)) return
     call check_true(error, .not. next%converged, 'not converged')
     if (allocated(error)) return
@@ -780,11 +847,11 @@ contains
     call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(none, contact%problem%lattice)
-    call advance(contact, none, load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 4, pressed, &
-                 error)
+    call advance(contact, none, load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(1.0e-9_wp, 60, 4), &
+                 pressed, error)
     if (allocated(error)) return
-    call advance(contact, pressed, load_target_t([f, f, f, d], [load, 1.2_wp*mu*load, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 4, &
-                 state, error)
+    call advance(contact, pressed, load_target_t([f, f, f, d], [load, 1.2_wp*mu*load, 0.0_wp, 0.0_wp]), &
+                 step_settings_t(1.0e-9_wp, 60, 4), state, error)
     if (allocated(error)) return
     call check_true(error, state%sliding .and. .not. state%converged, 'gross sliding')
     if (allocated(error)) return

@@ -5,13 +5,14 @@ module test_steps
   use hc_error, only: error_t, status
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
     displacement_control, rim_reached, separated, slip, stick
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_coulomb, only: coulomb_t
   use hc_field_space, only: field_space_t
-  use hc_frictional_contact, only: frictional_contact_t
-  use hc_load_path, only: advance
+  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
+  use hc_load_path, only: advance, step_settings_t
   use hc_options, only: step_options_t
   use hc_step_error, only: compare_halves, shear_free, step_change_t
-  use hc_step_control, only: accepted, failed, limited, rejected, step_attempt_t, step_control_t
+  use hc_step_control, only: accepted, failed, limited, outgrown, rejected, step_attempt_t, step_control_t
   use hc_adaptive_path, only: adaptive_path_t
   use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
@@ -21,7 +22,7 @@ module test_steps
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_wear_ahead, only: energy_ahead, worn_cycle_t
-  use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by, wear_left
+  use hc_wear_jumps, only: energy_of_second_jump, jump_change, two_jumps_t, wear_by, wear_law_t, wear_left
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring, turning_error
   use test_friction, only: new_sphere
@@ -47,6 +48,7 @@ contains
       new_test('halving', test_halving), &
       new_test('path', test_path), &
       new_test('path_to_the_rim', test_rim), &
+      new_test('path_on_a_growing_window', test_growing), &
       new_test('nodal_residuals', test_nodal_residuals), &
       new_test('energy', test_energy), &
       new_test('limits_of_error', test_limits), &
@@ -68,8 +70,10 @@ contains
     type(lattice_t) :: lattice
     type(step_change_t) :: change
     type(step_options_t) :: options
+    type(wear_law_t) :: law
     real(wp) :: depth(2, 2), volume, slower(2, 2), second(2, 2)
 
+    law = wear_law_t(2.0_wp, friction)
     depth = 1.0_wp
     call wear_by(energy, 2.0_wp, friction, 10.0_wp, 0.5_wp, depth, volume)
     call check(error, [depth, volume], [121.0_wp, 1.0_wp, 81.0_wp, 1.0_wp, 102.0_wp], thr, 'depth and volume')
@@ -78,18 +82,19 @@ contains
     if (allocated(error)) return
     associate (pair => elastic_pair_t(0.2_wp, 0.0_wp, 0.0_wp), after => energy + reshape([-1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp], [2, 2]))
       ! 40 and 40 more or less at two of the three nodes where friction dissipates
-      call jump_change(lattice, pair, energy, after, energy, 2.0_wp, friction, 10.0_wp, 5.0_wp, slower, change)
+      call jump_change(lattice, pair, law, two_jumps_t(energy, after, energy, 10.0_wp), 5.0_wp, slower, change)
       call check(error, reshape(slower, [4]), [-40.0_wp, 0.0_wp, 40.0_wp, 0.0_wp], thr, 'depth')
       if (allocated(error)) return
       call check(error, change%added/options%added_share*5.0_wp*normal_self_compliance(lattice, pair), &
                  40.0_wp*sqrt(2.0_wp/3.0_wp), thr, 'root mean square')
       if (allocated(error)) return
-      call jump_change(lattice, pair, energy, after, energy, 2.0_wp, friction, 10.0_wp, 0.0_wp, slower, change)
+      call jump_change(lattice, pair, law, two_jumps_t(energy, after, energy, 10.0_wp), 0.0_wp, slower, change)
       call check(error, change%added, 0.0_wp, 0.0_wp, 'without pressure')
       if (allocated(error)) return
       ! 1 less, to 1; 0.5 more, of which what is left of the pressure allows 0.01 times 1.5; a node that does not slip as it is
       associate (path => reshape([1.0_wp, 1.0_wp, normal_self_compliance(lattice, pair)/0.01_wp, 0.0_wp], [2, 2]))
-        call energy_of_second_jump(lattice, pair, path, 1.0_wp, 1.0_wp, energy, after, energy, second)
+        law%coefficient = 1.0_wp
+        call energy_of_second_jump(lattice, pair, law, two_jumps_t(energy, after, energy, 1.0_wp), path, second)
       end associate
       call check(error, reshape(second, [4]), [1.0_wp, 0.0_wp, 1.515_wp, 4.0_wp], thr, 'second jump')
     end associate
@@ -294,7 +299,7 @@ contains
     call check_true(error, .not. shear_free(whole, field_space_t(), step_options_t()), 'unlike bodies shear each other')
     if (allocated(error)) return
     associate (p => contact%problem)
-      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, virgin, virgin, 4.0_wp, change, field_space_t())
+      call compare_halves(p, whole, half, halves, virgin, virgin, 4.0_wp, change)
       expected = sum(norm2(whole%traction - halves%traction, dim=3))/(mu*sum(halves%pressure))
       ! of a contact area of pi, where the largest one is 4
       call check(error, change%traction, expected*pi/4.0_wp, 0.05_wp*expected, 'change of the tractions')
@@ -306,7 +311,7 @@ contains
       if (allocated(error)) return
       call check_true(error, change%lattice > 0.0_wp .and. change%gain >= 1.0_wp, 'rings of nodes enter')
       if (allocated(error)) return
-      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, whole, halves, 4.0_wp, change, field_space_t())
+      call compare_halves(p, whole, half, halves, whole, halves, 4.0_wp, change)
       call check(error, [change%added, change%lattice], [0.0_wp, 0.0_wp], thr, 'nothing added, no node entered')
     end associate
   end subroutine test_halving
@@ -319,7 +324,8 @@ contains
     type(contact_state_t), intent(out) :: next
     type(error_t), allocatable, intent(out) :: error
 
-    call advance(contact, state, load_target_t(value=[force, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 0, next, error)
+    call advance(contact, state, load_target_t(value=[force, 0.0_wp, 0.0_wp, 0.0_wp]), step_settings_t(1.0e-9_wp, 60, 0), next, &
+                 error)
     if (.not. allocated(error)) call check_true(error, next%converged, 'the step converges')
   end subroutine press
 
@@ -357,7 +363,8 @@ contains
     if (allocated(error)) return
     call check_true(error, bound(2) < bound(1), 'and has the smaller bound')
     if (allocated(error)) return
-    call path%advance(contact, load_target_t(), 0.0_wp, 1.0e-8_wp, 60, 6, failure)
+    path%tolerance = 0.0_wp
+    call path%advance(contact, load_target_t(), step_settings_t(), failure)
     call check_raised(error, failure, status%invalid_input, 'no tolerance')
   end subroutine test_path
 
@@ -378,12 +385,13 @@ contains
 
     call new_friction_state(state, contact%problem%lattice)
     call path%initialize(state, pi)
+    path%tolerance = tolerance
     n_step = 0
     within = .true.
     do segment = 1, 2
       target%value(:4) = [load, merge(0.0_wp, 0.3_wp*mu*load, segment == 1), 0.0_wp, 0.0_wp]
       do
-        call path%advance(contact, target, tolerance, 1.0e-8_wp, 60, 6, error)
+        call path%advance(contact, target, step_settings_t(max_sweeps=60), error)
         if (allocated(error)) return
         call check_true(error, path%state%converged, 'the step converges')
         if (allocated(error)) return
@@ -407,10 +415,88 @@ contains
     call new_friction_state(state, contact%problem%lattice)
     call path%initialize(state, pi)
     target%value(normal) = 20.0_wp*load
-    call path%advance(contact, target, 0.05_wp, 1.0e-8_wp, 60, 6, error)
+    path%tolerance = 0.05_wp
+    call path%advance(contact, target, step_settings_t(max_sweeps=60), error)
     if (allocated(error)) return
     call check_true(error, path%state%clipped .or. path%state%stopped == rim_reached, 'contact at the rim')
   end subroutine test_rim
+
+  !> A path on a window that grows is that on a large window: its steps, its tractions and the slip of all its nodes.
+  subroutine test_growing(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact, large
+    type(adaptive_path_t) :: path, reference
+    type(contact_state_t) :: state
+    type(lattice_t) :: small
+    type(load_target_t) :: target
+    integer :: n_grown, low(2), high(2)
+
+    call new_sphere(contact, 8, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    small = contact%problem%lattice
+    small%first = 2*small%first
+    small%extent = 2*small%extent - 1
+    call on_window(contact%problem, small, large, error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call path%initialize(state, 2.0_wp*pi)
+    call new_friction_state(state, small)
+    call reference%initialize(state, 2.0_wp*pi)
+    path%grows = .true.
+    ! so large that the step which needs a larger window is not made smaller there
+    path%tolerance = 10.0_wp
+    reference%tolerance = 10.0_wp
+    n_grown = 0
+    target = load_target_t(value=[load])
+    do
+      call path%advance(contact, target, step_settings_t(max_sweeps=60), error)
+      if (allocated(error)) return
+      if (path%verdict == outgrown) then
+        n_grown = n_grown + 1
+        small = contact%problem%lattice
+        call on_window(contact%problem, path%larger, contact, error)
+        if (.not. allocated(error)) call path%carry(contact, small, error)
+        if (allocated(error)) return
+        cycle
+      end if
+      call reference%advance(large, target, step_settings_t(max_sweeps=60), error)
+      if (allocated(error)) return
+      call check(error, path%fraction, reference%fraction, 1.0e-6_wp, 'end of the step')
+      if (allocated(error)) return
+      if (path%fraction < 1.0_wp) cycle
+      if (target%value(normal) > load) exit
+      ! the first window held the contact so far
+      call check(error, n_grown, 0, 'growth')
+      if (allocated(error)) return
+      target%value(normal) = 6.0_wp*load
+    end do
+    call check_true(error, n_grown > 0 .and. all(path%state%zone(1, :) == separated), 'the window grew')
+    if (allocated(error)) return
+    low = contact%problem%lattice%first - large%problem%lattice%first + 1
+    high = low + contact%problem%lattice%extent - 1
+    associate (whole => reference%state, part => path%state)
+      call check(error, largest(part%traction - whole%traction(low(1):high(1), low(2):high(2), :)), 0.0_wp, 1.0e-6_wp, 'tractions')
+      if (allocated(error)) return
+      call check(error, largest(part%accumulated_slip - whole%accumulated_slip(low(1):high(1), low(2):high(2))), 0.0_wp, &
+                 1.0e-6_wp, 'slip')
+      if (allocated(error)) return
+      call check(error, part%dissipated_energy, whole%dissipated_energy, 1.0e-6_wp, 'energy')
+    end associate
+  end subroutine test_growing
+
+  !> The same sphere on another window.
+  subroutine on_window(problem, lattice, contact, error)
+    type(friction_problem_t), intent(in) :: problem
+    type(lattice_t), intent(in) :: lattice
+    type(frictional_contact_t), intent(inout) :: contact
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: same
+    real(wp) :: x(lattice%extent(1), lattice%extent(2)), y(lattice%extent(1), lattice%extent(2))
+
+    call lattice%coordinates(x, y)
+    call new_friction_problem(same, lattice, problem%pair, 0.5_wp*(x**2 + y**2), x < 100.0_wp, problem%friction, .false., error)
+    if (.not. allocated(error)) call new_frictional_contact(contact, same, error)
+  end subroutine on_window
 
   !> The largest of them are the residuals of the state; away from the contact they are zero.
   subroutine test_nodal_residuals(error)
@@ -426,7 +512,8 @@ contains
       call new_sphere(contact, 10, 0.5_wp, 0.3_wp, friction, error)
       if (allocated(error)) return
       call new_friction_state(virgin, contact%problem%lattice)
-      call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-5_wp, 60, 0, state, error)
+      call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), &
+                   step_settings_t(1.0e-5_wp, 60, 0, static=.true.), state, error)
       if (allocated(error)) return
       allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, &
                                                            contact%problem%normal_law, state, field_space_t()))
@@ -463,7 +550,7 @@ contains
     if (allocated(error)) return
     target%control(about_z) = displacement_control
     target%value(:4) = [load, 0.0_wp, 0.0_wp, 0.01_wp]
-    call advance(contact, pressed, target, .false., 1.0e-9_wp, 60, 0, twisted, error)
+    call advance(contact, pressed, target, step_settings_t(1.0e-9_wp, 60, 0), twisted, error)
     if (allocated(error)) return
     call check(error, elastic_energy(contact%problem%lattice, contact%problem%initial_gap, twisted) - energy, &
                0.5_wp*twisted%load(about_z)*0.01_wp, 1.0e-8_wp, 'energy of the twist')
@@ -593,6 +680,7 @@ contains
   subroutine test_change_by_halves(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
+    type(friction_problem_t) :: problem
     type(contact_state_t) :: virgin, half, halves, whole
     type(step_change_t) :: change
     integer, parameter :: n = 30
@@ -603,13 +691,16 @@ contains
     if (allocated(error)) return
     allocate (x(2*n + 1, 2*n + 1), y(2*n + 1, 2*n + 1))
     call lattice%coordinates(x, y)
+    call new_friction_problem(problem, lattice, elastic_pair_t(0.2_wp, 0.0_wp, 0.0_wp), 0.0_wp*x, x < 100.0_wp, coulomb_t(mu), &
+                              .false., error)
+    if (allocated(error)) return
     call new_friction_state(virgin, lattice)
     half = sheared(c(1))
     halves = sheared(c(2))
     whole = halves
     whole%traction = whole%traction*1.01_wp
     associate (p => halves%pressure, area => pi*radius**2)
-      call compare_halves(lattice, x < 100.0_wp, coulomb_t(mu), whole, half, halves, virgin, virgin, area, change, field_space_t())
+      call compare_halves(problem, whole, half, halves, virgin, virgin, area, change)
       if (allocated(error)) return
       call check(error, change%gain, (c(1)**2 - c(2)**2)/(c(1)**3 - c(2)**3), 0.03_wp, 'gain')
       if (allocated(error)) return
@@ -620,8 +711,7 @@ contains
       call check(error, change%stick, 0.0_wp, 0.01_wp, 'the same stick area')
       if (allocated(error)) return
       ! an area that was twice as large halves everything
-      call compare_halves(lattice, x < 100.0_wp, coulomb_t(mu), whole, half, halves, whole, halves, 2.0_wp*area, change, &
-                          field_space_t())
+      call compare_halves(problem, whole, half, halves, whole, halves, 2.0_wp*area, change)
       call check(error, [change%traction, change%added], [0.005_wp*(1.0_wp - c(2)**3), 0.0_wp], 5.0e-5_wp, &
                  'beside a contact that was larger, inherited')
     end associate

@@ -24,7 +24,7 @@ from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separa
 from hexcontact.deck.write import STARTERS, starter, written
 from hexcontact.errors import DeckError
 from hexcontact.problem.preview import case_rows
-from hexcontact.problem.window import estimate_contact, grown, rim_sides
+from hexcontact.problem.window import estimate_contact, reaches_rim
 
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -84,7 +84,7 @@ def solved(case: Case) -> NormalSolution:
 
 
 def on_rim(field: NDArray[Any]) -> bool:
-    return any(rim_sides(field > 0))
+    return reaches_rim(field > 0)
 
 
 # --- decks -------------------------------------------------------------------------------------------------
@@ -674,13 +674,13 @@ def test_a_contact_without_end_is_refused() -> None:
 def test_growing_keeps_the_nodes() -> None:
     case = sphere_on_flat(nodes_across=21)
     lattice = case.lattice
-    larger = grown(lattice)
+    larger = lattice.grown(np.ones(lattice.shape, dtype=bool))
     assert (larger.spacing, larger.origin) == (lattice.spacing, lattice.origin)
     assert larger.shape == (33, 33)
     assert (larger.row_first, larger.col_first) == (lattice.row_first - 6, lattice.col_first - 6)
     contact = np.zeros(lattice.shape, dtype=bool)
     contact[0, 5] = contact[7, -1] = True
-    larger = grown(lattice, rim_sides(contact))
+    larger = lattice.grown(contact)
     assert larger.shape == (27, 27)
     assert (larger.row_first, larger.col_first) == (lattice.row_first - 6, lattice.col_first)
 

@@ -256,9 +256,14 @@ class Contact(Handle):
     def _solved(self, kind: type[S], procedure: Callable[..., int], *arguments: Any) -> S:
         """Return the solution that a procedure of the core finds, with views of its fields."""
         try:
-            held = HeldState(procedure(self, *arguments), self.lattice.shape)
+            handle = procedure(self, *arguments)
         finally:
             kernel_cache.warn_of_faults()
+        return self._found(kind, handle)
+
+    def _found(self, kind: type[S], handle: int) -> S:
+        """Return the solution behind a handle, with views of its fields."""
+        held = HeldState(handle, self.lattice.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
         found |= {"zone": held.view("zone").astype(np.int8), "stopped": _STOPPED[found["stopped"]]}
         names = [field.name for field in fields(kind)]

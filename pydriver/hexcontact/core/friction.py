@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import flat
+from . import flat, kernel_cache
 from .contact import (
     UNILATERAL,
     Contact,
@@ -31,12 +31,14 @@ from .contact import (
     thread_count,
     window_size,
 )
+from .flat import AdaptiveSteps
 from .handles import HeldState
 from .lattice import Lattice
 
 Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
+MAX_SWEEPS, MAX_CUTS = 40, 6
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS = CORE["fields"]
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
@@ -147,10 +149,6 @@ class ContactState(NormalSolution):
     sliding: bool = False
     cuts: int = 0
 
-    def recounted(self, **changes: Any) -> ContactState:
-        """Return this end of a load step with other counts, residuals or slip of the step."""
-        return dataclasses.replace(self, **changes).behind(self.known)
-
 
 class FrictionalContact(Contact):
     """A contact problem with friction; `advance` solves the step from one load to the next.
@@ -228,8 +226,8 @@ class FrictionalContact(Contact):
         static: bool = False,
         entry: Entry = "implicit",
         tolerance: float = 1e-8,
-        max_sweeps: int = 40,
-        max_cuts: int = 6,
+        max_sweeps: int = MAX_SWEEPS,
+        max_cuts: int = MAX_CUTS,
     ) -> ContactState:
         """Advance a state to new loads or motions.
 
@@ -284,34 +282,46 @@ class FrictionalContact(Contact):
             *(entry == "interpolated", tolerance),
             *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts"), self._held(state)),
         )
-        if not self._mask.all():
-            gap = np.where(self._mask, found.gap, np.nan)
-            gap.flags.writeable = False  # the core has another
-            found = dataclasses.replace(found, gap=gap).behind(found.known)
+        found = self._masked(found)
         self._warn_of_rim(found)
         return found
 
-    def joined(self, first: ContactState, last: ContactState) -> ContactState:
-        """Join two steps to one, with the end of the second.
+    def _masked(self, found: ContactState) -> ContactState:
+        """Return a state whose gap is NaN where the bodies cannot touch."""
+        if self._mask.all():
+            return found
+        gap = np.where(self._mask, found.gap, np.nan)
+        gap.flags.writeable = False  # the core has another
+        return dataclasses.replace(found, gap=gap).behind(found.known)
 
-        Parameters
-        ----------
-        first, last
-            Ends of the first and of the second step.
+    def attempt(
+        self,
+        steps: AdaptiveSteps,
+        control: Sequence[str],
+        targets: Sequence[Sequence[float]],
+        before: ContactState,
+        whole: ContactState | None,
+        entry: Entry = "implicit",
+        tolerance: float = 1e-8,
+    ) -> tuple[AdaptiveSteps, ContactState | None, ContactState | None]:
+        """Attempt a load step as a whole and in halves: fortran/path/adaptive_path.f90.
 
-        Returns
-        -------
-        ContactState
-            The end of the second step with the slip of both, and the residual of the friction conditions for
-            this slip; the work is that of the second.
+        The targets are those in the middle and at the end, with bulk strains. Both paths go on from `before`
+        and `whole` (None: they are one). Return the judged attempt and the ends of both paths, the first that
+        of the last solution.
         """
-        (slip_x, slip_y), residual = flat.record_steps(self, self._held(first), self._held(last))
-        return last.recounted(
-            slip_increment_x=slip_x,
-            slip_increment_y=slip_y,
-            residual_tangential=residual,
-            cuts=first.cuts + last.cuts,
-        )
+        start = self._held(before)
+        ends = start, start if whole is None else self._held(whole)
+        limits = tolerance, MAX_SWEEPS, MAX_CUTS
+        kinds = [_CONTROLS[word] for word in control]
+        try:
+            steps, *handles = flat.attempt_step(
+                self, steps, kinds, *targets, entry == "interpolated", *limits, *ends
+            )
+        finally:
+            kernel_cache.warn_of_faults()
+        after, apart = (self._masked(self._found(ContactState, each)) if each else None for each in handles)
+        return steps, after, apart
 
     def _held(self, state: ContactState) -> HeldState:
         """Return a state in the memory of the core, which is no copy if it was found there."""
@@ -335,23 +345,11 @@ class FrictionalContact(Contact):
         lattice
             The smaller window.
         """
-        arrays: dict[str, Any] = {
-            name: lattice.embed(getattr(state, name), self.lattice, 0.0) for name in _FIELDS
-        }
-        loaded = bool(np.any(state.pressure > 0))
-        known = lattice.embed(np.ones(lattice.shape), self.lattice, 0.0).astype(bool)
-        motion = [getattr(state, name) for name in MOTION]
-        if loaded or any(motion):
-            traction = [arrays[name] for name in ("pressure", "traction_x", "traction_y")]
-            closing, s_x, s_y = flat.relative_displacement(self, traction, motion)
-            arrays["gap"] = np.where(known, arrays["gap"], self._gap + closing)
-            arrays["relative_displacement_x"] = np.where(known, arrays["relative_displacement_x"], s_x)
-            arrays["relative_displacement_y"] = np.where(known, arrays["relative_displacement_y"], s_y)
-        else:
-            arrays["gap"] = self._gap.copy()
-        arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
-        zone = lattice.embed(state.zone, self.lattice, 0)
-        return dataclasses.replace(state, **arrays, zone=zone.astype(np.int8), touches_rim=False)
+        start = state.held
+        handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
+        found = self._masked(self._found(ContactState, handle))
+        fields = {name: getattr(found, name) for name in (*_FIELDS, "zone")}
+        return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)
 
 
 def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: Lattice) -> FrictionLaw:

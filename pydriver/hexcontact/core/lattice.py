@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, integer, number, reals
+from ..arrays import Array, Mask, integer, number, reals
 from ..errors import DeckError
 from . import flat
 
@@ -157,15 +157,11 @@ class Lattice:
         across = self.rows * self.basis[1, axis]
         return self.origin[axis] + across[:, None] + along[None, :]
 
-    def grown(self, bottom: int = 0, top: int = 0, left: int = 0, right: int = 0) -> Lattice:
-        """Return the window with more rows (bottom, top) and columns (left, right)."""
-        return replace(
-            self,
-            row_first=self.row_first - bottom,
-            col_first=self.col_first - left,
-            n_row=self.n_row + bottom + top,
-            n_col=self.n_col + left + right,
-        )
+    def grown(self, contact: Mask) -> Lattice:
+        """Return a window with a quarter more nodes, four at least, on each side that a contact reaches."""
+        low, extent = (each.tolist() for each in flat.grown_window(self, contact))
+        row, col = self.row_first + low[1], self.col_first + low[0]
+        return replace(self, row_first=row, col_first=col, n_row=extent[1], n_col=extent[0])
 
     def embed(self, field: NDArray[np.generic], other: Lattice, fill: float = 0.0) -> NDArray[np.generic]:
         """Return a field of this window on another one of the same lattice.

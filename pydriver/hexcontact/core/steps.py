@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,49 +11,25 @@ import numpy as np
 from ..arrays import Array, Mask
 from . import flat
 from .contact import ElasticPair, Interface, checked_interface
+from .flat import AdaptiveSteps as AdaptiveSteps
 from .flat import Change as Change
+from .flat import begin_step as begin_step
 from .flat import change_by_jump as change_by_jump
+from .flat import forget_changes as forget_changes
+from .flat import new_steps as new_steps
 from .flat import wear_left as wear_left
 from .flat import worn as worn
 from .friction import ContactState, FrictionLaw
-from .handles import HeldState
 from .lattice import Lattice
 
-REJECTED, ACCEPTED, LIMITED, FAILED = range(4)
+REJECTED, ACCEPTED, LIMITED, FAILED, OUTGROWN = range(5)
 """Verdicts on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones do
-not help; the smallest one did not converge."""
+not help; the smallest one did not converge; the contact reached the rim of its window."""
 
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
-NO_CHANGE = Change(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-_COMPARED = (
-    *("pressure", "gap", "zone", "traction_x", "traction_y"),
-    *("relative_displacement_x", "relative_displacement_y"),
-)
-
-
-def change_by_halving(
-    lattice: Lattice,
-    candidate: Mask,
-    friction: FrictionLaw,
-    states: Sequence[ContactState | None],
-    area: float,
-) -> Change:
-    """Compare the two solutions at the end of a load step.
-
-    The states are the end of the path in whole steps, the middle and the end of that in halves, and both
-    paths at the beginning of the step (None before the first load); the area is the largest of the history.
-    """
-    zero = np.zeros(lattice.shape)
-    none = HeldState.copied(dict.fromkeys(_COMPARED, zero), {}) if None in states else None
-    known = (none if state is None else state for state in states)
-    return flat.compare_halves(lattice, candidate, friction, *known, area)
-
-
-def is_shear_free(state: ContactState | None) -> bool:
-    """Test whether a state has no shear tractions: a path of such states has no history."""
-    return state is None or bool(flat.is_shear_free(state))
+_NO_CHANGE = Change(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 def expected_end(
@@ -110,6 +86,22 @@ Attempt = SimpleNamespace
 """An attempt at a load step: the numbers of `flat.Attempt`, such as its `end`."""
 
 
+_CHOOSER = ("size", "first", "stick", "traction")
+_MEMORY = {"stick": "past_stick", "traction": "past_traction", "spent": "spent", "turned": "turned"}
+
+
+def record_of(steps: Any) -> dict[str, Any]:
+    """Return the control of load steps in the record of a step."""
+    memory = {name: getattr(steps, number) for name, number in _MEMORY.items()}
+    return {**{name: getattr(steps, name) for name in _CHOOSER}, "memory": memory}
+
+
+def restored(steps: Any, record: Mapping[str, Any]) -> Any:
+    """Return the control of load steps from the record of a step."""
+    memory = {number: record["memory"][name] for name, number in _MEMORY.items()}
+    return steps._replace(**{name: record[name] for name in _CHOOSER}, **memory)
+
+
 class StepControl:
     """Control of load steps: the size of the next one, and the changes by the last ones."""
 
@@ -119,26 +111,18 @@ class StepControl:
     @classmethod
     def from_record(cls, record: Mapping[str, Any], least: float = LEAST) -> StepControl:
         """Return the control from the record of a step."""
-        control, past = cls(least), record["memory"]
-        numbers = {name: record[name] for name in ("size", "first", "stick", "traction")}
-        numbers |= {"past_stick": past["stick"], "past_traction": past["traction"]}
-        control._now = control._now._replace(**numbers, spent=past["spent"], turned=past["turned"])
+        control = cls(least)
+        control._now = restored(control._now, record)
         return control
 
     @property
     def record(self) -> dict[str, Any]:
         """The control in the record of a step."""
-        size, first, stick, traction, *past, _ = self._now
-        memory = dict(zip(("stick", "traction", "spent", "turned"), past, strict=True))
-        return {"size": size, "first": first, "stick": stick, "traction": traction, "memory": memory}
+        return record_of(self._now)
 
     def begin_with(self, size: float) -> None:
         """Set the first size of a segment, as a part of it."""
         self._now = self._now._replace(first=0.5 * size)  # the core doubles that of the segment before
-
-    def forget(self) -> None:
-        """Reset the changes, as after a load step of given size."""
-        self._now = flat.StepControl(self._now.size, self._now.first, *[0.0] * 6, self._now.least)
 
     def first_attempt(self, fraction: float, largest: float) -> Attempt:
         """Return the first attempt at a load step that begins at a fraction of its segment."""
@@ -148,7 +132,7 @@ class StepControl:
     def judge(self, attempt: Attempt, change: Change | None, tolerance: float) -> int:
         """Return the verdict on an attempt (None: it did not converge); a rejected one becomes the next."""
         known = change is not None
-        found, verdict = flat.decide_attempt(self._now, attempt, known, change or NO_CHANGE, tolerance)
+        found, verdict = flat.decide_attempt(self._now, attempt, known, change or _NO_CHANGE, tolerance)
         vars(attempt).update(found._asdict())
         return int(verdict)
 

@@ -31,7 +31,6 @@ MOST_TRIALS = 24  # coarse solutions; a contact along a line has no end
 MOST_ENLARGEMENTS = 12
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
-GROWTH = 0.25
 MOST_NODES_PER_SIDE = 100_000
 # Decimal logarithms of the stiffness of an interface over that of the bodies.
 SOFTEST, STIFFEST = -30.0, 12.0
@@ -117,21 +116,9 @@ def covering(window: Lattice, spacing: float, origin: tuple[float, float]) -> La
     return enclosing(lower + slack, upper - slack, spacing, 0, origin)
 
 
-def rim_sides(contact: Mask) -> tuple[bool, bool, bool, bool]:
-    """Test whether a contact reaches first row, last row, first column and last column of its window."""
-    return (
-        bool(contact[0].any()),
-        bool(contact[-1].any()),
-        bool(contact[:, 0].any()),
-        bool(contact[:, -1].any()),
-    )
-
-
-def grown(lattice: Lattice, sides: tuple[bool, bool, bool, bool] = (True, True, True, True)) -> Lattice:
-    """Return a larger window with the same nodes: a quarter more (four at least) on each given side."""
-    rows = max(4, math.ceil(GROWTH * lattice.n_row))
-    cols = max(4, math.ceil(GROWTH * lattice.n_col))
-    return lattice.grown(*(n * side for n, side in zip((rows, rows, cols, cols), sides, strict=True)))
+def reaches_rim(contact: Mask) -> bool:
+    """Test whether a contact reaches the rim of its window."""
+    return bool(contact[[0, -1]].any() or contact[:, [0, -1]].any())
 
 
 # --- the estimate -------------------------------------------------------------------------------------------
@@ -157,9 +144,9 @@ def estimate_contact(
             # under load control there is always contact; at an approach it may lie between the nodes
             lattice = centered(lattice.spacing / 4, center, lattice.shape, origin)
             continue
-        if any(sides := rim_sides(contact)):
+        if reaches_rim(contact):
             if enclosed:
-                lattice = grown(lattice, sides)
+                lattice = lattice.grown(contact)
             elif (enlargements := enlargements + 1) > MOST_ENLARGEMENTS:
                 break
             else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
@@ -16,10 +16,10 @@ from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, Norm
 from ..core.friction import ContactState, FrictionalContact
 from ..core.lattice import Lattice
 from ..core.measures import measures
+from ..core.steps import AdaptiveSteps
 from ..errors import DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
-from ..problem.window import grown, rim_sides
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, STATE, names_where
 from .events import Listener
@@ -91,7 +91,7 @@ class Window(ABC, Generic[S]):
             )
         del self._contact  # its memory goes before that of the next comes
         self._bodies.clear()
-        larger = grown(self.lattice, rim_sides(solution.zone > 0))
+        larger = self.lattice.grown(solution.zone > 0)
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return type(self)(self.case, larger, self.steps_held, self.listener)
 
@@ -227,9 +227,32 @@ class FrictionWindow(Window[ContactState]):
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
-            entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
-            **{"tolerance": self.case.solver.tolerance} | how,
+            **self._how | how,
         )
+
+    def attempt(
+        self,
+        steps: AdaptiveSteps,
+        before: ContactState | None,
+        whole: ContactState | None,
+        parts: Sequence[tuple[LoadStep, tuple[float, ...]]],
+    ) -> tuple[AdaptiveSteps, ContactState | None, ContactState | None]:
+        """Attempt an adaptive load step, whose parts are the load steps to its middle and to its end."""
+        return self._contact.attempt(
+            steps,
+            [motion.control for motion in parts[-1][0].targets],
+            [[*values, *self.case.bulk(part.bulk)[1]] for part, values in parts],
+            self._contact.virgin() if before is None else before,
+            whole,
+            **self._how,
+        )
+
+    @property
+    def _how(self) -> dict[str, Any]:
+        """Entry of nodes and tolerance of the solver."""
+        solver = self.case.solver
+        entry = "interpolated" if solver.entry == "interpolated" else "implicit"
+        return {"entry": entry, "tolerance": solver.tolerance}
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
@@ -243,10 +266,6 @@ class FrictionWindow(Window[ContactState]):
         if self.worn is not None:
             larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0), dtype=float))
         return larger
-
-    def joined(self, first: ContactState, last: ContactState) -> ContactState:
-        """Record two steps as one, with the slip of both and its residual."""
-        return self._contact.joined(first, last)
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; the history of the new nodes follows from it."""

@@ -12,10 +12,9 @@ from fuzz.file_made import WINDOW, made_step, written
 from hexcontact import Case
 from hexcontact.errors import DeckError
 from hexcontact.result import check
-from hexcontact.result.journal import journal_of, write_record
+from hexcontact.result.journal import Solution, TrialFolder, journal_of, write_record
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
-from hexcontact.result.trials import Solution, TrialFolder
 from hexcontact.study.dataset import histories
 from hexcontact.variables import LARGEST, RESIDUALS, VARIABLES
 

@@ -23,10 +23,10 @@ from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
 from hexcontact.core import contact, flat, friction, handles, influence, memory
 from hexcontact.core.contact import ElasticPair
-from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.handles import HeldState
 from hexcontact.core.lattice import Lattice
+from hexcontact.core.measures import area_radius
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
     ConvergenceError,
@@ -45,8 +45,8 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve import steps as solve
+from hexcontact.solve.events import Lines
 from hexcontact.solve.memory_needed import memory_needed
-from hexcontact.solve.progress import Lines
 from hexcontact.solve.window import FrictionWindow, state_of
 from hexcontact.variables import FIELDS, WORN
 

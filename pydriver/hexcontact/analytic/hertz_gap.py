@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
-from .elliptic import EllipticContact, hertz_ellipse
+from .frictionless import EllipticContact, hertz_ellipse
 
 if TYPE_CHECKING:
     import xarray

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Check a deck, report all its faults, and print a summary of the case."""
     from ..problem import plausibility
-    from ..problem.preview import case_rows
-    from ..problem.refinement import least_and_most
+    from ..problem.preview import case_rows, least_and_most
     from ..solve.memory_needed import peak_memory, require_memory
     from . import printed
 
@@ -74,7 +73,7 @@ def schema(
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
-    from ..study.study_file import study_schema
+    from ..study.plan import study_schema
 
     text = json.dumps(study_schema() if study else deck_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None or str(output) == "-":
@@ -96,7 +95,7 @@ def new(
     output: Annotated[Path | None, output_to("File to write; default: NAME.toml; - prints it.")] = None,
 ) -> None:
     """Write a commented deck to start from."""
-    from ..deck.write import STARTERS, starter
+    from ..deck.toml import STARTERS, starter
 
     if listing or name is None:
         print("\n".join(STARTERS))

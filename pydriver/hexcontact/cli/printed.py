@@ -100,7 +100,7 @@ class Summary(NamedTuple):
     def remarks(self) -> list[str]:
         """Sentences about doubtful steps."""
         found = remarks(self.histories, self.parameters)
-        from ..deck.recorded import recorded
+        from ..deck.read import recorded
 
         try:
             recorded(self.deck).tables("body")

@@ -22,11 +22,11 @@ import numpy as np
 
 from .._version import __version__
 from ..deck.below import Fatigue, Stress
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError, HexcontactError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
-from ..interior.extremes import place_of
 from ..interior.files import readable_table, tables_of
+from ..interior.stress import place_of
 from ..plotting.report_data import drawn_data, mapped_steps
 from ..problem.preview import case_rows
 from ..problem.problem import Problem

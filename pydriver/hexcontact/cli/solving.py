@@ -18,8 +18,8 @@ from ..result.netcdf import missing_stresses
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solving
+from ..solve.events import reporter
 from ..solve.interruption import Interrupted, in_background
-from ..solve.progress import reporter
 from ..text import listed, visible
 from . import printed
 from .frame import Report, print_error, print_output, write_json

@@ -54,8 +54,7 @@ def study(
     log_level: Level = None,
 ) -> Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
-    from ..study.progress import study_reporter
-    from ..study.study import Study
+    from ..study.study import Study, study_reporter
     from .solving import Messages
 
     if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
@@ -182,7 +181,7 @@ class _State:
 
 def _run_cases(study: Study, numbers: Sequence[int], retry: bool, messages: Messages) -> list[Outcome]:
     """Run cases for a job array; signals end the process unless all are done; finished steps stay."""
-    from ..solve.progress import reporter
+    from ..solve.events import reporter
 
     outcomes: list[Outcome] = []
     listener = reporter(messages.silent)

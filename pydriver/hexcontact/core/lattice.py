@@ -1,13 +1,14 @@
-"""The lattice of nodes: positions, windows, and transfer of fields between windows."""
+"""The lattice of nodes: positions, windows, transfer between windows, fields between the nodes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, integer, number, reals
 from ..errors import DeckError
@@ -186,3 +187,58 @@ class Lattice:
         if bottom > top and right > left:
             result[top:bottom, left:right] = field[top - row : bottom - row, left - col : right - col]
         return result
+
+
+Point = tuple[float, float]
+
+
+def linear(
+    values: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float = 0.0
+) -> Array:
+    """Interpolate values at the nodes of a lattice linearly on its triangles.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_row, n_col)
+        Values at the nodes.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    x, y : array_like
+        Points, m.
+    outside : float
+        Value at nodes outside the window.
+
+    Returns
+    -------
+    ndarray
+        Values at the points, in their shape.
+    """
+    nodes = Nodes(np.asarray(basis), start, np.shape(values))
+    return np.asarray(flat.field_between_nodes(nodes, values, outside, x, y))
+
+
+def nearest(
+    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
+) -> Array:
+    """Return the values at the nodes next to points; parameters as of `linear`."""
+    col, row, inside = flat.nodes_next_to(Nodes(basis, start, values.shape), x, y)
+    return np.where(inside, values[row, col], outside).astype(float)
+
+
+def section_ends(
+    lattice: Lattice, pressure: Array, angle: float, through: Point | None
+) -> tuple[Point, Point, float]:
+    """Return the ends of a line across a contact, and the distance of its zero from the first one (m)."""
+    point = (0.0, 0.0) if through is None else through
+    ends, zero = flat.section_of_pressure(lattice, pressure, angle, through is not None, point)
+    (x0, y0), (x1, y1) = ends.tolist()
+    return (x0, y0), (x1, y1), zero
+
+
+def crossings(lattice: Lattice, start: Point, end: Point) -> Array:
+    """Return where a line crosses edges of triangles, as distances from its start (m), with its ends."""
+    most = 8 + int(4.0 * math.dist(start, end) / lattice.spacing)  # rows are sqrt(3)/2 spacings apart
+    distance, count = flat.crossings_of_line(lattice, start, end, most)
+    return np.asarray(distance[:count])

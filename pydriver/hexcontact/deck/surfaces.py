@@ -23,9 +23,9 @@ from ..arrays import Array, Mask
 from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
-from .formula import Formula
 from .kinds import (
     Flag,
+    Formula,
     HeightFormula,
     Kind,
     PowerCoefficient,

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from .. import netcdf_library
 from ..deck.below import Fatigue, Stress
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError
 from ..files import reading, remove_stale, replacing
 from ..text import quantity
-from .extremes import extremes_of, place_of
+from .stress import extremes_of, place_of
 
 if TYPE_CHECKING:
     import xarray

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..analytic.compare import CIRCULAR, ClosedForms
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
-from ..analytic.shear import CIRCULAR, ClosedForms
 from ..arrays import Array
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of

@@ -15,8 +15,8 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefin
 
 from ..arrays import Array, Mask
 from ..core.edges import ZoneMesh
-from ..core.interpolation import linear
-from ..result.mesh import triangles
+from ..core.lattice import linear
+from ..result.netcdf import triangles
 from ..result.result import Result
 from ..result.view import StepView
 from ..text import scaled

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..analytic.shear import ClosedForms
+from ..analytic.compare import ClosedForms
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from .history import draw_history, fitted

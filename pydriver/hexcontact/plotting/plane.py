@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analytic.shear import ClosedForms, PartialSlip
+from ..analytic.compare import ClosedForms, PartialSlip
 from ..arrays import Array
 from ..errors import DeckError
 from ..result.result import Result

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..result.history_words import step_rows
-from ..result.raster import Plane, png_of
+from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from ..text import scaled, worded

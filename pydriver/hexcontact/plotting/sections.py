@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
-from ..analytic.shear import PartialSlip
+from ..analytic.compare import PartialSlip
 from ..arrays import Array
 from ..errors import DeckError, NotInResult
-from ..result.interpolate import Line, section_line
 from ..result.result import Result
+from ..result.step import Line, section_line
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from .plane import closed_solutions, views_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.estimators import (
+from ..core.measures import (
     LATTICE_ERRORS,
     NO_VALUE,
     expected_entry_error,

@@ -23,17 +23,15 @@ from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.write import as_toml, plain
+from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
 from ..variables import LOADS
 from . import window
 from .arguments import Body
 from .checks import checked
-from .friction_law import FrictionField
-from .height_map import HeightMap
 from .loads import LoadStep, wearing_cycle
-from .plane_field import GAP, FieldSource, PlaneField
+from .plane_field import GAP, FieldSource, FrictionField, HeightMap, PlaneField
 from .window import Estimate, NoContactFound
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import memory
+from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
 from ..variables import FIXED, SCHEMA_VERSION, VARIABLES
-from . import mesh
 from .check import fault_of_dimensions, fault_of_result
 from .layout import MISSING, Layout, Metadata
 from .step import Step
@@ -31,6 +31,73 @@ if TYPE_CHECKING:
     import netCDF4
 
     from .result import Result
+
+
+NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
+TOPOLOGY, FACE_NODES = "mesh", "mesh_face_nodes"
+MESH = (TOPOLOGY, "mesh_node_x", "mesh_node_y", FACE_NODES)
+_TRIANGLES = 1 << 16  # triangles
+
+
+def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
+    """Return the nodes at the corners of each triangle of a window, counterclockwise, shape (n, 3).
+
+    The short diagonal halves each cell into equilateral triangles, on which tractions are linear. Node (row
+    j, col i) has the number ``j*n_col + i``.
+    """
+    first = np.arange(n_row * n_col, dtype=np.int32).reshape(n_row, n_col)[:-1, :-1].ravel()
+    right, up, across = first + 1, first + n_col, first + n_col + 1
+    return np.stack([first, right, up, right, across, up], axis=1, dtype=np.int32).reshape(-1, 3)
+
+
+def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
+    """Write the mesh of a window to an open file, unless it has one row or column only."""
+    if min(lattice.shape) < 2:
+        return
+    faces = triangles(lattice.n_row, lattice.n_col)
+    for name, size in ((NODE, lattice.size), (FACE, len(faces)), (CORNER, 3)):
+        file.createDimension(name, size)
+    about: dict[str, Any] = {
+        "cf_role": "mesh_topology",
+        "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "mesh_node_x mesh_node_y",
+        "face_node_connectivity": FACE_NODES,
+        "face_dimension": FACE,
+    }
+    add_column(file, TOPOLOGY, "i4", (), about, np.int32(0))
+    packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
+    for axis, values in (("x", lattice.x.ravel()), ("y", lattice.y.ravel())):
+        standard = {"standard_name": f"projection_{axis}_coordinate"}
+        about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
+        chunks = [min(_TRIANGLES, lattice.size)]
+        add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, values, chunksizes=chunks, **packed)
+    about = {
+        "cf_role": "face_node_connectivity",
+        "long_name": "nodes at the corners of each triangle, counterclockwise",
+        "start_index": np.int32(0),
+    }
+    chunks = [min(_TRIANGLES, len(faces)), 3]
+    add_column(file, FACE_NODES, "i4", (FACE, CORNER), about, faces, chunksizes=chunks, **packed)
+
+
+def add_column(
+    file: netCDF4.Dataset,
+    name: str,
+    dtype: str,
+    dims: tuple[str, ...],
+    attributes: Mapping[str, Any],
+    values: Any = None,
+    **options: Any,
+) -> netCDF4.Variable:
+    """Add a variable with its attributes and values to a file; `options` go to ``createVariable``."""
+    column = file.createVariable(name, dtype, dims, **options)
+    column.setncatts(attributes)
+    column.set_auto_maskandscale(False)  # which looks for more attributes
+    if values is not None:
+        column[...] = values
+    return column
+
 
 # Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
 _BELOW = ("stress", "fatigue", "\\")
@@ -65,7 +132,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                     column.set_var_chunk_cache(size=0)
             for column, values in given:
                 column[...] = values
-            mesh.write_mesh(file, layout.window)
+            write_mesh(file, layout.window)
         fixed: dict[str, NDArray[Any]] = {}
         of_all_steps = {name: columns.pop(name) for name in FIXED if name in columns}
         block: list[Step] = []
@@ -121,7 +188,7 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     attributes = layout.attributes_of(name)
     if options and name not in ("x", "y"):
         attributes["coordinates"] = "x y"
-    return mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
+    return add_column(file, name, variable.dtype, variable.dims, attributes, **options)
 
 
 def _text(
@@ -135,7 +202,7 @@ def _text(
     characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
     file.createDimension(f"{name}_length", characters.shape[1])
     attributes = {**layout.attributes_of(name), "_Encoding": "utf-8"}
-    column = mesh.add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
+    column = add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
     column.set_auto_chartostring(False)
     return column, characters
 
@@ -212,7 +279,7 @@ def read_output(path: Path) -> Result:
         from .result import Result
 
         # the mesh, for other programs, repeats rows and columns
-        dataset = opened_by_xarray(path, drop_variables=mesh.VARIABLES)
+        dataset = opened_by_xarray(path, drop_variables=MESH)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:

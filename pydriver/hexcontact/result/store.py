@@ -29,15 +29,18 @@ from .journal import (
     SUFFIX,
     Header,
     Journal,
+    TrialFolder,
+    foreign_file,
     journal_of,
+    linked_folder,
     read_record,
+    remove_all,
     write_header,
     write_record,
 )
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
-from .trials import TrialFolder, foreign_file, linked_folder, remove_all
 
 if TYPE_CHECKING:
     from .result import Result

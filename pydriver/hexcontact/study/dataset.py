@@ -16,9 +16,8 @@ from ..result.netcdf import check_seal
 from ..result.view import last_steps
 from ..text import quantity, text_table, visible
 from ..variables import CONVENTIONS, SUMMARY, VARIABLES
-from .axes import Axis
 from .folder import INDEX, StudyFolder
-from .plan import Plan, PlannedCase
+from .plan import Axis, Plan, PlannedCase
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]

@@ -22,7 +22,7 @@ from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import replacing, require_ordinary, text_of
 from ..lock import Lock
 from ..result.netcdf import missing_stresses, stress_files
-from .job import Outcome, holds
+from .backend import Outcome, holds
 from .plan import Plan, PlannedCase
 
 INDEX = "index.json"

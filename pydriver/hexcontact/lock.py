@@ -22,25 +22,12 @@ _TRIES = 1000  # to open a lock that its holder deletes at the same time
 
 
 class Lock:
-    """Keeps two runs from writing one output.
+    """Keeps two runs from writing one output; DeckError if another run holds it, or the file is no lock.
 
     The operating system holds the lock, and releases it when the process dies.
     File systems differ in whether another machine notices, so the file names process and host:
-    a lock left by another host counts as held.
-
-    Parameters
-    ----------
-    path : Path
-        Lock file.
-    output : Path
-        The output that it protects, for messages.
-    began : float or None
-        When the run began that a resumed one continues (s since 1970), see `begun`; None: now.
-
-    Raises
-    ------
-    DeckError
-        If another run holds it, or the file is no lock, which stays unchanged.
+    a lock left by another host counts as held. `output` is named in messages; `began` is when the run began
+    that a resumed one continues (s since 1970), see `begun`.
     """
 
     def __init__(self, path: Path, output: Path, began: float | None = None) -> None:

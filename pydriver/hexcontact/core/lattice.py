@@ -14,6 +14,8 @@ from ..arrays import Array, integer, number, reals
 from ..errors import DeckError
 from . import flat
 
+_LENGTH = "a positive length in meters"
+
 
 class Nodes(NamedTuple):
     """Nodes from the first one: basis vectors, one a row, position of the first [m], rows and columns."""
@@ -50,8 +52,8 @@ class Lattice:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        kind = "a positive length in meters"
-        number(self.spacing, "spacing", kind, lambda spacing: 0 < spacing < np.inf)
+        if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:
+            raise DeckError(f"spacing = {self.spacing!r}: expected {_LENGTH}")
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
         origin = reals(self.origin, "origin")
@@ -101,28 +103,28 @@ class Lattice:
         basis: Array = flat.lattice_basis(self.spacing)
         return basis
 
-    @property
+    @cached_property
     def cell_area(self) -> float:
         """Area of a lattice cell, the volume of a pyramid of height one [m^2]."""
         (a, b), (c, d) = self.basis.tolist()
         return float(a * d - b * c)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Shape of a field over the window."""
         return (self.n_row, self.n_col)
 
-    @property
+    @cached_property
     def first(self) -> list[int]:
         """Smallest column and row index, as the core takes them."""
         return [self.col_first, self.row_first]
 
-    @property
+    @cached_property
     def extent(self) -> list[int]:
         """Number of columns and of rows, as the core counts them."""
         return [self.n_col, self.n_row]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of nodes."""
         return self.n_row * self.n_col

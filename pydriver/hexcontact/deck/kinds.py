@@ -48,22 +48,9 @@ _LONGEST = 300  # characters; the parser and the evaluation need stack for each 
 
 
 class Formula:
-    """A formula over names or dotted keys of a deck.
+    """A formula over names or dotted keys of a deck: numbers, ``+ - * / **``, parentheses and `FUNCTIONS`.
 
-    Parameters
-    ----------
-    text : str
-        Such as ``0.8 * friction.coefficient * load.1.normal_load``.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The names in it, each once.
-
-    Raises
-    ------
-    ValueError
-        If it is no formula of numbers, names, ``+ - * / **``, parentheses and `FUNCTIONS`.
+    ValueError for another text. `names` are those in it, each once.
     """
 
     def __init__(self, text: str) -> None:

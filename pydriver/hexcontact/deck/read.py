@@ -56,7 +56,6 @@ def assemble(
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
     """Return a deck with its included decks merged, single keys replaced, and series of loads read."""
-    refuse_deep(data, source.name)
     if not ("include" in data or overrides or any(True for _ in _named_files(data))):
         return Assembled(dict(data), text, source, [])
     name = Path(source.name) if source.name else None
@@ -163,14 +162,9 @@ def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
 
 
 class RecordedDeck:
-    """The tables of the deck of a result; none without a text.
+    """The tables of the deck of a result, `data` as they are written; none without a text.
 
-    Attributes
-    ----------
-    data : dict
-        The tables as they are written, unchecked.
-    given : frozenset of str
-        Parts that were given in Python: "surface" for the gap, "friction".
+    `given` are the parts that were given in Python: "surface" for the gap, "friction".
     """
 
     def __init__(self, text: str, name: str) -> None:

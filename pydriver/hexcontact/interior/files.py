@@ -40,13 +40,7 @@ def files_of(deck: str, output: Path) -> dict[str, Path]:
 
 
 def read_table(path: Path) -> xarray.Dataset | None:
-    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one.
-
-    Raises
-    ------
-    DeckError
-        If it is damaged.
-    """
+    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
     if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
     with reading(path), netcdf_library.opened_by_xarray(path) as found:

@@ -43,18 +43,8 @@ class HeightMap:
 
     Between the points it is their cubic spline. Near steps, where that would ring, it is a bicubic with
     monotone slopes (Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300) in the range of the
-    four heights around.
-
-    Parameters
-    ----------
-    x, y : ndarray
-        Coordinates (m) of the columns and rows of the grid, in any order.
-    gap : ndarray, (x, y)
-        Values (m) at its points, or those of another quantity; NaN in a hole, inf where nothing can touch.
-    name : str
-        Its name in messages.
-    degree : int
-        Degree of the spline; one of degree 1 has no holes.
+    four heights around. Columns x and rows y (m) have any order; the values at (x, y) are NaN in a hole, inf
+    where nothing can touch. A spline of degree 1 has no holes.
     """
 
     def __init__(self, x: Array, y: Array, gap: Array, name: str = "gap", degree: int = 3) -> None:
@@ -469,12 +459,7 @@ def given_coefficient(coefficient: Any, lattice: Lattice | None) -> Any:
 class FrictionField:
     """Friction over the plane, by the tables [friction] and [interface] of a deck.
 
-    Attributes
-    ----------
-    varies : bool
-        Whether it differs from node to node.
-    in_deck : object
-        Value in a deck that needs no file: a map has its points and values.
+    `in_deck` is its value in a deck that needs no file: a map has its points and values.
     """
 
     def __init__(self, friction: Friction | None, interface: Interface | None = None) -> None:

@@ -229,11 +229,24 @@ def _at_most(error: float) -> str:
 
 
 def warnings(case: Problem, estimated: bool = True) -> list[str]:
-    """Return a sentence for each limit that a case exceeds; arguments as `expected`."""
-    found = expected(case, estimated)
+    """Return a sentence for each limit that a case exceeds, found once; arguments as `expected`."""
+    if estimated not in case.judged:
+        found = expected(case, estimated)
+        passed = [
+            limit
+            for limit in LIMITS
+            if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
+        ]
+        known = found | _words(case, found) if passed else {}
+        case.judged[estimated] = [limit.words.format(**known) for limit in passed]
+    return case.judged[estimated]
+
+
+def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
+    """Return the words in the sentences of limits that are no numbers."""
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
     worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
-    known = found | {
+    return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
         "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
@@ -243,10 +256,6 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
         "turning_percent": percent(found.get("turning_error", 0.0)),
         "ring_percent": _at_most(found.get("ring_error", 0.0)),
     }
-    passed = [
-        limit for limit in LIMITS if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
-    ]
-    return [limit.words.format(**known) for limit in passed]
 
 
 def row(case: Problem) -> str:

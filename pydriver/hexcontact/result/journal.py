@@ -51,7 +51,7 @@ _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
 _ABOUT = "about"  # name of the text among the arrays
 _KIND = "a record of a journal"
-_LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
+LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _COMPANION = "companion."  # before the names of restart data
 _PARTS = {"run": str, "index": int, **dict.fromkeys(("lattice", "history", "control"), dict)}
 _OTHER_VERSION = "{} was kept by hexcontact {}, whose journal has the layout {}; this version reads layout {}"
@@ -277,7 +277,7 @@ def read_record(path: Path, companion: bool = False, lazy: bool = False) -> tupl
         names = [name.removesuffix(".npy") for name in file.namelist() if name != f"{_ABOUT}.npy"]
         more = [name for name in names if name.startswith(_COMPANION)]
         names = [name for name in names if name not in more]
-        if lazy and path.stat().st_size >= _LARGE:
+        if lazy and path.stat().st_size >= LARGE:
             fields: Mapping[str, NDArray[Any]] = Stored(path, names)
         else:
             fields = {name: _array(file, name) for name in names}
@@ -491,7 +491,8 @@ def _clear(journal: Journal) -> None:
 def remove_all(folder: Path) -> None:
     """Delete load steps and lattices in the folder of a journal, but not the lock."""
     Journal(folder).remove()
-    TrialFolder(folder).remove()
+    if (folder / FOLDER).is_dir():
+        TrialFolder(folder).remove()
 
 
 def foreign_file(folder: Path) -> Path | None:

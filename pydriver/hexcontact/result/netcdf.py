@@ -270,16 +270,16 @@ def read_output(path: Path) -> Result:
     FileNotFoundError for a missing one.
     """
     with reading(path):
-        sealed = check_seal(path)
-    with reading(path), opened(path) as file:
-        _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
-        if not sealed and (fault := fault_of_dimensions(file.variables)):
-            raise DeckError(f"{path} is damaged: {fault}")
-    with reading(path):
         from .result import Result
 
+        if not (sealed := check_seal(path)):
+            with opened(path) as file:
+                _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
+                if fault := fault_of_dimensions(file.variables):
+                    raise DeckError(f"{path} is damaged: {fault}")
         # the mesh, for other programs, repeats rows and columns
         dataset = opened_by_xarray(path, drop_variables=MESH)
+        _check_ours(dataset.attrs, path)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
             if variable.ndim < 3:

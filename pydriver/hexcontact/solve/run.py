@@ -114,7 +114,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     again.
     """
     solve_into(case, store, listener, before)
-    if store.finished:
+    if store.finished and (case.deck.stress or case.deck.fatigue):
         for path in write_stresses(store.path, case, listener):
             listener.said("written", file=path)
 

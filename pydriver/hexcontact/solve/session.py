@@ -121,6 +121,7 @@ class Session:
         self._resting = _AT_REST  # those that were zero in all steps
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
+        self._driven.judged = {}
         self._closed = False
         self._store: Store | None = None
         if output is not None:

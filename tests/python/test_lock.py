@@ -11,8 +11,7 @@ import pytest
 from fuzz.file_made import made_step
 
 from hexcontact import DeckError
-from hexcontact.files import replacing
-from hexcontact.lock import Lock, names_a_run
+from hexcontact.files import Lock, names_a_run, replacing
 from hexcontact.result.journal import Journal, TrialFolder, journal_of
 from hexcontact.result.layout import Metadata
 from hexcontact.result.store import Store

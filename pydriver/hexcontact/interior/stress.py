@@ -29,8 +29,6 @@ from . import fields
 from .fields import Region, region
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray
 
 

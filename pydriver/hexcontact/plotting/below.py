@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -47,7 +48,6 @@ from .zones import draw_zone_bars
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
 
 _DEPTH = 0.6  # of the section, in its widths

@@ -27,7 +27,6 @@ from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figur
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))

@@ -37,8 +37,6 @@ from .style import (
 if TYPE_CHECKING:
     import xarray
 
-    from ..result.result import Result
-
 
 Point = tuple[float, float]
 

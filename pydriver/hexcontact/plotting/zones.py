@@ -43,8 +43,6 @@ from .style import (
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def draw_zones(axes: Axes, view: StepView, exact: PartialSlip | None, part: Part) -> None:

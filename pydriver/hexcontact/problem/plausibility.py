@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,8 @@ from ..core.measures import (
 from ..deck.interface import TwoCoefficients
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
-
-if TYPE_CHECKING:
-    from .loads import LoadStep
-    from .problem import Problem
+from .loads import LoadStep
+from .problem import Problem
 
 
 class Limit(NamedTuple):

@@ -238,8 +238,8 @@ class Problem:
     def initial_gap(self, lattice: Lattice) -> tuple[Array, Mask]:
         """Return the gap before loading over the nodes of a window, and where the bodies can touch.
 
-        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch. DeckError if
-        a gap given in Python does not fit the window or is NaN somewhere.
+        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch.
+        DeckError if a gap given in Python does not fit the window or is NaN somewhere.
         """
         gap = self._gap.over(lattice)
         return gap, np.isfinite(gap)

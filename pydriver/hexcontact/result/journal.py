@@ -32,8 +32,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
-from ..files import beginning, made, reading, replacing, require_kinds
-from ..lock import names_a_run
+from ..files import beginning, made, names_a_run, reading, replacing, require_kinds
 from ..variables import VARIABLES
 from .layout import Metadata, assemble
 from .step import Step

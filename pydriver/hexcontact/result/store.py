@@ -22,8 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import flush, make_anew, reading, replacing, require_utf8
-from ..lock import Lock, begun, names_a_run
+from ..files import Lock, begun, flush, make_anew, names_a_run, reading, replacing, require_utf8
 from .journal import (
     HEADER,
     LARGE,

@@ -19,8 +19,7 @@ from typing import Any
 
 from .._version import __version__
 from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import replacing, require_ordinary, text_of
-from ..lock import Lock
+from ..files import Lock, replacing, require_ordinary, text_of
 from ..result.netcdf import missing_stresses, stress_files
 from .backend import Outcome, holds
 from .plan import Plan, PlannedCase

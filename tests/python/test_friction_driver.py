@@ -18,6 +18,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from hexcontact.analytic import hertz_sphere
+from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.case import Case
 from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
@@ -838,6 +839,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
 def test_hertz_is_left_alone(sheared: Result) -> None:
     history = sheared.history.to_dict("records")[-1]
-    assert printed.against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
+    assert against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
     exact = hertz_sphere(sphere().pair.effective_modulus, 1e-3, normal_load=31.5)
     assert float(sheared.max_pressure[1]) == pytest.approx(1.034 * exact.max_pressure, rel=0.01)

@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, Study, open_result
 from hexcontact.cli.app import app
-from hexcontact.cli.options import beside
+from hexcontact.cli.frame import beside
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.read import MOST_INCLUDED, MOST_SERIES
 from hexcontact.deck.series import MOST_STEPS, read_series

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 import hexcontact
 from hexcontact import Case, DeckError
-from hexcontact.cli.options import setting, steps_of
+from hexcontact.cli.frame import setting, steps_of
 from hexcontact.deck.keys import Deck
 from hexcontact.deck.kinds import Kind
 from hexcontact.deck.series import read_series

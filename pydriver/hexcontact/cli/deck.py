@@ -9,8 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..files import beginning, replacing
 from ..text import did_you_mean, listed, visible
-from .frame import Content, command, print_error, print_output
-from .options import AsJson, DeckFile, Settings, argument, case_of, flag, output_to, target_of
+from .frame import (
+    AsJson,
+    Content,
+    DeckFile,
+    Settings,
+    argument,
+    case_of,
+    command,
+    flag,
+    output_to,
+    print_error,
+    print_output,
+    target_of,
+)
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem

@@ -24,8 +24,7 @@ from ..solve.events import Listener, reporter
 from ..solve.interruption import Interrupted, in_background
 from ..text import listed, visible
 from . import printed
-from .frame import Report, print_error, print_output, write_json
-from .options import LogLevel
+from .frame import LogLevel, Report, print_error, print_output, write_json
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
-from .frame import Content, Failure, command, print_error, print_output
-from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to, steps_of
+from .frame import (
+    AsJson,
+    Content,
+    Failure,
+    Level,
+    LogFile,
+    Quiet,
+    argument,
+    command,
+    flag,
+    option,
+    output_to,
+    print_error,
+    print_output,
+    steps_of,
+)
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel

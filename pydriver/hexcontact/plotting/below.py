@@ -23,8 +23,7 @@ from ..result.step import nodal
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, visible, worded
 from ..variables import EDGES, spelled
-from .maps import mesh_of
-from .plane import Part
+from .maps import Part, mesh_of
 from .registry import figure
 from .report_data import mapped_steps
 from .sections import Cut, Point

@@ -18,7 +18,7 @@ from ..result.result import Result
 from ..result.step import Line, section_line
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
-from .plane import closed_solutions, views_of
+from .maps import closed_solutions, views_of
 from .registry import figure
 from .style import (
     COMPUTED,

@@ -25,8 +25,7 @@ from ..result.netcdf import triangles
 from ..result.result import Result
 from ..result.view import Results, StepView
 from ..text import worded
-from .maps import mesh_of
-from .plane import FEWER_ARROWS, Part, closed_solutions, map_panels, views_of
+from .maps import FEWER_ARROWS, Part, closed_solutions, map_panels, mesh_of, views_of
 from .registry import figure
 from .style import (
     COMPUTED,

@@ -29,8 +29,7 @@ from ..text import quantity
 from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
-from .dataset import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
-from .folder import StudyFolder
+from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
 from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
 
 if TYPE_CHECKING:

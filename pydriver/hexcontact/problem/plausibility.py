@@ -36,11 +36,6 @@ class Limit(NamedTuple):
     least: float = -math.inf  # range without a warning
     most: float = math.inf
 
-    @property
-    def usual(self) -> float:
-        """A value within the limits, for an unknown one."""
-        return self.least if math.isinf(self.most) else self.most
-
 
 _EDGE_SPACINGS = 18  # in the radius, from which nodes lie near enough to the peak of a fatigue parameter
 _LATTICE_ERROR = 0.05  # of any quantity, that the lattice may leave
@@ -233,7 +228,7 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
         passed = [
             limit
             for limit in LIMITS
-            if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
+            if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most
         ]
         known = found | _words(case, found) if passed else {}
         case.judged[estimated] = [limit.words.format(**known) for limit in passed]

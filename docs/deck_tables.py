@@ -17,7 +17,7 @@ from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Severa
 from hexcontact.deck.table_base import Table, expectation, kind_of
 from hexcontact.problem import plausibility
 from hexcontact.study.backends.dask import Dask
-from hexcontact.study.study_file import Parameter, StudyFile
+from hexcontact.study.plan import Parameter, StudyFile
 from hexcontact.text import shown
 from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 

@@ -56,7 +56,7 @@ def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
 
 
 def number(
-    value: Any, name: str, expected: str = "a number", fits: Callable[[float], bool] = lambda found: True
+    value: Any, name: str, expected: str = "a number", fits: Callable[[float], bool] | None = None
 ) -> float:
     """Return an argument as a real number, which may be infinite."""
     try:
@@ -65,7 +65,7 @@ def number(
         found = float(value)
     except (TypeError, ValueError, OverflowError) as error:
         raise DeckError(f"{name} = {_shown(value)}: expected {expected}") from error
-    if found != found or not fits(found):
+    if found != found or (fits and not fits(found)):
         raise DeckError(f"{name} = {_shown(value)}: expected {expected}")
     return found
 

@@ -12,14 +12,12 @@ from .arrays import Array
 from .core.lattice import Lattice
 from .deck.keys import FINENESS, Grid, Solver
 from .deck.read import Assembled, assemble
-from .deck.toml import refuse_deep, with_overrides
-from .deck.write import plain
+from .deck.toml import plain, refuse_deep, with_overrides
 from .errors import DeckError, PlausibilityWarning, warn
 from .problem import plausibility
 from .problem.arguments import Body, known_keywords, middle_of, refuse_unknown, with_radians
-from .problem.friction_law import given_coefficient
 from .problem.loads import LoadStep, Target
-from .problem.plane_field import GAP, FieldSource, given_field
+from .problem.plane_field import GAP, FieldSource, given_coefficient, given_field
 from .problem.problem import Problem
 
 if TYPE_CHECKING:

@@ -166,16 +166,18 @@ def write(dataset: xarray.Dataset, path: Path, mode: Literal["w", "a"] = "w", **
 def opened_by_xarray(path: Path, **options: Any) -> xarray.Dataset:
     """Open a file with xarray, whose fields are then read under the lock.
 
-    Raises
-    ------
-    ValueError
-        If a variable has a dimension twice, of which xarray only warns.
+    ValueError if a variable has a dimension twice, of which xarray only warns.
     """
     import xarray
+    from xarray.backends import NetCDF4DataStore
 
     with LOCK:
-        with opened(path) as file:
-            for name, values in (file[group] if (group := options.get("group")) else file).variables.items():
+        store = NetCDF4DataStore.open(path, lock=LOCK, group=options.pop("group", None))
+        try:
+            for name, values in store.ds.variables.items():
                 if len(set(values.dimensions)) < values.ndim:
                     raise ValueError(f"{name} has a dimension twice")
-        return xarray.open_dataset(path, engine="netcdf4", lock=LOCK, **options)
+            return xarray.open_dataset(store, **options)
+        except BaseException:
+            store.close()
+            raise

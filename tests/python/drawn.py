@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 from PIL import Image
 
-from hexcontact.result.raster import SLIP, STICK
+from hexcontact.result.html import SLIP, STICK
 from hexcontact.result.view import StepView
 
 PREFIXES = {"p": 1e-12, "n": 1e-9, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}

@@ -21,10 +21,10 @@ from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError
 from hexcontact.cli.app import app
 from hexcontact.cli.report import report
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.problem import refinement
+from hexcontact.problem import preview
+from hexcontact.problem.preview import SHIFTS
 from hexcontact.problem.problem import RATIO
-from hexcontact.problem.refinement import SHIFTS
-from hexcontact.result.trials import TrialFolder
+from hexcontact.result.journal import TrialFolder
 from hexcontact.solve import accuracy
 from hexcontact.variables import ESTIMATED, VARIABLES
 
@@ -251,13 +251,13 @@ def test_gap_of_an_array_cannot_be_refined() -> None:
 )
 def test_windows_of_finer_and_shifted_lattices_hold_the_contact(grid: dict[str, Any]) -> None:
     case = made(**grid)
-    for trial in (refinement.Trial(0), refinement.Trial(2), refinement.Trial(3, 1), refinement.Trial(2, 4)):
+    for trial in (preview.Trial(0), preview.Trial(2), preview.Trial(3, 1), preview.Trial(2, 4)):
         other = trial.case(case)
         first, lattice = case.lattice, other.lattice
         assert lattice.spacing == pytest.approx(first.spacing / RATIO**trial.level)
         shift = SHIFTS[trial.copy - 1] @ lattice.basis if trial.copy else np.zeros(2)
         assert_allclose(lattice.origin, first.origin + shift, atol=1e-12 * first.spacing)
-        if trial == refinement.Trial(0):
+        if trial == preview.Trial(0):
             assert lattice == first
         ratio = lattice.size * lattice.cell_area / (first.size * first.cell_area)
         assert 0.4 < ratio < 1.1
@@ -358,15 +358,15 @@ def test_other_deck_or_damage_is_refused(tmp_path: Path) -> None:
 
 def test_step_that_fails_keeps_the_finished_lattices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, case = tmp_path / "out.nc", made(**SHEARED)
-    solve = refinement.Trial.case
+    solve = preview.Trial.case
 
-    def failing(trial: refinement.Trial, case: Case) -> Case:
+    def failing(trial: preview.Trial, case: Case) -> Case:
         if trial.level == 2:
             raise ConvergenceError("did not converge")
         return solve(trial, case)
 
     with monkeypatch.context() as patch, pytest.raises(ConvergenceError) as raised:
-        patch.setattr(refinement.Trial, "case", failing)
+        patch.setattr(preview.Trial, "case", failing)
         case.run(path)
     assert "lattice" in raised.value.__notes__[0]
     assert "hexcontact resume" in raised.value.__notes__[0]

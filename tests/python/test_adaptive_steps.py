@@ -23,7 +23,7 @@ from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
-from hexcontact.solve.progress import Lines
+from hexcontact.solve.events import Lines
 from hexcontact.solve.restart import resume
 from hexcontact.solve.window import FrictionWindow
 

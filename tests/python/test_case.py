@@ -21,7 +21,7 @@ from hexcontact.core.lattice import Lattice
 from hexcontact.deck import keys as tables
 from hexcontact.deck.faults import Source
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
-from hexcontact.deck.write import STARTERS, starter, written
+from hexcontact.deck.toml import STARTERS, starter, written
 from hexcontact.errors import DeckError
 from hexcontact.problem.preview import case_rows
 from hexcontact.problem.window import estimate_contact, reaches_rim

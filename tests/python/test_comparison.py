@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexcontact import Case, DeckError, Result, analytic
-from hexcontact.cli.printed import against_hertz
+from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.deck.surfaces import (
     Cone,
     Cylinder,

@@ -11,11 +11,10 @@ from fuzz.file_made import WINDOW, made_step, written
 
 from hexcontact import Case
 from hexcontact.errors import DeckError
-from hexcontact.result import check
-from hexcontact.result.journal import journal_of, write_record
+from hexcontact.result import netcdf
+from hexcontact.result.journal import Solution, TrialFolder, journal_of, write_record
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
-from hexcontact.result.trials import Solution, TrialFolder
 from hexcontact.study.dataset import histories
 from hexcontact.variables import LARGEST, RESIDUALS, VARIABLES
 
@@ -146,10 +145,10 @@ def test_every_step_has_the_numbers_that_are_required() -> None:
     known = {name: v for name, v in VARIABLES.items() if v.dtype == "f8" and v.dims == ("step",)}
     required = [name for name, v in known.items() if v.required and not name.startswith("stick_center")]
     assert len(required) > 20
-    assert check._fault_of_histories(dataset) == ""
+    assert netcdf._fault_of_histories(dataset) == ""
     for name in required:
         damaged = dataset.assign({name: dataset[name].where(dataset["step"] != 2)})
-        assert name in check._fault_of_histories(damaged), name
+        assert name in netcdf._fault_of_histories(damaged), name
 
 
 def test_records_of_a_journal_are_of_one_run(out: Path) -> None:
@@ -286,7 +285,7 @@ def test_every_bound_of_the_table_is_looked_at() -> None:
     quantities = {**known, "window": window}
 
     def fault(name: str, value: float) -> str:
-        return check._fault_of_numbers({**known, name: value}, {"tolerance": 1.0}, "", window)
+        return netcdf._fault_of_numbers({**known, name: value}, {"tolerance": 1.0}, "", window)
 
     found = 0
     for name, variable in VARIABLES.items():

@@ -21,7 +21,7 @@ from hexcontact.cli.app import app
 from hexcontact.deck.faults import Source
 from hexcontact.deck.keys import Deck
 from hexcontact.deck.series import read_series
-from hexcontact.deck.write import written
+from hexcontact.deck.toml import written
 from hexcontact.errors import DeckError
 from hexcontact.problem.preview import case_rows, operator_applications, seconds
 

@@ -48,13 +48,13 @@ def test_procedures_that_a_load_passes_are_there() -> None:
 
 
 def test_example_of_a_surface_has_its_closed_solution(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.analytic import recognise
+    from hexcontact.analytic import compare
     from hexcontact.deck import surfaces
 
     monkeypatch.setattr(surfaces, "SHAPES", dict(surfaces.SHAPES))
-    monkeypatch.setattr(recognise, "_SHAPES", dict(recognise._SHAPES))
+    monkeypatch.setattr(compare, "_SHAPES", dict(compare._SHAPES))
     executed("Add a surface with a closed-form solution", "hexcontact.deck.surfaces")
-    executed("Add a surface with a closed-form solution", "hexcontact.analytic.recognise", 1)
+    executed("Add a surface with a closed-form solution", "hexcontact.analytic.compare", 1)
     surface = {"shape": "steepening", "radius": "10 mm", "factor": 3000.0}
     case = hexcontact.Case(
         body_1={**STEEL, "surface": surface}, body_2=STEEL, nodes_in_radius=12, normal_load=100.0

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hexcontact import Case, Result
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.result.raster import Plane
+from hexcontact.result.html import Plane
 from hexcontact.result.view import StepView
 from hexcontact.text import html_table, text_table
 from hexcontact.variables import VARIABLES

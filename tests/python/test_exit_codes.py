@@ -54,7 +54,7 @@ cli.main()
 LATE_CASE = """
 import os, sys, time
 from hexcontact.cli import app
-from hexcontact.study.folder import StudyFolder
+from hexcontact.study.dataset import StudyFolder
 
 note = StudyFolder.note
 def late(*arguments):

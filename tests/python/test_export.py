@@ -17,10 +17,9 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
 from hexcontact.cli.app import app
-from hexcontact.result.interpolate import with_shown
 from hexcontact.result.journal import journal_of
-from hexcontact.result.mesh import triangles
-from hexcontact.result.step import Step
+from hexcontact.result.netcdf import triangles
+from hexcontact.result.step import Step, with_shown
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SPHERES = {"body_1": BODY | {"surface": {"shape": "sphere", "radius": 0.01}}, "body_2": BODY}
@@ -185,7 +184,7 @@ def test_a_result_in_memory_has_no_second_set_of_coordinates(folder: Path) -> No
 
 def test_a_window_without_triangles_has_no_mesh(tmp_path: Path) -> None:
     from hexcontact.core.lattice import Lattice
-    from hexcontact.result.mesh import write_mesh
+    from hexcontact.result.netcdf import write_mesh
 
     with netCDF4.Dataset(tmp_path / "row.nc", "w") as file:
         write_mesh(file, Lattice(1e-6, 0, 0, 1, 5))

@@ -26,7 +26,7 @@ from hexcontact.case import Body
 from hexcontact.cli.app import app
 from hexcontact.deck import table_base
 from hexcontact.deck.surfaces import SHAPES
-from hexcontact.deck.write import starter
+from hexcontact.deck.toml import starter
 from hexcontact.surfaces import Sphere
 from hexcontact.text import cut
 

@@ -18,15 +18,16 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from hexcontact.analytic import hertz_sphere
+from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.case import Case
 from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
 from hexcontact.core import contact, flat, friction, handles, influence, memory
 from hexcontact.core.contact import ElasticPair
-from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.handles import HeldState
 from hexcontact.core.lattice import Lattice
+from hexcontact.core.measures import area_radius
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
     ConvergenceError,
@@ -45,8 +46,8 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve import steps as solve
+from hexcontact.solve.events import Lines
 from hexcontact.solve.memory_needed import memory_needed
-from hexcontact.solve.progress import Lines
 from hexcontact.solve.window import FrictionWindow, state_of
 from hexcontact.variables import FIELDS, WORN
 
@@ -838,6 +839,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
 
 def test_hertz_is_left_alone(sheared: Result) -> None:
     history = sheared.history.to_dict("records")[-1]
-    assert printed.against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
+    assert against_hertz(sheared.deck, sheared.dataset.attrs, history) == []
     exact = hertz_sphere(sphere().pair.effective_modulus, 1e-3, normal_load=31.5)
     assert float(sheared.max_pressure[1]) == pytest.approx(1.034 * exact.max_pressure, rel=0.01)

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, open_result, resume
 from hexcontact.cli.app import app
-from hexcontact.deck.formula import Formula
+from hexcontact.deck.kinds import Formula
 from hexcontact.surfaces import Sphere
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

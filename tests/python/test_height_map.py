@@ -11,7 +11,7 @@ from scipy.interpolate import RectBivariateSpline
 
 from hexcontact import Case, DeckError, Lattice
 from hexcontact.problem import plausibility
-from hexcontact.problem.height_map import HeightMap
+from hexcontact.problem.plane_field import HeightMap
 from hexcontact.problem.preview import case_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

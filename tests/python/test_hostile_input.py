@@ -22,13 +22,13 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, Study, open_result
 from hexcontact.cli.app import app
-from hexcontact.cli.options import beside
+from hexcontact.cli.frame import beside
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.read import MOST_INCLUDED, MOST_SERIES
 from hexcontact.deck.series import MOST_STEPS, read_series
 from hexcontact.files import LARGEST_TEXT, text_of
 from hexcontact.result.journal import Journal
-from hexcontact.solve.progress import Bar
+from hexcontact.solve.events import Bar
 from hexcontact.text import html_table, text_table, visible
 
 OBEYED = re.compile(

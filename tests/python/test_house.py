@@ -16,7 +16,7 @@ import typer.main
 import hexcontact
 from hexcontact.cli.app import app
 from hexcontact.core.lattice import Lattice
-from hexcontact.result import journal, trials
+from hexcontact.result import journal
 from hexcontact.result.layout import Metadata
 from hexcontact.study.dataset import STUDY_VERSION
 from hexcontact.variables import SCHEMA_VERSION
@@ -163,7 +163,7 @@ def test_a_changed_format_has_a_version_of_its_own() -> None:
         "metadata": " ".join(field.name for field in dataclasses.fields(Metadata)),
         "header": " ".join(field.name for field in dataclasses.fields(journal.Header)),
         "window": " ".join(field.name for field in dataclasses.fields(Lattice)),
-        "solution": " ".join(trials.Solution._fields),
+        "solution": " ".join(journal.Solution._fields),
     }
     newest = [*FORMATS][-1]
     assert present == FORMATS[newest], "raise the version, and add a line to FORMATS"

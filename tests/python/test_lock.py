@@ -11,12 +11,10 @@ import pytest
 from fuzz.file_made import made_step
 
 from hexcontact import DeckError
-from hexcontact.files import replacing
-from hexcontact.lock import Lock, names_a_run
-from hexcontact.result.journal import Journal, journal_of
+from hexcontact.files import Lock, names_a_run, replacing
+from hexcontact.result.journal import Journal, TrialFolder, journal_of
 from hexcontact.result.layout import Metadata
 from hexcontact.result.store import Store
-from hexcontact.result.trials import TrialFolder
 
 THESIS = "what somebody wrote\n"
 

@@ -390,7 +390,7 @@ def test_a_study_logs_its_cases(tmp_path: Path) -> None:
 
 
 def test_level_names_are_those_of_the_option() -> None:
-    from hexcontact.cli.options import LogLevel
+    from hexcontact.cli.frame import LogLevel
 
     assert [level.value for level in LogLevel] == list(log.LEVELS)
     with pytest.raises(DeckError, match="cannot be written"), log.kept(Path("/no/folder/x"), None):

@@ -19,14 +19,14 @@ from pydantic_core import PydanticCustomError
 
 import hexcontact
 from hexcontact import Case, DeckError
-from hexcontact.cli.options import setting, steps_of
+from hexcontact.cli.frame import setting, steps_of
 from hexcontact.deck.keys import Deck
 from hexcontact.deck.kinds import Kind
 from hexcontact.deck.series import read_series
 from hexcontact.deck.surfaces import SHAPES
 from hexcontact.deck.table_base import Table, kind_of, parts_of
-from hexcontact.deck.write import starter
-from hexcontact.study.study_file import StudyFile
+from hexcontact.deck.toml import starter
+from hexcontact.study.plan import StudyFile
 
 PACKAGE = Path(hexcontact.__file__).parent
 METHODS = ("match", "fullmatch", "search", "sub", "split", "findall", "finditer")
@@ -113,7 +113,7 @@ def test_patterns_are_found() -> None:
     places = "\n".join(patterns().values())
     for room in (
         "deck.units",
-        "deck.formula",
+        "deck.kinds",
         "deck.kinds",
         "deck.series",
         "deck.toml",

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from hexcontact import Case, open_result, plotting
-from hexcontact.cli import options
+from hexcontact.cli import frame
 from hexcontact.cli import plot as plot_command
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
@@ -244,16 +244,16 @@ def test_every_option_belongs_to_some_picture() -> None:
 
 def test_options_are_read() -> None:
     labels = ["press", "to, fro", "to, fro", "press", "press"]
-    assert options.steps_of("3, 4,-1", labels) == [3, 4, -1]
-    assert options.steps_of("2-4, -1", labels) == [2, 3, 4, -1]
-    assert options.steps_of("all", labels) == [1, 2, 3, 4, 5]
-    assert options.steps_of("press", labels) == [1, 5]  # the last step of each segment
-    assert options.steps_of("to, fro", labels) == [3]
-    assert options.steps_of("press,2", labels) == [1, 5, 2]
+    assert frame.steps_of("3, 4,-1", labels) == [3, 4, -1]
+    assert frame.steps_of("2-4, -1", labels) == [2, 3, 4, -1]
+    assert frame.steps_of("all", labels) == [1, 2, 3, 4, 5]
+    assert frame.steps_of("press", labels) == [1, 5]  # the last step of each segment
+    assert frame.steps_of("to, fro", labels) == [3]
+    assert frame.steps_of("press,2", labels) == [1, 5, 2]
     with pytest.raises(DeckError, match=r'--step shear: .* all or a label \("press" or "to, fro"\)'):
-        options.steps_of("shear", labels)
+        frame.steps_of("shear", labels)
     with pytest.raises(DeckError, match="--cycle first: expected a number of a cycle, several as .* or all"):
-        options.steps_of("first", [""], "cycle")
+        frame.steps_of("first", [""], "cycle")
     assert plot_command.angle_of("30") == pytest.approx(np.pi / 6)
     assert plot_command.angle_of("0.5 rad") == 0.5
     assert plot_command.point_of("10 um, -1e-3") == pytest.approx((1e-5, -1e-3))

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 
 from hexcontact import Case, Result, analytic, plotting
 from hexcontact.analytic import EllipticContact
-from hexcontact.core import estimators
+from hexcontact.core import measures
 from hexcontact.plotting import maps as plotting_maps
 from hexcontact.plotting.registry import entries
 from hexcontact.plotting.style import new_figure, set_title
@@ -303,7 +303,7 @@ def test_boundary_shows_the_nodes_in_contact(make: str) -> None:
     result = RESULTS[make]()
     view = StepView.of(result, -1)
     axes = plotting.contact_boundary(result).axes[0]
-    rim = estimators.boundary(view.contact)
+    rim = measures.boundary(view.contact)
     lines = drawn.by_label(axes)
     for label, nodes in (("in contact", view.contact & ~rim), ("boundary node", rim)):
         x, y = drawn.si(axes, lines[label])
@@ -411,7 +411,7 @@ def test_section_at_an_angle_follows_the_ellipse() -> None:
 def test_boundary_names_the_fitted_circle() -> None:
     result = sphere()
     one = result.sel(step=2)
-    fit = estimators.boundary_circle(one["x"].values, one["y"].values, one["pressure"].values > 0, 0.1)
+    fit = measures.boundary_circle(one["x"].values, one["y"].values, one["pressure"].values > 0, 0.1)
     [legend] = plotting.contact_boundary(result, 2).legends
     texts = [text.get_text() for text in legend.get_texts()]
     assert f"fitted circle, a = {worded(fit.radius, 'm')}" in texts

@@ -23,15 +23,15 @@ from matplotlib.patches import PathPatch
 from matplotlib.quiver import Quiver
 
 from hexcontact import analytic, plotting
-from hexcontact.analytic import shear as closed_forms
+from hexcontact.analytic import compare as closed_forms
+from hexcontact.analytic.compare import ClosedForms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
-from hexcontact.analytic.shear import ClosedForms
 from hexcontact.core.edges import ContactEdges
 from hexcontact.core.lattice import Lattice
 from hexcontact.plotting.history import initial_compliance, panels_of
 from hexcontact.plotting.registry import entries
+from hexcontact.result.html import SLIP, STICK
 from hexcontact.result.layout import Metadata, assemble
-from hexcontact.result.raster import SLIP, STICK
 from hexcontact.result.step import Step
 from hexcontact.result.view import StepView
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexcontact import Case, DeckError, Lattice, Result, open_result
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.result.interpolate import Line, interpolate, profile
+from hexcontact.result.step import Line, interpolate, profile
 
 Array = NDArray[np.float64]
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

@@ -29,7 +29,7 @@ from hexcontact.cli.app import app
 from hexcontact.cli.report import report, write_report
 from hexcontact.errors import DeckError
 from hexcontact.plotting.report_data import MOST_STEPS, mapped_steps
-from hexcontact.result.raster import Plane
+from hexcontact.result.html import Plane
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.view import StepView

@@ -388,7 +388,7 @@ def test_a_process_number_that_was_given_again_holds_no_lock(
 
     out = tmp_path / "out.nc"
     stopped(made(), out, 2)
-    monkeypatch.setattr("hexcontact.lock.fcntl.flock", unsupported)
+    monkeypatch.setattr("hexcontact.files.fcntl.flock", unsupported)
     holder = {"process": os.getpid(), "host": os.uname().nodename, "since": "2026-01-01 00:00:00"}
     (journal_of(out) / "lock").write_text(json.dumps({**holder, "time": 2e9}))
     with pytest.raises(DeckError, match="is being written by another run"):

@@ -16,7 +16,7 @@ from hexcontact.cli.app import app
 from hexcontact.deck.faults import Source
 from hexcontact.deck.json_schema import deck_schema
 from hexcontact.deck.keys import Deck
-from hexcontact.deck.write import STARTERS, starter
+from hexcontact.deck.toml import STARTERS, starter
 
 ROOT = Path(__file__).parents[2]
 DECKS = runpy.run_path(str(Path(__file__).with_name("test_deck.py")))

@@ -17,7 +17,7 @@ from numpy.testing import assert_array_equal
 from hexcontact import Case, ResourceError, open_result
 from hexcontact.cli import frame
 from hexcontact.core import memory
-from hexcontact.lock import _is_running
+from hexcontact.files import _is_running
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="limits and sizes are those of Linux"

@@ -23,8 +23,7 @@ from hexcontact.errors import ConvergenceError, DeckError, ResourceError, StopRu
 from hexcontact.result.journal import journal_of
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
-from hexcontact.solve.events import Callback, Listener, Stopped
-from hexcontact.solve.progress import Lines, reporter
+from hexcontact.solve.events import Callback, Lines, Listener, Stopped, reporter
 from hexcontact.solve.steps import steps
 from hexcontact.text import quantity
 

@@ -29,8 +29,7 @@ from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck.kinds import Whole
 from hexcontact.deck.table_base import extended, meaning
-from hexcontact.deck.toml import with_overrides
-from hexcontact.deck.write import starter
+from hexcontact.deck.toml import starter, with_overrides
 from hexcontact.problem.problem import Problem
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback, Listener
@@ -38,11 +37,10 @@ from hexcontact.solve.run import metadata_of, run_into
 from hexcontact.study import backend as backend_registry
 from hexcontact.study import backends
 from hexcontact.study import study as study_module
-from hexcontact.study.backend import BACKENDS, KEYS, Backend
+from hexcontact.study.backend import BACKENDS, KEYS, Backend, Job, solve_case
 from hexcontact.study.backends.processes import LocalPool
-from hexcontact.study.job import Job, solve_case
+from hexcontact.study.plan import StudyFile
 from hexcontact.study.study import Study, run_study
-from hexcontact.study.study_file import StudyFile
 
 CASES = Path(__file__).parents[2] / "cases"
 

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
-from hexcontact.deck.formula import Formula
+from hexcontact.deck.kinds import Formula
 from hexcontact.problem import window
 from hexcontact.study import study as study_module
-from hexcontact.study.job import solve_case
+from hexcontact.study.backend import solve_case
 from hexcontact.study.study import Study
 
 DECK = {
@@ -255,7 +255,7 @@ values = ["60 N", "100 N", "300 N"]
 
 def written(here: Path) -> None:
     """Write a study of which two cases slide."""
-    from hexcontact.deck.write import as_toml
+    from hexcontact.deck.toml import as_toml
 
     (here / "deck.toml").write_text(as_toml(DECK))
     (here / "study.toml").write_text(STUDY)

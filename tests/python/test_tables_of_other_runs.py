@@ -9,7 +9,7 @@ import xarray
 
 from hexcontact import Case, DeckError, open_result, resume
 from hexcontact.problem import preview
-from hexcontact.solve.progress import Lines
+from hexcontact.solve.events import Lines
 
 BODIES = """
 [body.1]

@@ -10,7 +10,7 @@ from matplotlib.collections import TriMesh
 import hexcontact
 from hexcontact import Case, DeckError, ElasticPair, NormalContact, PathWarning, plotting
 from hexcontact.cli.printed import Summary
-from hexcontact.deck.write import starter
+from hexcontact.deck.toml import starter
 from hexcontact.result.history_words import energy_table, step_rows
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.solve import wear as solving

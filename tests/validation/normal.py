@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.core import estimators
+from hexcontact.core import measures
 from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
 
 from .reference import Comparison, reference
@@ -50,12 +50,12 @@ class Solved:
     @property
     def area_radius(self) -> float:
         """a_A."""
-        return estimators.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
+        return measures.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
 
     @property
     def edge_radius(self) -> float:
         """A from p^2 at the edge, about x = y = 0."""
-        return estimators.edge_radius(self.x, self.y, self.pressure, self.spacing)
+        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing)
 
 
 def solve(body_1: Mapping[str, Any], body_2: Mapping[str, Any], **arguments: Any) -> Solved:
@@ -117,7 +117,7 @@ def table_9_2(meshes: Sequence[str] = tuple(MESHES_9_2)) -> Comparison:
             found.add(where, "approach", "um", s.approach, row=reference(case, "delta"), relative=1e-6)
         apart = float(np.abs(direct.pressure - fft.pressure).max()) / fft.peak
         found.add(name, "max |p_direct - p_fft|/p_max", "-", apart, analytic=0.0, absolute=1e-8)
-        fit = estimators.boundary_circle(fft.x, fft.y, fft.contact, spacing)
+        fit = measures.boundary_circle(fft.x, fft.y, fft.contact, spacing)
         row = reference(case, "a by (9.1)-(9.2)")
         found.add(name, "a of (9.1)-(9.2)", "um", fit.radius, row=row, relative=1e-6)
         row = reference(case, "a area-equivalent")
@@ -191,7 +191,7 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
         s = solve(first, second, spacing=0.225e-3, normal_load=1e4)
         where, case = f"{phi}°, l_e = 0.225 mm", f"9.3 phi={phi} mu=0 mesh le=0.225 mm"
-        nodes = estimators.moment_ellipse(s.x, s.y, s.contact)
+        nodes = measures.moment_ellipse(s.x, s.y, s.contact)
         for letter, value in (("a", nodes.semi_major), ("b", nodes.semi_minor)):
             row = reference(case, f"{letter} (moment ellipse of contact nodes)")
             found.add(where, f"{letter}, moments of the nodes", "mm", value, row=row, relative=1e-6)
@@ -200,7 +200,7 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
         s = solve(first, second, spacing=hertz.semi_minor / 24, normal_load=1e4)
         where, case = f"{phi}°, b/l_e = 24", f"9.3 phi={phi} mu=0"
-        fit = estimators.edge_ellipse(s.x, s.y, s.pressure, s.spacing)
+        fit = measures.edge_ellipse(s.x, s.y, s.pressure, s.spacing)
         for quantity, name, unit, value, exact, allowed in (
             ("p_max", "p0", "MPa", s.peak, hertz.max_pressure, 2e-4),
             ("approach", "delta", "um", s.approach, hertz.approach, 2e-4),
@@ -223,10 +223,10 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
 
 def ellipse_error(
-    x: Array, y: Array, zone: NDArray[np.bool_], spacing: float, ellipse: estimators.Ellipse
+    x: Array, y: Array, zone: NDArray[np.bool_], spacing: float, ellipse: measures.Ellipse
 ) -> float:
     """E_e: mean distance from the ellipse of the boundary nodes, moved out by l_e/2, divided by b."""
-    rim = estimators.boundary(zone)
+    rim = measures.boundary(zone)
     x, y = x[rim] - ellipse.center[0], y[rim] - ellipse.center[1]
     cosine, sine = math.cos(ellipse.angle), math.sin(ellipse.angle)
     u, v = (x * cosine + y * sine) / ellipse.semi_major, (y * cosine - x * sine) / ellipse.semi_minor

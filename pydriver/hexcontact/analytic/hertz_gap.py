@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
-from .elliptic import EllipticContact, hertz_ellipse
+from .frictionless import EllipticContact, hertz_ellipse
 
 if TYPE_CHECKING:
     import xarray
 
 
+ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
 
 
@@ -51,7 +52,7 @@ def is_worn(history: Mapping[Any, Any]) -> bool:
 
 
 def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
-    """Test whether the pressure of a result is that of a contact without friction, see `recognise`."""
+    """Test whether the pressure of a result is that of a contact without friction."""
     return (
         friction_of(attributes) == 0.0
         or abs(attribute_of(attributes, "dundurs_beta")) <= SIMILAR
@@ -125,8 +126,27 @@ class QuadraticGap:
         return self.contact(load).approach + self.lowest
 
 
-def hertzian_gap(deck: str, attributes: Mapping[Any, Any], history: Mapping[Any, Any]) -> QuadraticGap | None:
-    """Return the gap of a deck of two surfaces if Hertz holds for a load step; else None."""
-    gap = QuadraticGap.of_deck(deck, attributes)
-    holds = float(history["normal_load"]) > 0.0 and not is_worn(history)
-    return gap if holds and pressure_is_frictionless(attributes) else None
+def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
+    major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
+    return (major, minor) if minor < ROUND * major else None
+
+
+def against_hertz(
+    deck: str, attributes: Mapping[str, Any], history: Mapping[str, Any]
+) -> list[tuple[str, float, float, str]]:
+    """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail."""
+    gap, load = QuadraticGap.of_deck(deck, attributes), float(history["normal_load"])
+    if gap is None or not load > 0.0 or is_worn(history) or not pressure_is_frictionless(attributes):
+        return []
+    hertz = gap.contact(load)
+    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (gap.approach(load), "m")}
+    if half_axes(history):
+        known |= {f"contact_semi_{n}": (getattr(hertz, f"semi_{n}"), "m") for n in ("major", "minor")}
+    else:
+        known |= {"contact_radius_fit": (hertz.radius, "m"), "contact_radius": (hertz.radius, "m")}
+    return [
+        (name, exact, float(history[name]), unit)
+        for name, (exact, unit) in known.items()
+        if not math.isnan(history.get(name, math.nan))
+    ]

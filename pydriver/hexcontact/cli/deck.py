@@ -9,8 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..files import beginning, replacing
 from ..text import did_you_mean, listed, visible
-from .frame import Content, command, print_error, print_output
-from .options import AsJson, DeckFile, Settings, argument, case_of, flag, output_to, target_of
+from .frame import (
+    AsJson,
+    Content,
+    DeckFile,
+    Settings,
+    argument,
+    case_of,
+    command,
+    flag,
+    output_to,
+    print_error,
+    print_output,
+    target_of,
+)
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
@@ -20,8 +32,7 @@ if TYPE_CHECKING:
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Check a deck, report all its faults, and print a summary of the case."""
     from ..problem import plausibility
-    from ..problem.preview import case_rows
-    from ..problem.refinement import least_and_most
+    from ..problem.preview import case_rows, least_and_most
     from ..solve.memory_needed import peak_memory, require_memory
     from . import printed
 
@@ -74,7 +85,7 @@ def schema(
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
-    from ..study.study_file import study_schema
+    from ..study.plan import study_schema
 
     text = json.dumps(study_schema() if study else deck_schema(), indent=2, ensure_ascii=False) + "\n"
     if output is None or str(output) == "-":
@@ -96,7 +107,7 @@ def new(
     output: Annotated[Path | None, output_to("File to write; default: NAME.toml; - prints it.")] = None,
 ) -> None:
     """Write a commented deck to start from."""
-    from ..deck.write import STARTERS, starter
+    from ..deck.toml import STARTERS, starter
 
     if listing or name is None:
         print("\n".join(STARTERS))

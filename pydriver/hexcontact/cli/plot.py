@@ -14,8 +14,18 @@ from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
-from .frame import command, print_output
-from .options import Shown, argument, beside, labels_of, option, output_to, steps_of, steps_option
+from .frame import (
+    Shown,
+    argument,
+    beside,
+    command,
+    labels_of,
+    option,
+    output_to,
+    print_output,
+    steps_of,
+    steps_option,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..analytic.hertz_gap import against_hertz, half_axes
 from ..errors import DeckError
 from ..result.history_words import (
     contact_size,
@@ -16,7 +17,6 @@ from ..result.history_words import (
     error_of,
     extent_of,
     fitted,
-    half_axes,
     is_frictional,
     load_or_motion,
     remarks,
@@ -100,7 +100,7 @@ class Summary(NamedTuple):
     def remarks(self) -> list[str]:
         """Sentences about doubtful steps."""
         found = remarks(self.histories, self.parameters)
-        from ..deck.recorded import recorded
+        from ..deck.read import recorded
 
         try:
             recorded(self.deck).tables("body")
@@ -245,27 +245,6 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
 
 
 # --- against Hertz --------------------------------------------------------------------------------
-
-
-def against_hertz(
-    deck: str, parameters: Mapping[str, Any], history: History
-) -> list[tuple[str, float, float, str]]:
-    """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail."""
-    from ..analytic.hertz_gap import hertzian_gap
-
-    if (gap := hertzian_gap(deck, parameters, history)) is None:
-        return []
-    hertz = gap.contact(load := float(history["normal_load"]))
-    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (gap.approach(load), "m")}
-    if half_axes(history):
-        known |= {f"contact_semi_{n}": (getattr(hertz, f"semi_{n}"), "m") for n in ("major", "minor")}
-    else:
-        known |= {"contact_radius_fit": (hertz.radius, "m"), "contact_radius": (hertz.radius, "m")}
-    return [
-        (name, exact, float(history[name]), unit)
-        for name, (exact, unit) in known.items()
-        if not math.isnan(history.get(name, math.nan))
-    ]
 
 
 def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: History) -> list[Row]:

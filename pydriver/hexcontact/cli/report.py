@@ -15,28 +15,25 @@ import json
 from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import jinja2
 import numpy as np
 
 from .._version import __version__
 from ..deck.below import Fatigue, Stress
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError, HexcontactError, NotInResult
 from ..files import MADE_BY, replacing, require_replaceable
-from ..interior.extremes import place_of
 from ..interior.files import readable_table, tables_of
+from ..interior.stress import place_of
 from ..plotting.report_data import drawn_data, mapped_steps
 from ..problem.preview import case_rows
 from ..problem.problem import Problem
 from ..result.history_words import load_or_motion, worth_showing
+from ..result.result import Result
 from ..text import quantity, visible
 from ..variables import RESIDUALS, label_of
 from . import printed
-
-if TYPE_CHECKING:
-    from ..result.result import Result
 
 _MOST_PARTS = 200  # segments, and cycles, in the table of energies
 _DATA = resources.files("hexcontact").joinpath("data")

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 from ..solve.interruption import signal_pipe
-from .frame import Content, command, print_error
-from .options import (
+from .frame import (
     AsJson,
+    Content,
     DeckFile,
     Level,
     LogFile,
@@ -18,8 +18,10 @@ from .options import (
     Settings,
     argument,
     case_of,
+    command,
     flag,
     output_to,
+    print_error,
     setting,
     settings_option,
     target_of,

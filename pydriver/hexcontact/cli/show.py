@@ -6,8 +6,20 @@ from pathlib import Path
 from typing import Annotated
 
 from ..errors import DeckError
-from .frame import Content, command, print_output
-from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_to, steps_of, steps_option
+from .frame import (
+    AsJson,
+    Content,
+    ResultFile,
+    Shown,
+    beside,
+    command,
+    flag,
+    labels_of,
+    output_to,
+    print_output,
+    steps_of,
+    steps_option,
+)
 
 
 @command("hexcontact info hertz_spheres.nc")

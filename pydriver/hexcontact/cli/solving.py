@@ -9,28 +9,22 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
-from ..result.history_words import extent_of
+from ..problem.problem import Problem
+from ..result.history_words import Extent, extent_of
 from ..result.netcdf import missing_stresses
-from ..result.store import open_result
+from ..result.step import Step
+from ..result.store import Store, open_result
 from ..solve import log
 from ..solve import run as solving
+from ..solve.events import Listener, reporter
 from ..solve.interruption import Interrupted, in_background
-from ..solve.progress import reporter
 from ..text import listed, visible
 from . import printed
-from .frame import Report, print_error, print_output, write_json
-from .options import LogLevel
-
-if TYPE_CHECKING:
-    from ..problem.problem import Problem
-    from ..result.history_words import Extent
-    from ..result.step import Step
-    from ..result.store import Store
-    from ..solve.events import Listener
+from .frame import LogLevel, Report, print_error, print_output, write_json
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
-from .frame import Content, Failure, command, print_error, print_output
-from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to, steps_of
+from .frame import (
+    AsJson,
+    Content,
+    Failure,
+    Level,
+    LogFile,
+    Quiet,
+    argument,
+    command,
+    flag,
+    option,
+    output_to,
+    print_error,
+    print_output,
+    steps_of,
+)
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
@@ -54,8 +68,7 @@ def study(
     log_level: Level = None,
 ) -> Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
-    from ..study.progress import study_reporter
-    from ..study.study import Study
+    from ..study.study import Study, study_reporter
     from .solving import Messages
 
     if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
@@ -182,7 +195,7 @@ class _State:
 
 def _run_cases(study: Study, numbers: Sequence[int], retry: bool, messages: Messages) -> list[Outcome]:
     """Run cases for a job array; signals end the process unless all are done; finished steps stay."""
-    from ..solve.progress import reporter
+    from ..solve.events import reporter
 
     outcomes: list[Outcome] = []
     listener = reporter(messages.silent)

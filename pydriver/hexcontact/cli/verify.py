@@ -17,8 +17,7 @@ from typing import Annotated, Any
 from ..errors import DeckError, PlausibilityWarning
 from ..text import TextTable, quantity
 from ..variables import VARIABLES
-from .frame import Content, command, print_error
-from .options import AsJson, argument, flag
+from .frame import AsJson, Content, argument, command, flag, print_error
 
 Check = Mapping[str, Any]
 """An entry of the self-test: name, title, note, deck, values."""

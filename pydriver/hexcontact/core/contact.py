@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -147,17 +148,17 @@ class ElasticPair:
         )
         return cls(*constants)
 
-    @property
+    @cached_property
     def effective_modulus(self) -> float:
         """Effective modulus E* [Pa]."""
         return float(1.0 / (np.pi * self.lambda_1))
 
-    @property
+    @cached_property
     def beta(self) -> float:
         """Dundurs' second constant: coupling of normal and tangential contact."""
         return self.lambda_2 / self.lambda_1
 
-    @property
+    @cached_property
     def gamma(self) -> float:
         """Ratio of the additional tangential to the normal compliance."""
         return self.lambda_5 / self.lambda_1

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, Mask
 from . import flat, memory
 from .contact import ElasticPair
-from .estimators import Ellipse
 from .lattice import Nodes
+from .measures import Ellipse
 
 _UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
 _GIVEN = 12  # arrays that it is made from, with copies and zones

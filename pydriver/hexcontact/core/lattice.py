@@ -1,17 +1,20 @@
-"""The lattice of nodes: positions, windows, and transfer of fields between windows."""
+"""The lattice of nodes: positions, windows, transfer between windows, fields between the nodes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, integer, number, reals
 from ..errors import DeckError
 from . import flat
+
+_LENGTH = "a positive length in meters"
 
 
 class Nodes(NamedTuple):
@@ -49,8 +52,8 @@ class Lattice:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        kind = "a positive length in meters"
-        number(self.spacing, "spacing", kind, lambda spacing: 0 < spacing < np.inf)
+        if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:
+            raise DeckError(f"spacing = {self.spacing!r}: expected {_LENGTH}")
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
         origin = reals(self.origin, "origin")
@@ -100,28 +103,28 @@ class Lattice:
         basis: Array = flat.lattice_basis(self.spacing)
         return basis
 
-    @property
+    @cached_property
     def cell_area(self) -> float:
         """Area of a lattice cell, the volume of a pyramid of height one [m^2]."""
         (a, b), (c, d) = self.basis.tolist()
         return float(a * d - b * c)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int]:
         """Shape of a field over the window."""
         return (self.n_row, self.n_col)
 
-    @property
+    @cached_property
     def first(self) -> list[int]:
         """Smallest column and row index, as the core takes them."""
         return [self.col_first, self.row_first]
 
-    @property
+    @cached_property
     def extent(self) -> list[int]:
         """Number of columns and of rows, as the core counts them."""
         return [self.n_col, self.n_row]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of nodes."""
         return self.n_row * self.n_col
@@ -182,3 +185,58 @@ class Lattice:
         if bottom > top and right > left:
             result[top:bottom, left:right] = field[top - row : bottom - row, left - col : right - col]
         return result
+
+
+Point = tuple[float, float]
+
+
+def linear(
+    values: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float = 0.0
+) -> Array:
+    """Interpolate values at the nodes of a lattice linearly on its triangles.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_row, n_col)
+        Values at the nodes.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    x, y : array_like
+        Points, m.
+    outside : float
+        Value at nodes outside the window.
+
+    Returns
+    -------
+    ndarray
+        Values at the points, in their shape.
+    """
+    nodes = Nodes(np.asarray(basis), start, np.shape(values))
+    return np.asarray(flat.field_between_nodes(nodes, values, outside, x, y))
+
+
+def nearest(
+    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
+) -> Array:
+    """Return the values at the nodes next to points; parameters as of `linear`."""
+    col, row, inside = flat.nodes_next_to(Nodes(basis, start, values.shape), x, y)
+    return np.where(inside, values[row, col], outside).astype(float)
+
+
+def section_ends(
+    lattice: Lattice, pressure: Array, angle: float, through: Point | None
+) -> tuple[Point, Point, float]:
+    """Return the ends of a line across a contact, and the distance of its zero from the first one (m)."""
+    point = (0.0, 0.0) if through is None else through
+    ends, zero = flat.section_of_pressure(lattice, pressure, angle, through is not None, point)
+    (x0, y0), (x1, y1) = ends.tolist()
+    return (x0, y0), (x1, y1), zero
+
+
+def crossings(lattice: Lattice, start: Point, end: Point) -> Array:
+    """Return where a line crosses edges of triangles, as distances from its start (m), with its ends."""
+    most = 8 + int(4.0 * math.dist(start, end) / lattice.spacing)  # rows are sqrt(3)/2 spacings apart
+    distance, count = flat.crossings_of_line(lattice, start, end, most)
+    return np.asarray(distance[:count])

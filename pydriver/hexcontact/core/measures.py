@@ -1,6 +1,11 @@
-"""Measures of a state by the core: nodal residuals, areas, energy; cycles of a load history."""
+"""Measures of a state by the core: nodal residuals, areas, energy, sizes of zones, expected errors.
+
+Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
+"""
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -8,9 +13,86 @@ from ..arrays import Array, Mask
 from ..variables import VARIABLES
 from . import flat
 from .contact import ElasticPair, Interface, NormalSolution
+from .flat import area_radius as area_radius
+from .flat import boundary as boundary
+from .flat import boundary_circle as boundary_circle
 from .flat import bulk_strain as bulk_strain
+from .flat import edge_radius as edge_radius
+from .flat import pressure_center as pressure_center
+from .flat import slip_ring as slip_ring
+from .flat import unresolved_slip_zones as unresolved_slip_zones
 from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
+
+NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
+LATTICE_ERRORS: tuple[str, ...] = flat.LatticeErrors._fields
+
+
+class Ellipse(NamedTuple):
+    """An ellipse: semi-axes (m), direction of the major axis from x (rad, in (-pi/2, pi/2]), center (m)."""
+
+    semi_major: float
+    semi_minor: float
+    angle: float
+    center: tuple[float, float]
+
+    @classmethod
+    def of(cls, found: Any) -> Self:
+        """Return an ellipse of the core."""
+        return cls(found.semi_major, found.semi_minor, found.angle, (found.x, found.y))
+
+
+def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
+    """Return the ellipse with the second moments of the nodes of a zone that is not empty."""
+    return Ellipse.of(flat.moment_ellipse(x, y, zone))
+
+
+def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
+    """Return the ellipse on which the pressure vanishes: docs/theory/edges.md."""
+    return Ellipse.of(flat.edge_ellipse(x, y, pressure, spacing))
+
+
+def limits_of_error(
+    spacings: Array, values: Array, rough: Mask | None = None, unresolved: Mask | None = None
+) -> Array:
+    """Estimate the error of values on the first, finest lattice: docs/theory/error_bars.md, (A1) to (A3).
+
+    The values of a lattice are a row. `rough` quantities depend on a few nodes at the edge of a zone, so that
+    an order of 1/2 is possible; `unresolved` ones on a slip zone narrower than the lattice resolves, so that
+    still slower orders are.
+    """
+    none = np.zeros(values.shape[1], dtype=bool)
+    masks = (none if mask is None else mask for mask in (rough, unresolved))
+    return np.asarray(flat.limits_of_error(spacings, values.T, *masks))
+
+
+def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> tuple[Array, float]:
+    """Estimate the `LATTICE_ERRORS`, and spacings for a goal: docs/theory/expected_errors.md, (X1), (X2)."""
+    errors, needed = flat.expected_lattice_errors(spacings, load_ratio, goal)
+    return np.array(errors), needed
+
+
+def expected_entry_error(
+    before: Array, after: Array, stick: float, load_ratio: float | None, goal: float
+) -> tuple[float, float, float]:
+    """Estimate the error of the shear tractions by nodes that enter a growing contact, (X3)-(X5).
+
+    Its steps go from contact radii `before` to `after`; `stick` is mu/abs(beta), 0 if the materials are
+    alike; `load_ratio` is Q/mu P of a tangential load that grows, too. Return the error as a share of all
+    shear tractions, the number of steps as they count, and that for the goal.
+    """
+    ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
+    entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
+    return entry, steps, needed
+
+
+def expected_turning_error(shear: Array) -> float:
+    """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6).
+
+    `shear` has the tangential load or shift along x and y, and torque or twist, each over its largest, a row
+    for the end of each load step.
+    """
+    return float(flat.turning_errors(shear)) if len(shear) else 0.0
 
 
 def nodal_residuals(

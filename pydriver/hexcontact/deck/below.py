@@ -94,7 +94,7 @@ class Below(Table):
 
     @property
     def where(self) -> dict[str, Any]:
-        """The region as arguments of `hexcontact.interior.region`."""
+        """The region as arguments of `hexcontact.interior.fields`."""
         keys = (*REGIONS, "box", "count")
         found = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
         return found if set(found) & set(REGIONS) else self.default_region | found

@@ -14,8 +14,7 @@ from pydantic import ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from ..arrays import Array
-from .formula import Formula
-from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
+from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .table_base import Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, to_si
 

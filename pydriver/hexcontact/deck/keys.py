@@ -7,13 +7,13 @@ the tables together (load history, size of the window, limits of this version).
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, cast, get_origin
+from typing import Annotated, Any, ClassVar, get_origin
 
-from pydantic import Field, TypeAdapter, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
 
 from ..variables import BULK_STRESS, FIELDS, LOADS
@@ -88,7 +88,7 @@ class Bodies(Table):
     body_1: Body = Field(alias="1")
     body_2: Body = Field(alias="2")
 
-    @property
+    @functools.cached_property
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
         return Separation(self.body_1.surface or Flat(), self.body_2.surface or Flat())
@@ -416,7 +416,10 @@ class Deck(Table):
         if data.keys() <= cls.model_fields.keys():
             # Each table alone: pydantic need not build the models of tables that the deck does not have.
             with suppress(ValidationError, PydanticCustomError, LookupError):
-                return {name: _table(data, name, info) for name, info in cls.model_fields.items()}, []
+                return {
+                    name: _reader(name)(data[name]) if name in data or info.is_required() else _absent(info)
+                    for name, info in cls.model_fields.items()
+                }, []
         try:
             return dict(cls.model_validate(data)), []
         except ValidationError as error:
@@ -426,28 +429,30 @@ class Deck(Table):
         for name, info in cls.model_fields.items():
             if name in data and name not in faulty:
                 with suppress(ValidationError):  # an absent key of another table, which is reported
-                    tables[name] = _adapter(cls, name).validate_python(data[name])
+                    tables[name] = _reader(name)(data[name])
             elif name not in faulty:
-                tables[name] = info.get_default(call_default_factory=True)
+                tables[name] = _absent(info)
         return tables, problems
 
 
-def _table(data: Mapping[str, Any], name: str, info: Any) -> Any:
-    """Return one table of a deck; an error if anything is wrong, which the check of all tables reports."""
-    if name not in data and not info.is_required():
-        return info.get_default(call_default_factory=True)
-    value = data[name]
-    if kind := kind_of(info):
-        return kind.parse(value)
-    (table,) = (part for part in parts_of(info.annotation) if issubclass(part, Table))
-    if get_origin(info.annotation) is not list:
-        return table.model_validate(value)
-    if not isinstance(value, list) or not value:
-        raise LookupError(name)
-    return [table.model_validate(entry) for entry in value]
+def _absent(info: Any) -> Any:
+    """Return the value of a table that a deck does not have; `get_default` of pydantic takes longer."""
+    return info.default if info.default_factory is None else info.default_factory()
 
 
 @functools.cache
-def _adapter(deck: type[Deck], name: str) -> TypeAdapter[Any]:
-    """Return the validator of one table of a deck."""
-    return TypeAdapter(cast(Any, deck.model_fields[name].annotation))
+def _reader(name: str) -> Callable[[Any], Any]:
+    """Return the function that checks one table of a deck, and raises an error if anything is wrong."""
+    info = Deck.model_fields[name]
+    if kind := kind_of(info):
+        return kind.parse
+    (table,) = (part for part in parts_of(info.annotation) if issubclass(part, Table))
+    if get_origin(info.annotation) is not list:
+        return table.model_validate
+
+    def entries(value: Any) -> list[Table]:
+        if not isinstance(value, list) or not value:
+            raise LookupError(name)
+        return [table.model_validate(entry) for entry in value]
+
+    return entries

@@ -1,4 +1,4 @@
-"""A deck from several sources: included files, keys set on the command line, series of loads.
+"""Decks from their sources: included files, keys set on the command line, series of loads, results.
 
 The assembled deck is complete: a result that contains its text can be run again without the other files.
 """
@@ -6,6 +6,7 @@ The assembled deck is complete: a result that contains its text can be run again
 from __future__ import annotations
 
 import copy
+import functools
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -14,12 +15,16 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from .._version import __version__
 from ..errors import DeckError
 from ..files import LARGEST_TEXT
 from ..text import listed, visible
-from .faults import MISSING, NOWHERE, Mistake, Source
+from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
+from .interface import FROM_PYTHON
+from .keys import Deck
 from .series import Series, read_series
-from .toml import read_toml, refuse_deep, with_overrides
+from .surfaces import Separation, Surface
+from .toml import parse_toml, read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
 MOST_SERIES = 1000  # files of series
@@ -51,7 +56,6 @@ def assemble(
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
     """Return a deck with its included decks merged, single keys replaced, and series of loads read."""
-    refuse_deep(data, source.name)
     if not ("include" in data or overrides or any(True for _ in _named_files(data))):
         return Assembled(dict(data), text, source, [])
     name = Path(source.name) if source.name else None
@@ -155,3 +159,60 @@ def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
             key = ("load", number, "series", "file")
             for sentence in str(error).splitlines():
                 yield Mistake(key, MISSING, sentence)
+
+
+class RecordedDeck:
+    """The tables of the deck of a result, `data` as they are written; none without a text.
+
+    `given` are the parts that were given in Python: "surface" for the gap, "friction".
+    """
+
+    def __init__(self, text: str, name: str) -> None:
+        self._source = Source(name, text)
+        self.data = parse_toml(text, name) if text else {}
+        places = {"surface": ("body", "1", "surface", "shape"), "friction": ("friction", "coefficient")}
+        self.given = frozenset(part for part, keys in places.items() if self._value(keys) == FROM_PYTHON)
+
+    def _value(self, keys: tuple[str, ...]) -> Any:
+        value: Any = self.data
+        for key in keys:
+            value = value.get(key) if isinstance(value, dict) else None
+        return value
+
+    @functools.cached_property
+    def _checked(self) -> tuple[dict[str, Any], list[Mistake]]:
+        data = self.data
+        if "surface" in self.given:
+            one = {key: value for key, value in data["body"]["1"].items() if key != "surface"}
+            data = {**data, "body": {**data["body"], "1": one}}
+        return Deck.checked(data) if data else ({}, [])
+
+    def tables(self, *names: str) -> dict[str, Any]:
+        """Return the named tables; refuse a key or a value in them that this version does not know."""
+        found, mistakes = self._checked
+        if wrong := [mistake for mistake in mistakes if mistake.key and mistake.key[0] in names]:
+            error = deck_error(wrong, self._source)
+            error.add_note(
+                f"this is hexcontact {__version__}; open the result with the version that wrote it"
+            )
+            raise error
+        return {name: found[name] for name in names if name in found}
+
+    @property
+    def separation(self) -> Separation | None:
+        """The gap of the two surfaces; None if it was given in Python, or without a deck."""
+        bodies = None if "surface" in self.given else self.tables("body").get("body")
+        return bodies.separation if bodies else None
+
+    @property
+    def only_surface(self) -> Surface | None:
+        """The surface of a body on a flat one; None if there is none, or both have one."""
+        bodies = None if "surface" in self.given else self.tables("body").get("body")
+        curved = [body.surface for body in (bodies.body_1, bodies.body_2) if body.surface] if bodies else []
+        return curved[0] if len(curved) == 1 else None
+
+
+@functools.lru_cache(4)
+def recorded(text: str, name: str = "deck of the result") -> RecordedDeck:
+    """Return the deck of a result by its text; `name` stands for it in messages."""
+    return RecordedDeck(text, name)

@@ -23,9 +23,9 @@ from ..arrays import Array, Mask
 from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
-from .formula import Formula
 from .kinds import (
     Flag,
+    Formula,
     HeightFormula,
     Kind,
     PowerCoefficient,
@@ -381,12 +381,9 @@ class SurfaceKind(Kind):
 
 @dataclass(frozen=True)
 class Separation:
-    """The initial gap between two surfaces: their heights added, less the height at first touch.
+    """The initial gap between the surfaces of body 1 and of body 2, which is mirrored.
 
-    Attributes
-    ----------
-    surface_1, surface_2 : Surface
-        The surfaces of body 1 and of body 2 (mirrored).
+    Their heights are added, less the height at first touch.
     """
 
     surface_1: Surface

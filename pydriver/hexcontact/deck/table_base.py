@@ -7,6 +7,7 @@ sentences, which one `DeckError` reports together.
 from __future__ import annotations
 
 import contextlib
+import functools
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NoReturn, Self, get_args
@@ -94,7 +95,8 @@ class Table(BaseModel):
         yield from ()
 
     @classmethod
-    def known_keys(cls) -> dict[str, Any]:
+    @functools.cache
+    def known_keys(cls) -> Mapping[str, Any]:
         """Return the fields of the table by the keys of decks."""
         return {info.alias or name: info for name, info in cls.model_fields.items()}
 
@@ -161,12 +163,14 @@ class Table(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _collect(cls, data: Any, handler: Any) -> Any:
-        found: list[Mistake] = []
-        table = None
+        table, found = None, []
         try:
             table = handler(data)
         except ValidationError as error:
-            found += [cls._problem(details) for details in error.errors(include_url=False)]
+            found = [cls._problem(details) for details in error.errors(include_url=False)]
+        conflicts = list(cls.conflicts(data)) if isinstance(data, Mapping) else []
+        if not (found or conflicts):
+            return table
         if isinstance(data, Mapping):
             # A key that an unknown one means is not reported as missing.
             known = cls.known_keys()
@@ -175,7 +179,7 @@ class Table(BaseModel):
             found = [problem for problem in found if problem.value is not MISSING or problem.key not in given]
             corrected = {meant.get(key) or key: value for key, value in data.items()}
             remaining = list(cls.conflicts(corrected))
-            for key, sentence in cls.conflicts(data):
+            for key, sentence in conflicts:
                 if (key, sentence) in remaining:
                     found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:

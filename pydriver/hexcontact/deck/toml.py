@@ -1,4 +1,4 @@
-"""TOML files as dictionaries, and single keys replaced in them, before any check."""
+"""TOML texts of decks: read as dictionaries, changed by single keys, written."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import DeckError, Fault
 from ..files import text_of
+from .keys import Deck
+from .table_base import Table
 from .units import DIGITS
 
 _LONGEST_NUMBER = 9  # digits of an entry
@@ -100,3 +104,56 @@ def _entry(array: Any, number: str, key: str) -> Any:
         hint = "" if number.lstrip("-").isdecimal() else f" (entries of arrays count from 1: {example})"
         raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number[:60]}{hint}")
     return array[int(number) - 1]
+
+
+STARTERS = (
+    *("sphere", "fretting", "paraboloid", "crossed_cylinders"),
+    *("punch", "rounded_punch", "cone", "power"),
+)
+"""Names of the starter decks, ``templates/NAME.toml``."""
+
+
+def starter(name: str) -> str:
+    """Return the text of a starter deck, see ``hexcontact new NAME``."""
+    from importlib import resources
+
+    return (resources.files(__package__) / "templates" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def plain(value: Any) -> Any:
+    """Return values of Python as a deck can hold them: without numpy, None and `Table`."""
+    if isinstance(value, Table):
+        return value.written(defaults=False)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
+    if isinstance(value, list | tuple):
+        return ["" if entry is None else plain(entry) for entry in value]
+    return value
+
+
+def as_toml(data: Mapping[str, Any]) -> str:
+    """Return the text of a deck with the given tables."""
+    import tomli_w
+
+    return tomli_w.dumps(plain(data))
+
+
+def load_as_toml(entry: Mapping[str, Any]) -> str:
+    """Return the text of an entry of [[load]], which can follow that of other tables and entries."""
+    import tomli_w
+
+    long = {"label": "-" * 100}  # beside it no entry is written as an array in a line
+    return "\n" + tomli_w.dumps({"load": [entry, long]}).removesuffix(
+        f'\n[[load]]\nlabel = "{long["label"]}"\n'
+    )
+
+
+def written(deck: Deck) -> str:
+    """Return the text of a deck with every key that has a value, defaults included, in SI.
+
+    Parsing the text gives an equal deck. Keys that others exclude (`ramp` beside `values`, all but the label
+    beside a `path`) are left out.
+    """
+    return as_toml(deck.written())

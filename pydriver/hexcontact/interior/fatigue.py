@@ -17,7 +17,7 @@ from ..core.lattice import Lattice
 from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError
 from . import fields
-from .region import Region, region
+from .fields import Region, region
 from .stress import Fields, Loaded, NearSurface, add_bulk, source_of, summed, window_over
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from .. import netcdf_library
 from ..deck.below import Fatigue, Stress
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError
 from ..files import reading, remove_stale, replacing
 from ..text import quantity
-from .extremes import extremes_of, place_of
+from .stress import extremes_of, place_of
 
 if TYPE_CHECKING:
     import xarray
@@ -40,13 +40,7 @@ def files_of(deck: str, output: Path) -> dict[str, Path]:
 
 
 def read_table(path: Path) -> xarray.Dataset | None:
-    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one.
-
-    Raises
-    ------
-    DeckError
-        If it is damaged.
-    """
+    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
     if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
     with reading(path), netcdf_library.opened_by_xarray(path) as found:

@@ -20,7 +20,6 @@ from .zones import contact_boundary, outlines, zones
 from .history import compliance, history, loop, torsion
 from .below import fatigue, lines, stress, trailing_edge
 from .overview import overview
-from . import table as table
 from .registry import entries
 
 __all__ = [

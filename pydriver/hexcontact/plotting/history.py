@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..analytic.compare import CIRCULAR, ClosedForms
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
-from ..analytic.shear import CIRCULAR, ClosedForms
 from ..arrays import Array
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
@@ -27,7 +27,6 @@ from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figur
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))

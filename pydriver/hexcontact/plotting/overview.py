@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..analytic.shear import ClosedForms
+from ..analytic.compare import ClosedForms
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from .history import draw_history, fitted
-from .maps import draw_field
-from .plane import Part
+from .maps import Part, draw_field
 from .registry import figure
 from .sections import Cut, draw_section, draw_shear
 from .style import legend_above, legend_below, new_figure, set_title

@@ -15,13 +15,13 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..result.history_words import step_rows
-from ..result.raster import Plane, png_of
+from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from ..text import scaled, worded
 from ..variables import LOADS, MAPS, RESIDUALS, TRACTIONS, VARIABLES, spelled
 from .history import panels_of, peak
-from .plane import Limits, Part
+from .maps import Limits, Part
 from .sections import line_of
 
 MOST_STEPS = 120  # steps with maps; evenly chosen from longer histories

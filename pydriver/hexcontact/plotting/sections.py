@@ -11,14 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
-from ..analytic.shear import PartialSlip
+from ..analytic.compare import PartialSlip
 from ..arrays import Array
 from ..errors import DeckError, NotInResult
-from ..result.interpolate import Line, section_line
 from ..result.result import Result
+from ..result.step import Line, section_line
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
-from .plane import closed_solutions, views_of
+from .maps import closed_solutions, views_of
 from .registry import figure
 from .style import (
     COMPUTED,
@@ -36,8 +36,6 @@ from .style import (
 
 if TYPE_CHECKING:
     import xarray
-
-    from ..result.result import Result
 
 
 Point = tuple[float, float]

@@ -14,19 +14,18 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
-from ..analytic.shear import PartialSlip
+from ..analytic.compare import PartialSlip
+from ..analytic.hertz_gap import ROUND
 from ..arrays import Array, Mask
-from ..core import estimators
+from ..core import measures
 from ..core.edges import ZoneMesh
 from ..errors import NotInResult
-from ..result.history_words import ROUND
-from ..result.mesh import triangles
-from ..result.raster import SLIP, STICK
+from ..result.html import SLIP, STICK
+from ..result.netcdf import triangles
 from ..result.result import Result
 from ..result.view import Results, StepView
 from ..text import worded
-from .maps import mesh_of
-from .plane import FEWER_ARROWS, Part, closed_solutions, map_panels, views_of
+from .maps import FEWER_ARROWS, Part, closed_solutions, map_panels, mesh_of, views_of
 from .registry import figure
 from .style import (
     COMPUTED,
@@ -43,8 +42,6 @@ from .style import (
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def draw_zones(axes: Axes, view: StepView, exact: PartialSlip | None, part: Part) -> None:
@@ -176,7 +173,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
     width, height = part.size()
     canvas, axes = drawing(ax, max(width, 4.6), height + 0.6, equal=True)
     x_min, x_max, y_min, y_max = part.limits
-    x, y, rim = view.x * part.factor, view.y * part.factor, estimators.boundary(view.contact)
+    x, y, rim = view.x * part.factor, view.y * part.factor, measures.boundary(view.contact)
     across = part.width / view.spacing
     pitch = 70.0 * (6.4 if part.is_wide else min(3.4, 6.0 / part.aspect)) / across  # points between nodes
     if across < _APART:
@@ -226,11 +223,11 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
 
 def _fitted(
     view: StepView, zone: Mask, letter: str, center: tuple[float, float] | None = None
-) -> tuple[estimators.Ellipse, str]:
+) -> tuple[measures.Ellipse, str]:
     """Return the circle of the boundary nodes of a zone, or the ellipse of its moments, and its label."""
-    moments = estimators.moment_ellipse(view.x, view.y, zone)
+    moments = measures.moment_ellipse(view.x, view.y, zone)
     if moments.semi_minor > ROUND * moments.semi_major:
         center = center or moments.center
-        radius = estimators.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
-        return estimators.Ellipse(radius, radius, 0.0, center), f"circle, {letter} = {worded(radius, 'm')}"
+        radius = measures.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
+        return measures.Ellipse(radius, radius, 0.0, center), f"circle, {letter} = {worded(radius, 'm')}"
     return moments, f"ellipse, {worded(moments.semi_major, 'm')} by {worded(moments.semi_minor, 'm')}"

@@ -13,7 +13,7 @@ from ..deck.interface import Interface
 from ..deck.series import DRIVEN
 from ..deck.surfaces import Surface
 from ..deck.table_base import SYMBOLS, Argument, Table, not_included
-from ..deck.write import plain
+from ..deck.toml import plain
 from ..text import listed, nearest
 
 _P = ParamSpec("_P")

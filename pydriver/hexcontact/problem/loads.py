@@ -121,18 +121,8 @@ START: dict[Motion, Target] = {
 class History:
     """Load steps, unrolled from entries of [[load]] as they are appended.
 
-    Parameters
-    ----------
-    friction_coefficient : float or None
-        Coefficient of friction, may be inf; NaN for another law; None: tangential loads and motions are no
-        unknowns.
-    bulk : Bulk, optional
-        The body that carries a bulk stress.
-
-    Attributes
-    ----------
-    steps : list of LoadStep
-        The history; incomplete if it is longer than `MOST_STEPS`.
+    The coefficient of friction may be inf; NaN: another law; None: tangential loads and motions are no
+    unknowns. `steps` are incomplete if they are more than `MOST_STEPS`.
     """
 
     def __init__(self, friction_coefficient: float | None, bulk: Bulk | None = None) -> None:

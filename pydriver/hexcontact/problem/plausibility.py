@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.estimators import (
+from ..core.measures import (
     LATTICE_ERRORS,
     NO_VALUE,
     expected_entry_error,
@@ -23,10 +23,8 @@ from ..core.estimators import (
 from ..deck.interface import TwoCoefficients
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
-
-if TYPE_CHECKING:
-    from .loads import LoadStep
-    from .problem import Problem
+from .loads import LoadStep
+from .problem import Problem
 
 
 class Limit(NamedTuple):
@@ -37,11 +35,6 @@ class Limit(NamedTuple):
     reason: str  # reason for the limit, with its source
     least: float = -math.inf  # range without a warning
     most: float = math.inf
-
-    @property
-    def usual(self) -> float:
-        """A value within the limits, for an unknown one."""
-        return self.least if math.isinf(self.most) else self.most
 
 
 _EDGE_SPACINGS = 18  # in the radius, from which nodes lie near enough to the peak of a fatigue parameter
@@ -229,11 +222,24 @@ def _at_most(error: float) -> str:
 
 
 def warnings(case: Problem, estimated: bool = True) -> list[str]:
-    """Return a sentence for each limit that a case exceeds; arguments as `expected`."""
-    found = expected(case, estimated)
+    """Return a sentence for each limit that a case exceeds, found once; arguments as `expected`."""
+    if estimated not in case.judged:
+        found = expected(case, estimated)
+        passed = [
+            limit
+            for limit in LIMITS
+            if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most
+        ]
+        known = found | _words(case, found) if passed else {}
+        case.judged[estimated] = [limit.words.format(**known) for limit in passed]
+    return case.judged[estimated]
+
+
+def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
+    """Return the words in the sentences of limits that are no numbers."""
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
     worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
-    known = found | {
+    return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
         "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
@@ -243,10 +249,6 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
         "turning_percent": percent(found.get("turning_error", 0.0)),
         "ring_percent": _at_most(found.get("ring_error", 0.0)),
     }
-    passed = [
-        limit for limit in LIMITS if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
-    ]
-    return [limit.words.format(**known) for limit in passed]
 
 
 def row(case: Problem) -> str:

@@ -23,17 +23,15 @@ from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.write import as_toml, plain
+from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
 from ..variables import LOADS
 from . import window
 from .arguments import Body
 from .checks import checked
-from .friction_law import FrictionField
-from .height_map import HeightMap
 from .loads import LoadStep, wearing_cycle
-from .plane_field import GAP, FieldSource, PlaneField
+from .plane_field import GAP, FieldSource, FrictionField, HeightMap, PlaneField
 from .window import Estimate, NoContactFound
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
@@ -79,6 +77,7 @@ class Problem:
     deck_file: Path | None = None
     _stiffest = 0.0  # decimal logarithm of the stiffness of the interface over that of the bodies
     trial = False  # whether it is one of several lattices of a refinement
+    judged: dict[bool, list[str]]  # its warnings, without and with an estimate of the contact, once found
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Self:
@@ -126,7 +125,7 @@ class Problem:
         return case
 
     def _set_up(self, given: Assembled, gap: FieldSource | None, lattice: Lattice | None) -> None:
-        self._given = given
+        self._given, self.judged = given, {}
         self.deck, self.solver, self.load_steps = checked(given, gap is not None)
         deck = self.deck
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
@@ -224,12 +223,12 @@ class Problem:
         share = _NO_ELASTICITY / max(1.0, 10.0**self._stiffest)
         return ElasticPair(share * pair.lambda_1, 0.0, share * pair.lambda_5)
 
-    @property
+    @cached_property
     def frictional(self) -> bool:
         """Whether shear tractions are unknowns."""
         return self.solver.algorithm != "frictionless"
 
-    @property
+    @cached_property
     def coupled(self) -> bool:
         """Whether pressure and shear are coupled."""
         return self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
@@ -237,24 +236,10 @@ class Problem:
     # --- data of the solvers --------------------------------------------------------------------------------
 
     def initial_gap(self, lattice: Lattice) -> tuple[Array, Mask]:
-        """Return the gap before loading, over the nodes of a window.
+        """Return the gap before loading over the nodes of a window, and where the bodies can touch.
 
-        Parameters
-        ----------
-        lattice : Lattice
-            The window.
-
-        Returns
-        -------
-        gap : ndarray, (n_row, n_col)
-            Initial gap (m) from first touch; inf where nothing can touch.
-        candidate : ndarray of bool, (n_row, n_col)
-            False where the two bodies cannot touch, as outside a punch.
-
-        Raises
-        ------
-        DeckError
-            If a gap given in Python does not fit the window or is NaN somewhere.
+        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch.
+        DeckError if a gap given in Python does not fit the window or is NaN somewhere.
         """
         gap = self._gap.over(lattice)
         return gap, np.isfinite(gap)
@@ -262,30 +247,12 @@ class Problem:
     def friction_law(self, lattice: Lattice) -> FrictionLaw:
         """Return the law of friction at the nodes of a window.
 
-        Raises
-        ------
-        DeckError
-            If a coefficient is negative or NaN somewhere, or a map ends within the window.
+        DeckError if a coefficient is negative or NaN somewhere, or a map ends within the window.
         """
         return self._friction.over(lattice)
 
     def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
-        """Refuse a load step whose contact reaches the end of a height map, or a hole in it.
-
-        Parameters
-        ----------
-        number : int
-            Number of the load step.
-        lattice : Lattice
-            Its window.
-        contact : ndarray of bool, (n_row, n_col)
-            The nodes in contact.
-
-        Raises
-        ------
-        DeckError
-            If the contact reaches it.
-        """
+        """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
         if fault := self._gap.fault_near(lattice, contact):
             raise DeckError(f"gap: the contact of load step {number} {fault}")
 
@@ -306,7 +273,7 @@ class Problem:
     def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Self:
         """Return the same problem on a lattice of another spacing (m) and origin (m), without refinement."""
         other = copy.copy(self)
-        other.accuracy, other.trial = None, True
+        other.accuracy, other.trial, other.judged = None, True, {}
         moved = np.array(window.lattice_coordinates(*self.lattice.origin, origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]

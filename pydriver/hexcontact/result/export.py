@@ -21,11 +21,10 @@ from ..interior.files import as_volume, tables_of
 from ..interior.stress import TENSOR
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
-from . import mesh
-from .below import at_hand
-from .interpolate import is_kept, with_shown
+from . import netcdf
 from .netcdf import is_mesh
-from .result import Result
+from .result import Result, at_hand
+from .step import is_kept, with_shown
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -151,7 +150,7 @@ def _vtu(result: Result, number: int, source: str | None) -> str:
     """Return a load step as an unstructured grid in XML."""
     lattice, one = result.lattice, result.step(number)
     points = np.stack([lattice.x.ravel(), lattice.y.ravel(), np.zeros(lattice.size)], axis=1)
-    faces = mesh.triangles(lattice.n_row, lattice.n_col)
+    faces = netcdf.triangles(lattice.n_row, lattice.n_col)
     history = {
         name: one[name].values.reshape(1)
         for name, variable in VARIABLES.items()
@@ -252,14 +251,14 @@ def to_ugrid(
         about = {"content": "fields on a mesh", "hexcontact_version": __version__}
         file.setncatts({"Conventions": CONVENTIONS, **about, **named})
         file.createDimension("step", len(steps))
-        mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
-        mesh.write_mesh(file, result.lattice)
-        on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
+        netcdf.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
+        netcdf.write_mesh(file, result.lattice)
+        on_nodes = {"mesh": netcdf.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
         for name in (name for name in (*FIXED, *FIELDS) if name in result.dataset):
             variable = VARIABLES[name]
             fill = variable.missing if variable.dtype == "f8" else None
-            dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
-            column = mesh.add_column(
+            dims, attributes = (*variable.dims[:-2], netcdf.NODE), variable.attributes | on_nodes
+            column = netcdf.add_column(
                 *(file, name, variable.dtype, dims, attributes), zlib=True, complevel=1, fill_value=fill
             )
             if name in FIXED:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analytic.hertz_gap import half_axes
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of, turning_points
 from ..deck.below import Stage
@@ -45,7 +46,6 @@ _NOTICED = 1e-6  # share of the normal load or approach from which tangential on
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 _ELLIPTIC = 0.005  # share by which the area of a contact may differ from that of the ellipse with its moments
-ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 _WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
 _UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
@@ -81,12 +81,6 @@ def fitted(name: str, history: History) -> float:
     """Return an area or radius to the edge between the nodes; without a fit, that of the nodes."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
-
-
-def half_axes(history: History) -> tuple[float, float] | None:
-    """Return the half-axes (m) of a contact; None if it is a circle, or they are unknown."""
-    major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
-    return (major, minor) if minor < ROUND * major else None
 
 
 def contact_size(history: History) -> tuple[str, str]:

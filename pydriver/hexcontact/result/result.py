@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
@@ -11,33 +12,25 @@ from numpy.typing import ArrayLike, NDArray
 from ..analytic.hertz_gap import friction_of
 from ..arrays import Array, has_entries, integer, number
 from ..core.lattice import Lattice
-from ..deck.below import Criteria, Fatigue, cycle_of
+from ..deck.below import Criteria, Fatigue, Stress, cycle_of
 from ..deck.faults import NOWHERE
 from ..errors import DeckError, NotInResult, PathWarning, warn
-from ..interior.extremes import with_places
 from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
-from ..interior.region import region
-from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions
+from ..interior.fields import region
+from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
+from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions, with_places
 from ..text import did_you_mean, text_table
 from ..variables import FIELDS, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
-from .interpolate import (
-    NodalStep,
-    Point,
-    PressureField,
-    TractionField,
-    chosen_fields,
-    loaded,
-    nodal,
-    with_shown,
-)
 from .layout import Quantities, history_of, lattice_of, step_of
+from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
     from ..analytic.compare import Comparison
+
 
 _FEW_STEPS = 4  # load steps of a cycle; fewer have none between its ends
 _LISTED = "result.quantities lists what there is"
@@ -368,7 +361,7 @@ class Result:
 
         `components` are names of `hexcontact.variables.STRESSES`; several numbers of a step give the dataset
         the dimension ``step``; `where` is one of ``points``, ``line``, ``plane`` and ``depths``, see
-        `hexcontact.interior.region`; `source` says of which tractions: ``"edges"``, corrected at the edges
+        `hexcontact.interior.fields`; `source` says of which tractions: ``"edges"``, corrected at the edges
         of contact and stick, or ``"nodes"``, as they are. Raises DeckError, IndexError or ResourceError.
         """
         one = not has_entries(step)
@@ -590,3 +583,62 @@ class Result:
         from . import html
 
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
+
+
+def computed(
+    result: Result, kept: list[int], names: list[str] | None = None
+) -> Iterator[tuple[str, xarray.Dataset]]:
+    """Yield name and dataset of each table, or of those named, of the deck of a result."""
+    for name, table in tables_of(result.deck).items():
+        if names is None or name in names:
+            yield name, of_table(result, name, table, kept)
+
+
+def at_hand(
+    result: Result, kept: list[int], names: list[str] | None = None
+) -> Iterator[tuple[str, xarray.Dataset]]:
+    """Yield the tables as `computed`; those that the run has written are read from their files."""
+    run, path = result.dataset.attrs.get("run"), Path(result.path)
+    files = files_of(result.deck, path) if path.name else {}
+    for name, table in tables_of(result.deck).items():
+        if names is not None and name not in names:
+            continue
+        found = readable_table(files[name]) if files else None
+        if found is None or found.attrs.get("stress_of") != run:
+            found = of_table(result, name, table, kept)
+        yield name, found
+
+
+def of_table(
+    result: Result, name: str, table: Stress | Fatigue, kept: list[int] | None = None
+) -> xarray.Dataset:
+    """Return the dataset of a table of the deck; arguments and errors as of `computed`."""
+    if isinstance(table, Fatigue):
+        try:
+            found = of_cycle(result, table)
+        except DeckError as error:
+            raise DeckError(f"fatigue {name}: {error}") from error
+    else:
+        kept = kept or []
+        steps = kept[-1:] if table.steps is None else kept
+        if isinstance(table.steps, tuple):
+            steps = list(table.steps)
+        if missing := [number for number in steps if number not in kept]:
+            raise DeckError(f"stress {name}: there are no fields of step {missing[0]} (output.every)")
+        chosen = {"step": steps, "body": table.body, "source": table.source}
+        found = result.stress(*table.components, **chosen, **table.where)  # type: ignore[arg-type]
+    attributes = result.dataset.attrs
+    return found.assign_attrs(
+        {key: attributes[key] for key in ("source", "hexcontact_version")},
+        title=f"{attributes.get('title') or 'hexcontact'}: {name}",
+        stress_of=attributes["run"],
+        content=FATIGUE if isinstance(table, Fatigue) else STRESS,
+    )
+
+
+def of_cycle(result: Result, table: Fatigue) -> xarray.Dataset:
+    """Return the fatigue parameters that a table wants."""
+    constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
+    given = {key: value for key, value in constants.items() if value is not None}
+    cycle = {"segment": table.segment, "steps": table.steps}
+    return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]

@@ -1,24 +1,327 @@
-"""A finished load step, the state of a run."""
+"""A finished load step: its values at the nodes, between them, and along lines.
+
+A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
+a polygon with corners at the edges of triangles. Pressure and shear traction go to the edges of contact and
+stick between the nodes, unless the source is "nodes".
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..analytic.hertz_gap import friction_of, is_compliant
 from ..arrays import Array, Mask
+from ..core.edges import ContactEdges, Limits, TractionField
+from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
+from ..deck.below import SOURCES
+from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
-from .interpolate import NodalStep, loaded
+from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
+
+
+Point = tuple[float, float]
+Fields = Mapping[str, NDArray[Any]]
+
+_FINER = 8  # points along a spacing where tractions are curved
+_STICK = 1  # value of zone at a sticking node
+
+
+def interpolate(
+    lattice: Lattice,
+    name: str,
+    values: NDArray[Any],
+    x: ArrayLike,
+    y: ArrayLike,
+    tractions: TractionField | None = None,
+) -> Array:
+    """Return a field at points of the plane (m): tractions to the edges, others linear on the triangles.
+
+    A zone is that of the nearest node. Without `tractions` pressure and shear are linear, too. Outside the
+    window tractions and slip are 0, other fields NaN.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    if tractions is not None and name in TRACTIONS:
+        return np.asarray(tractions(x, y)[TRACTIONS.index(name)])
+    variable = VARIABLES[name]
+    between = nearest if variable.flags else linear
+    return between(values, lattice.basis, lattice.start, x, y, variable.padding)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NodalStep:
+    """A load step by its values at the nodes: fields between them, and along lines."""
+
+    index: int
+    lattice: Lattice
+    fields: Fields
+    friction: float = field(default=0.0, kw_only=True)
+    sharp: bool = field(default=True, kw_only=True)
+    shear_limit: float = field(default=math.inf, kw_only=True)
+
+    @property
+    def number(self) -> int:
+        """Number of the step, from 1."""
+        return self.index + 1
+
+    @property
+    def limits(self) -> Limits | None:
+        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
+        if not math.isnan(self.friction):
+            return (self.friction, self.shear_limit) if 0.0 < self.friction < math.inf else None
+        if NODAL_FRICTION not in self.fields:  # of another law
+            return None
+        # a coefficient that varies, or has a bound; NaN where no step had a node
+        return np.nan_to_num(np.asarray(self.fields[NODAL_FRICTION])), self.shear_limit
+
+    def traction_field(self, source: str | None = None) -> TractionField:
+        """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
+        if source not in (None, *SOURCES):
+            raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+        there = {name: np.asarray(self.fields[name]) for name in (*TRACTIONS, *EDGES) if name in self.fields}
+        kept = {name: values for name, values in there.items() if is_kept(values)}
+        for name in ("pressure", "gap") if source == "edges" else ("pressure",):
+            if name not in kept:
+                raise NotInResult(
+                    f"the {name} of step {self.number} was not kept (output.fields, output.every)"
+                )
+        if source == "edges" and not self.sharp:
+            raise NotInResult(
+                "source = 'edges': expected nodes; the edges need the gap, and there are none with a "
+                "compliant interface"
+            )
+        zero, at = np.zeros(self.lattice.shape), (self.lattice.basis, self.lattice.start)
+        tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
+        if source == "nodes" or not (self.sharp and "gap" in kept):
+            return TractionField.of_nodes(tractions, *at)
+        zone, gap = kept.get("zone"), kept["gap"]
+        contact = tractions[0] > 0.0 if zone is None else zone > 0
+        edges = ContactEdges(tractions[0], gap, contact, np.isfinite(gap), *at)
+        if zone is None or not kept.keys() >= {*TRACTIONS} or not (limits := self.limits):
+            return edges.field(tractions[1:])
+        return edges.field(tractions[1:], np.asarray(zone == _STICK), limits)
+
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
+        """Return a field at points of the plane; see `hexcontact.Result.at`."""
+        [values] = chosen_fields([name], self.fields, self.number).values()
+        return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
+
+    def profile(
+        self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
+    ) -> xarray.Dataset:
+        """Return fields along a line between two points; see `hexcontact.Result.profile`."""
+        return self._along(Line(start, end), names, points, source)
+
+    def section(
+        self,
+        *names: str,
+        angle: float = 0.0,
+        through: Point | None = None,
+        points: int | None = None,
+        source: str | None = None,
+    ) -> xarray.Dataset:
+        """Return fields along a line across the contact; see `hexcontact.Result.section`."""
+        pressure = chosen_fields(["pressure"], self.fields, self.number)["pressure"]
+        return self._along(section_line(self.lattice, pressure, angle, through), names, points, source)
+
+    def _along(
+        self, line: Line, names: Sequence[str], points: int | None, source: str | None
+    ) -> xarray.Dataset:
+        fields = chosen_fields(names, self.fields, self.number)
+        return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
+
+    def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
+        """Return the tractions between the nodes, if there is one among some fields."""
+        return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
+
+
+def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
+    """Return a load step of a result, whose fields are read at their first use."""
+    known = step.attrs
+    return NodalStep(
+        int(step["step"]) - 1,
+        lattice,
+        {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
+        friction=friction_of(known),
+        sharp=not is_compliant(known),
+        shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
+    )
+
+
+def loaded(step: NodalStep, more: Sequence[str] = (), edges: bool = True) -> dict[str, Any]:
+    """Return the tractions and `more` fields of a step; with `edges`, those that show the edges, if known."""
+    names = [name for name in (*TRACTIONS, *more) if name in step.fields]
+    if (
+        edges
+        and step.sharp
+        and all(name in step.fields and is_kept(np.asarray(step.fields[name])) for name in EDGES)
+    ):
+        names += EDGES
+    return dict(chosen_fields(names, step.fields, step.number))
+
+
+def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
+    """Return a load step of a result with the tractions of a source at the nodes."""
+    names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]
+    if "pressure" not in names:
+        return step
+    shown = nodal(step, lattice).traction_field(source).at_nodes()
+    found = dict(zip(TRACTIONS, shown, strict=True))
+    return step.assign({name: step[name].copy(data=found[name]) for name in names})
+
+
+class PressureField:
+    """The pressure of a solution at any point.
+
+    Near the edge of the contact its square is interpolated, which is linear in the distance; elsewhere, and
+    where the contact ends at nodes that can never touch, the pressure itself is.
+
+    Parameters
+    ----------
+    pressure, gap : ndarray, shape (n_row, n_col)
+        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where the bodies cannot touch.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    """
+
+    def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:
+        edges = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start)
+        self._tractions = edges.field()
+
+    @classmethod
+    def of(cls, tractions: TractionField) -> Self:
+        """Return the pressure of a traction field."""
+        field = cls.__new__(cls)
+        field._tractions = tractions
+        return field
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the pressure (Pa) at points (m), in their shape; 0 outside the window."""
+        return np.asarray(self._tractions(x, y)[0])
+
+
+# --- lines --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line between two points (m); distances along it are 0 at `zero` (m) from its start."""
+
+    start: Point
+    end: Point
+    zero: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, point in (("start", self.start), ("end", self.end)):
+            if np.shape(point) != (2,) or not np.isfinite(np.asarray(point, dtype=float)).all():
+                raise DeckError(f"{name} = {point!r}: expected a point (x, y) in meters")
+        if not self.length > 0.0:
+            raise DeckError(f"end = {self.end!r}: expected another point than the start of the line")
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    def corners(self, lattice: Lattice) -> Array:
+        """Return distances (m) from the start at which the line crosses edges of triangles, and its ends."""
+        return crossings(lattice, self.start, self.end)
+
+    def points(self, distance: Array) -> tuple[Array, Array]:
+        """Return the coordinates (m) of points at some distances (m) from the start."""
+        x, y = (a + (b - a) * (distance / self.length) for a, b in zip(self.start, self.end, strict=True))
+        return np.asarray(x), np.asarray(y)
+
+
+def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point | None) -> Line:
+    """Return the line across a contact at an angle (rad) from x, with a margin on both sides.
+
+    Distances count from the point `through` (m), by default from the node next to the center of pressure.
+    """
+    start, end, zero = section_ends(lattice, pressure, angle, through)
+    return Line(start, end, zero)
+
+
+def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
+    """Return the named fields of a load step, by default all that were kept."""
+    for name in names:
+        if name not in fields:
+            known = name in VARIABLES and VARIABLES[name].is_field
+            hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
+            if known:
+                raise NotInResult(f"{name} was not kept (output.fields){hint}")
+            raise DeckError(f"{name} is no field{hint}")
+    found = {name: np.asarray(fields[name]) for name in names or fields}
+    kept = {name: values for name, values in found.items() if is_kept(values)}
+    for name in names:
+        if name not in kept:
+            raise NotInResult(f"{name} of step {step} was not kept (output.every)")
+    if not names and not any(VARIABLES[name].is_field for name in kept):
+        raise NotInResult(f"no field of step {step} was kept (output.fields, output.every)")
+    return kept
+
+
+def is_kept(values: NDArray[Any]) -> bool:
+    """Test by its values whether the output has a field of a step."""
+    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
+
+
+def profile(
+    lattice: Lattice,
+    fields: Fields,
+    line: Line,
+    points: int | None = None,
+    tractions: TractionField | None = None,
+    **attributes: Any,
+) -> xarray.Dataset:
+    """Return fields along a line, over ``distance`` (m), with `attributes` of the dataset.
+
+    Without a number of `points` they are the corners of the polygon of a field, so that straight lines
+    between them are exact; tractions to the edges are curved and have eight points a spacing.
+    """
+    import xarray
+
+    if points is not None and (isinstance(points, bool) or not isinstance(points, int) or points < 2):
+        raise DeckError(f"points = {points!r}: expected a whole number of at least 2")
+    distance = line.corners(lattice) if points is None else np.linspace(0.0, line.length, points)
+    if tractions is not None and any(name in TRACTIONS for name in fields):
+        attributes["tractions"] = tractions.source
+        if points is None and tractions.source == "edges":
+            distance = np.union1d(distance, np.arange(0.0, line.length, lattice.spacing / _FINER))
+    x, y = line.points(distance)
+    places = {
+        "distance": (distance - line.zero, "distance along the line"),
+        "x": (x, "x coordinate"),
+        "y": (y, "y coordinate"),
+    }
+    return xarray.Dataset(
+        {
+            name: (
+                "distance",
+                interpolate(lattice, name, values, x, y, tractions),
+                VARIABLES[name].attributes,
+            )
+            for name, values in fields.items()
+        },
+        coords={
+            name: ("distance", values, {"long_name": long_name, "units": "m"})
+            for name, (values, long_name) in places.items()
+        },
+        attrs=attributes,
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import errno
+import itertools
 import os
 import shlex
 import shutil
@@ -21,23 +22,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import flush, make_anew, reading, replacing, require_utf8
-from ..lock import Lock, begun, names_a_run
+from ..files import Lock, begun, flush, make_anew, names_a_run, reading, replacing, require_utf8
 from .journal import (
     HEADER,
+    LARGE,
     STOPPED,
     SUFFIX,
     Header,
     Journal,
+    TrialFolder,
+    foreign_file,
     journal_of,
+    linked_folder,
     read_record,
+    remove_all,
     write_header,
     write_record,
 )
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
-from .trials import TrialFolder, foreign_file, linked_folder, remove_all
 
 if TYPE_CHECKING:
     from .result import Result
@@ -103,9 +107,9 @@ class Store:
         self._at(path)
         self.metadata = metadata
         with self.writing("the journal"):
-            self._lock = self._locked()
+            self._lock, there = self._locked()
         try:
-            self._take_over(overwrite)
+            self._take_over(overwrite, there)
         except BaseException:
             self.close()
             raise
@@ -152,6 +156,7 @@ class Store:
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)
         self.heads: list[Step] = []
+        self._last: Step | None = None  # with its fields, unless they are large
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
         self.finished = False  # whether the output is complete
@@ -231,24 +236,32 @@ class Store:
         with self.writing("the journal"):
             Journal(self.folder).tidy()
 
-    def _locked(self) -> Lock:
+    def _locked(self) -> tuple[Lock, bool]:
+        """Return the lock of the journal, and whether its folder was there before."""
         while True:
-            self.folder.mkdir(exist_ok=True)
+            try:
+                self.folder.mkdir()
+                there = False
+            except FileExistsError:
+                self.folder.mkdir(exist_ok=True)  # fails for another file of this name
+                there = True
             flush(self.path.parent)
-            left = names_a_run(self.folder / "lock")
-            if foreign := linked_folder(self.folder) or (None if left else foreign_file(self.folder)):
+            left = there and names_a_run(self.folder / "lock")
+            if there and (
+                foreign := linked_folder(self.folder) or (None if left else foreign_file(self.folder))
+            ):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
                 )
             with contextlib.suppress(FileNotFoundError):  # a run that just ended deleted the folder
-                return Lock(self.folder / "lock", self.path)
+                return Lock(self.folder / "lock", self.path), there
 
-    def _take_over(self, overwrite: bool) -> None:
-        """Refuse or delete an existing output or unfinished run."""
-        left, trials = Journal(self.folder), TrialFolder(self.folder)
+    def _take_over(self, overwrite: bool, there: bool) -> None:
+        """Refuse or delete an existing output or unfinished run, whose folder is `there`."""
+        left, trials = (Journal(self.folder), TrialFolder(self.folder)) if there else (None, None)
         if (left or trials) and not overwrite:
-            count, what = (len(trials.solutions), "lattice") if trials else (len(left), "step")
+            count, what = (len(trials.solutions), "lattice") if trials else (len(left or ()), "step")
             raise DeckError(
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
@@ -271,7 +284,8 @@ class Store:
                         self._put_together(layout, left, left.complete)
                     if old is not None:
                         old.close()
-            remove_all(self.folder)
+            if there:
+                remove_all(self.folder)
 
     def __enter__(self) -> Self:
         """Return the store."""
@@ -353,6 +367,7 @@ class Store:
             if step.companion and "until" in step.control and step.number > 2:
                 self._lighten(self.folder / f"{step.number - 2:06d}{SUFFIX}")
             self.heads.append(step.head)
+            self._last = step if sum(v.nbytes for v in step.fields.values()) < LARGE else None
 
     def publish(self) -> None:
         """Write an interim output if one is due; errors as those of `append`, but all steps remain."""
@@ -364,7 +379,7 @@ class Store:
                 self._published = (len(self.heads), time.monotonic())  # also if it fails: not at each step
                 with self.writing("the output"):
                     layout = Layout(self.metadata, self.heads)
-                    self._put_together(layout, Journal(self.folder, ours=True), complete=False)
+                    self._put_together(layout, self._steps(), complete=False)
 
     def _lighten(self, record: Path) -> None:
         """Remove restart data from an older record; the last two keep it, since one may be lost."""
@@ -378,7 +393,14 @@ class Store:
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._finish(Layout(self.metadata, self.heads), Journal(self.folder, ours=True))
+            self._finish(Layout(self.metadata, self.heads), self._steps())
+
+    def _steps(self) -> Iterator[Step]:
+        """Yield the finished steps: their records, and the last one as it is."""
+        recorded = len(self.heads) - (self._last is not None)
+        yield from itertools.islice(Journal(self.folder, ours=True), recorded) if recorded else ()
+        if self._last is not None:
+            yield self._last
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]

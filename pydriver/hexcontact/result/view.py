@@ -12,12 +12,12 @@ import numpy as np
 from ..analytic.hertz_gap import QuadraticGap, friction_of, is_worn, pressure_is_frictionless
 from ..arrays import Array, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
-from ..core.interpolation import linear
+from ..core.lattice import linear
 from ..errors import NotInResult
 from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
-from .interpolate import is_kept, nodal
 from .layout import lattice_of, step_of
+from .step import is_kept, nodal
 
 if TYPE_CHECKING:
     import xarray

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.estimators import limits_of_error, unresolved_slip_zones
+from ..core.measures import limits_of_error, unresolved_slip_zones
 from ..problem.loads import LoadStep
-from ..result.trials import Solution
+from ..result.journal import Solution
 from ..variables import ESTIMATED, LOADS, VARIABLES
 
 History = Mapping[str, Any]

@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeckError, ResourceError
+from ..problem.preview import SHIFTS, Trial
 from ..problem.problem import LEAST_LEVELS, RATIO, Problem
-from ..problem.refinement import SHIFTS, Trial
-from ..result.journal import Journal, journal_of
+from ..result.journal import Journal, Solution, TrialFolder, journal_of
 from ..result.layout import Metadata
 from ..result.step import Step
 from ..result.store import Store
-from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener

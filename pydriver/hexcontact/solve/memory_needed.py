@@ -52,7 +52,7 @@ def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[s
     if not (case.deck.stress or case.deck.fatigue):
         return {}
     from ..interior import fatigue, stress
-    from ..interior.region import region
+    from ..interior.fields import region
 
     needs = {}
     for number, table in enumerate(case.deck.stress, 1):

@@ -12,17 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from .._version import __version__
-from ..deck.recorded import recorded
+from ..deck.read import recorded
 from ..errors import DeckError, HexcontactError, PlausibilityWarning, warn
 from ..problem import plausibility
 from ..problem.problem import Problem
-from ..result.journal import journal_of
+from ..result.journal import TrialFolder, journal_of
 from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
 from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
-from ..result.trials import TrialFolder
 from .events import Listener
 from .run import checked, listeners, metadata_of, run_into, write_stresses
 from .steps import check_step

@@ -10,19 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyWarning, HexcontactError, warn
-from ..problem.preview import parameters_of
+from ..problem.preview import coarser, parameters_of
 from ..problem.problem import Problem
-from ..problem.refinement import coarser
 from ..result.history_words import limited_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import quantity, visible
-from .events import Callback, Listener, Listeners, Stopped
+from .events import Callback, Listener, Listeners, Stopped, reporter
 from .log import Log
 from .memory_needed import require_memory
-from .progress import reporter
 from .steps import steps
 
 if TYPE_CHECKING:
@@ -116,7 +114,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     again.
     """
     solve_into(case, store, listener, before)
-    if store.finished:
+    if store.finished and (case.deck.stress or case.deck.fatigue):
         for path in write_stresses(store.path, case, listener):
             listener.said("written", file=path)
 
@@ -157,10 +155,10 @@ def write_stresses(
     missing = missing_stresses(output)
     if not missing:
         return
-    from ..interior.extremes import with_errors
     from ..interior.files import tables_of, write_netcdf
-    from ..result.below import computed
+    from ..interior.stress import with_errors
     from ..result.export import kept_steps
+    from ..result.result import computed
 
     result = open_result(output)
     try:
@@ -181,9 +179,8 @@ def _on_coarser(
     result: Result, case: Problem | None, names: list[str], listener: Listener
 ) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
-    from ..result.below import computed
     from ..result.export import kept_steps
-    from ..result.result import Result
+    from ..result.result import Result, computed
 
     case = case or Problem.from_text(result.deck, f"deck of {result.path}")
     level = int(result.dataset["trial_level"].max()) if "trial_level" in result.dataset else 0

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.keys import Load
-from ..deck.write import as_toml, load_as_toml, plain
+from ..deck.toml import as_toml, load_as_toml, plain
 from ..errors import DeckError
 from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
@@ -121,6 +121,7 @@ class Session:
         self._resting = _AT_REST  # those that were zero in all steps
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
+        self._driven.judged = {}
         self._closed = False
         self._store: Store | None = None
         if output is not None:

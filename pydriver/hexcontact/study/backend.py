@@ -1,19 +1,172 @@
-"""Backends, which run the cases of a study: executors of `concurrent.futures` with a key in study files.
+"""Jobs of a study, one for each case, and the backends that run them: executors of `concurrent.futures`.
 
 Each module in `backends` registers one; no other module names them.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import os
 import queue
+import shutil
 import threading
+import time
+import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from .._version import __version__
 from ..deck.kinds import Kind, refuse
-from .job import Job, Outcome, solve_case
+from ..errors import HexcontactError, ResourceError
+from ..netcdf_library import attributes
+
+if TYPE_CHECKING:
+    from ..problem.problem import Problem
+    from ..result.step import Step
+    from ..solve.events import Listener
+    from ..solve.restart import Restart
+
+
+MOST_CASES = 100_000  # of a study
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case to run: its hash, its deck, the path of its file."""
+
+    hash: str
+    deck: str
+    path: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of a case.
+
+    Attributes
+    ----------
+    hash : str
+        Name of the case.
+    exit_code : int
+        0 if it is done, else the exit code of ``hexcontact run``.
+    message : str
+        Why it failed.
+    seconds : float
+        Wall time of this attempt.
+    lasting : bool
+        Whether the case itself caused the failure, not memory, disk or signals.
+    hexcontact_version : str
+        Version of the program that ran it.
+    """
+
+    hash: str
+    exit_code: int = 0
+    message: str = ""
+    seconds: float = 0.0
+    lasting: bool = True
+    hexcontact_version: str = __version__
+
+
+def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
+    """Run one case, write its file, and return the outcome, also of a failure.
+
+    An attempt `apart` writes to a file of its own first, since another attempt may still run.
+    """
+    from ..problem.problem import Problem
+    from ..result.store import Store
+    from ..solve.run import listeners, metadata_of, solve_into, write_stresses
+
+    started = time.perf_counter()
+    target = Path(job.path)
+    own = target.with_name(f"{target.stem}.{uuid.uuid4().hex[:8]}.nc") if apart else target
+
+    def ended(error: BaseException, exit_code: int, message: str, lasting: bool = True) -> Outcome:
+        notes = [note for note in getattr(error, "__notes__", ()) if not apart]
+        return Outcome(
+            job.hash, exit_code, "\n".join([message, *notes]), time.perf_counter() - started, lasting
+        )
+
+    began = False
+    try:
+        case = Problem.from_text(job.deck, target.name)
+        if holds(target, job.hash):  # only its tables are missing
+            list(write_stresses(target, case))
+            return Outcome(job.hash, seconds=time.perf_counter() - started)
+        with contextlib.ExitStack() as stack:
+            restart = _interrupted(job, case, stack)
+            if restart is None:
+                if own.is_file():  # damaged, or of another case that had this number
+                    own.unlink()
+                store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
+                began = True
+                before: Sequence[Step] = ()
+            else:
+                own, began, store, before = restart.store.path, True, restart.store, restart.before
+            follower = listeners(case, listener)
+            with follower.following(case.title or target.stem, case.planned_steps):
+                solve_into(case, store, follower, before)
+        apart = own != target
+        if apart:
+            os.replace(own, target)
+        list(write_stresses(target, case))
+    except HexcontactError as error:
+        _rename_journal(own, target)
+        return ended(error, error.exit_code, str(error), began)
+    except MemoryError as error:
+        return ended(error, ResourceError.exit_code, "the machine has not enough memory for this", False)
+    except OSError as error:
+        return ended(error, ResourceError.exit_code, str(error), False)
+    except Exception as error:  # one case must not end the others
+        return ended(error, HexcontactError.exit_code, f"{type(error).__name__}: {error}", False)
+    return Outcome(job.hash, seconds=time.perf_counter() - started)
+
+
+def hash_of(deck: str) -> str:
+    """Return the name of a case: a hash of the text of its deck."""
+    return hashlib.sha256(deck.encode()).hexdigest()[:20]
+
+
+def holds(path: Path, name: str) -> bool:
+    """Return whether a file is the complete result of the case with this hash."""
+    about = attributes(path)
+    return bool(about.get("complete")) and hash_of(str(about.get("deck"))) == name
+
+
+def _interrupted(job: Job, case: Problem, stack: contextlib.ExitStack) -> Restart | None:
+    """Reopen the journal of an interrupted attempt to continue it; None if there is none."""
+    from ..result.journal import journal_of
+    from ..solve.restart import reopened
+
+    target = Path(job.path)
+    attempts = target.parent.glob(f"{target.stem}.*.nc.d") if target.parent.is_dir() else ()
+    for journal in (journal_of(target), *sorted(attempts)):
+        if not journal.is_dir():
+            continue
+        with contextlib.ExitStack() as attempt:
+            try:
+                restart = attempt.enter_context(reopened(journal, case))
+            except (HexcontactError, OSError):
+                continue  # damaged, of another deck, or locked by another attempt
+            if restart is None or restart.warning:  # finished, or of another version: run from the start
+                continue
+            stack.push(attempt.pop_all())
+            return restart
+    return None
+
+
+def _rename_journal(own: Path, target: Path) -> None:
+    """Give the journal of a failed attempt the name of the case."""
+    from ..result.journal import journal_of
+
+    if own != target and journal_of(own).is_dir():
+        with contextlib.suppress(OSError):
+            shutil.rmtree(journal_of(target), ignore_errors=True)
+            os.replace(journal_of(own), journal_of(target))
+
 
 T = TypeVar("T", bound=type)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,20 +23,62 @@ from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
 from ..errors import DeckError
-from ..solve.events import Listener, Listeners
+from ..solve.events import Bar, Lines, Listener, Listeners
 from ..solve.log import Log
 from ..text import quantity
-from .backend import BACKENDS, Backend, outcomes
+from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
-from .dataset import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
-from .folder import StudyFolder
-from .job import Job, Outcome, solve_case
-from .plan import CheckLevel, Plan, PlannedCase, plan
-from .study_file import StudyFile
+from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
+from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
 
 if TYPE_CHECKING:
     import xarray
+
+
+class StudyLines(Lines):
+    """One line for each case, for logs and pipes."""
+
+    _count = 0
+
+    def begun(self, title: str, steps: int) -> None:
+        """Record the number of cases to run."""
+        self.steps = steps
+
+    def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
+        """Print a line on the study, then one for each case with its number in the sequence."""
+        if event != "study":
+            self._count += 1
+            text = f"{self._count:>{len(str(self.steps))}}/{self.steps}  {text}"
+        super().said(event, text)
+
+
+class StudyBar(Bar):
+    """A progress bar over the cases, with the latest case below it."""
+
+    def begun(self, title: str, steps: int) -> None:
+        """Show the bar, also if no case is missing."""
+        super().begun(title, max(steps, 1))
+
+    def _columns(self) -> list[Any]:
+        return super()._columns()[1:]
+
+    def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: Any) -> None:
+        """Start the bar at the finished cases, then advance it case by case."""
+        if event == "study":
+            cases = values["cases"]
+            self._bar.reset(self._task, total=cases, completed=cases - values["missing"])
+        else:
+            super().said(event, text)
+            self._bar.update(self._task, advance=1)
+
+
+def study_reporter(quiet: bool = False) -> Listener:
+    """Return the listener for standard error: a bar, lines, or none if `quiet`."""
+    if quiet:
+        return Listener()
+    return StudyBar() if sys.stderr.isatty() else StudyLines(sys.stderr)
+
 
 __all__ = ["Outcome", "PlannedCase", "Study", "run_study"]
 
@@ -83,7 +126,7 @@ class Study:
         skip_invalid: bool = False,
         **keys: Any,
     ) -> None:
-        from ..deck.write import plain
+        from ..deck.toml import plain
 
         if isinstance(parameters, Mapping):
             parameters = [

@@ -16,8 +16,7 @@ from typing import Annotated, Any
 from ...deck.kinds import Text, Whole, Word
 from ...deck.table_base import Table, meaning
 from ...errors import DeckError, ResourceError
-from ..backend import Backend, OptionTable, backend
-from ..job import MOST_CASES, Job, Outcome
+from ..backend import MOST_CASES, Backend, Job, OptionTable, Outcome, backend
 
 _CLASSES = {
     "slurm": "SLURMCluster",

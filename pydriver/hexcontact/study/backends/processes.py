@@ -18,8 +18,7 @@ from typing import Any
 
 from ...core.memory import cores
 from ...errors import DeckError, ResourceError
-from ..backend import Backend, backend
-from ..job import Job, Outcome
+from ..backend import Backend, Job, Outcome, backend
 
 _BLOCKED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 

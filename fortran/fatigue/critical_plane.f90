@@ -9,8 +9,8 @@
 !> Cells below the best value by more than this are left out, the others are divided into four until the loss is negligible.
 !> Where more cells are left than can be kept, as on a ridge of equal values, the best of them are divided. On a narrow ridge,
 !> as where a history under pressure has next to no tension, these need not contain the maximum: if the loss is not negligible
-!> in the end, Newton's method leads there from the best plane, from the first cells that were too many, and from the planes of
-!> tension. At each time these are an arc about the axis e_3 of the largest principal stress, towards that of the middle one:
+!> in the end, planes of tension are compared as well. At each time these are an arc about the axis e_3 of the largest
+!> principal stress, towards that of the middle one:
 !>
 !>     n = cos(phi) e_3 + sin(phi) e_2,   sigma_3 cos(phi)^2 + sigma_2 sin(phi)^2 >= 0.
 module hc_critical_plane
@@ -32,9 +32,6 @@ module hc_critical_plane
   real(wp), parameter :: negligible = 1.0e-6_wp
   !> Largest angle between center and corner of a cell, in that from the middle of a face to its side times the cell's share.
   real(wp), parameter :: corner = 1.7_wp*0.25_wp*pi
-  !> Newton's method: most steps, the largest one, and the distance of points over the half width of a ridge.
-  integer, parameter :: n_newton = 20
-  real(wp), parameter :: longest = 0.1_wp, share = 0.2_wp
   !> Planes of an arc on either side of its middle.
   integer, parameter :: n_arc = 12
 
@@ -64,14 +61,15 @@ contains
     real(wp), intent(out) :: value
     !> Normal of the critical plane (3), its last component not negative
     real(wp), intent(out) :: normal(3)
-    type(search_t) :: search, before, crowd
-    real(wp) :: path(size(history, 2), 6), half, enough, curvature
+    type(search_t) :: search, before
+    real(wp) :: path(size(history, 2), 6), half, enough
     integer :: i, j, face, division
+    logical :: crowded
 
     path = transpose(history)
+    crowded = .false.
     half = 1.0_wp/n_side
-    curvature = criterion%curvature(extent_of(history))
-    search%loss = 0.5_wp*curvature*(corner*half)**2
+    search%loss = 0.5_wp*criterion%curvature(extent_of(history))*(corner*half)**2
     do face = 1, 3
       do j = 1, n_side
         do i = 1, n_side
@@ -93,52 +91,33 @@ contains
           call search%compare(criterion, path, before%face(i), before%place(:, i) + half*[1 - 2*mod(j, 2), 1 - 2*(j/2)])
         end do
       end do
-      if (crowd%number == 0 .and. search%number == search%most) crowd = search
+      crowded = crowded .or. search%number == search%most
     end do
-    if (search%number + crowd%number > 0 .and. search%loss > negligible*abs(search%value)) then
-      call search_ridges(search, criterion, path, curvature, crowd)
+    if ((search%number > 0 .or. crowded) .and. search%loss > negligible*abs(search%value)) then
+      call search_ridges(search, criterion, path)
     end if
     value = max(search%value, criterion%least())
     normal = sign(1.0_wp, search%normal(3))*search%normal
   end subroutine find_critical_plane
 
-  !> Search for narrow ridges: from the best plane, the planes of tension at each time, and a crowd of cells.
-  pure subroutine search_ridges(search, criterion, path, curvature, crowd)
+  !> Compare the planes of tension at each time, among which a narrow ridge lies.
+  pure subroutine search_ridges(search, criterion, path)
     type(search_t), intent(inout) :: search
     class(plane_criterion_t), intent(in) :: criterion
     !> Stress (times, 6) [Pa]
     real(wp), intent(in), contiguous :: path(:, :)
-    !> Bound of the curvature
-    real(wp), intent(in) :: curvature
-    !> Cells, the first that were too many
-    type(search_t), intent(in) :: crowd
-    real(wp), allocatable :: normals(:, :, :), values(:, :)
-    real(wp) :: normal(3)
+    real(wp) :: normals(3, -n_arc:n_arc), value
     integer :: i, k
 
-    allocate (normals(3, -n_arc:n_arc, size(path, 1)))
-    allocate (values(-n_arc - 1:n_arc + 1, size(path, 1)), source=-huge(1.0_wp))
     do i = 1, size(path, 1)
-      call find_arc(path(i, :), normals(:, :, i))
-      if (norm2(normals(:, 0, i)) <= 0.0_wp) cycle ! no tension
+      call find_arc(path(i, :), normals)
+      if (norm2(normals(:, 0)) <= 0.0_wp) cycle ! no tension
       do k = -n_arc, n_arc
-        values(k, i) = value_on(criterion, path, normals(:, k, i), -0.5_wp*huge(curvature))
-        if (values(k, i) <= search%value) cycle
-        search%value = values(k, i)
-        search%normal = normals(:, k, i)
+        value = value_on(criterion, path, normals(:, k), search%value)
+        if (value <= search%value) cycle
+        search%value = value
+        search%normal = normals(:, k)
       end do
-    end do
-    if (search%value <= criterion%least()) return
-    normal = search%normal
-    call climb(search, criterion, path, curvature, normal)
-    do i = 1, size(path, 1)
-      do k = -n_arc, n_arc
-        if (values(k, i) <= criterion%least() .or. values(k, i) < max(values(k - 1, i), values(k + 1, i))) cycle
-        call climb(search, criterion, path, curvature, normals(:, k, i))
-      end do
-    end do
-    do k = 1, crowd%number
-      call climb(search, criterion, path, curvature, normal_at(crowd%face(k), crowd%place(:, k)))
     end do
   end subroutine search_ridges
 
@@ -185,49 +164,6 @@ contains
     identity(2, 2) = 1.0_wp
     identity(3, 3) = 1.0_wp
   end function identity
-
-  !> Go from a plane to the maximum beside it by Newton's method, with derivatives from differences.
-  pure subroutine climb(search, criterion, path, curvature, start)
-    type(search_t), intent(inout) :: search
-    class(plane_criterion_t), intent(in) :: criterion
-    !> Stress (times, 6) [Pa]
-    real(wp), intent(in), contiguous :: path(:, :)
-    !> Bound of the curvature
-    real(wp), intent(in) :: curvature
-    real(wp), intent(in) :: start(3)
-    real(wp) :: values(-1:1, -1:1), axes(3, 2), h, gradient(2), xx, yy, xy, step(2), best(3), normal(3), here
-    integer :: newton, halving, i, j
-
-    best = start
-    h = share*sqrt(2.0_wp*abs(search%value)/curvature)
-    do newton = 1, n_newton
-      axes = tangents(best)
-      do j = -1, 1
-        do i = -1, 1
-          values(i, j) = value_on(criterion, path, unit(best + h*matmul(axes, [i, j])), -0.5_wp*huge(h))
-        end do
-      end do
-      gradient = 0.5_wp*[values(1, 0) - values(-1, 0), values(0, 1) - values(0, -1)]
-      xx = values(1, 0) - 2.0_wp*values(0, 0) + values(-1, 0)
-      yy = values(0, 1) - 2.0_wp*values(0, 0) + values(0, -1)
-      xy = 0.25_wp*(values(1, 1) - values(-1, 1) - values(1, -1) + values(-1, -1))
-      if (values(0, 0) > search%value) then
-        search%value = values(0, 0)
-        search%normal = best
-      end if
-      if (xx >= 0.0_wp .or. xx*yy <= xy**2) return ! no maximum of the parabola
-      step = h*[xy*gradient(2) - yy*gradient(1), xy*gradient(1) - xx*gradient(2)]/(xx*yy - xy**2)
-      step = step*min(1.0_wp, longest/max(norm2(step), tiny(h)))
-      do halving = 1, n_newton
-        normal = unit(best + matmul(axes, step))
-        here = value_on(criterion, path, normal, values(0, 0))
-        if (here > values(0, 0)) exit
-        step = 0.5_wp*step
-      end do
-      if (.not. here > values(0, 0)) return
-      best = normal
-    end do
-  end subroutine climb
 
   !> Compare the center of a cell with the best plane, and keep the cell if a better one may lie in it.
   pure subroutine compare(self, criterion, path, face, place)

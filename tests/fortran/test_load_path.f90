@@ -830,7 +830,8 @@ contains
     if (allocated(error)) return
     call new_friction_state(virgin, solver%problem%lattice)
     solver%loosest = 1.0_wp
-    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 60, 0, next, error)
+    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), &
+                 step_settings_t(1.0e-8_wp, max_sweeps=60, max_cuts=0), next, error)
     if (allocated(error)) return
     call check_true(error, next%converged .and. count(next%pressure > 0.0_wp) <= 16, 'a few nodes')
     if (allocated(error)) return

@@ -41,11 +41,9 @@ class FrictionField:
 
     def __init__(self, friction: Friction | None, interface: Interface | None = None) -> None:
         mu: Any = friction.coefficient if friction else 0.0
-        numbers: dict[str, float] = {}
+        numbers = friction.numbers if friction else {}
         if friction is None and interface and (limit := interface.friction_limit):
             mu, numbers["power"] = limit
-        if friction and friction.shear_limit is not None:
-            numbers["shear_limit"] = friction.shear_limit
         if isinstance(mu, TwoCoefficients):
             mean = math.sqrt(mu.along * mu.across)
             numbers |= {"ratio": mu.along / mu.across, "angle": mu.angle}

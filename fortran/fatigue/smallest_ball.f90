@@ -1,7 +1,7 @@
 !> Smallest ball around points in a few dimensions.
 !>
 !> The radius of this ball is the amplitude of a path: of the shear traction on a plane (two dimensions), of the stress deviator
-!> (five; see hc_stress_path). The ball is found by walking: its center moves towards the center of the points that it
+!> (five; see hc_invariant_criteria). The ball is found by walking: its center moves towards the center of the points that it
 !> rests on, until another point stops it or the center lies among them (K. Fischer, B. Gärtner and M. Kutz, Fast
 !> smallest-enclosing-ball computation in high dimensions, ESA 2003, LNCS 2832, 630-641).
 module hc_smallest_ball

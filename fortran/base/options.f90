@@ -62,7 +62,7 @@ module hc_options
     !> Lattices with fewer nodes are left to one thread: the start of the others takes longer than each of the short passes
     integer :: worth_sharing = 150000
     !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
-    !> edge; coarse tolerance there: what is interpolated deserves it
+    !> edge; a tolerance that suits a start interpolated from the coarser lattice
     real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
     !> Residual below which a compliant interface is linearised with the stiffness of a node, times this share, for r': the errors
     !> that are left sit in a few nodes along the edge
@@ -77,7 +77,7 @@ module hc_options
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").
   type :: newton_options_t
-    !> Accuracy of a linear solution, relative to the residual at its start: sets that will change deserve no more
+    !> Accuracy of a linear solution, relative to the residual at its start: loose while the active set changes
     real(wp) :: inner_accuracy = 0.1_wp
     !> The same once residuals are small; where shear does not act on the pressure, Newton's method converges the faster for
     !> it; and of the pressure, whose iterations are the cheaper ones
@@ -149,7 +149,7 @@ module hc_options
     integer :: max_parts = 3
     !> Nodes in contact up to which a step that failed is handed to LAPACK, and sides of the part of the window for that
     integer :: few_nodes = 16, largest_direct_side = 64
-    !> Share of the nodes of the window below which a part pays for operators of its own
+    !> Share of the nodes of the window below which a part pays for separate operators
     real(wp) :: largest_part = 0.6_wp
     !> Margin of a part about the contact, in nodes: at least, and as a fraction 1/n of the width; the contact may grow in a
     !> step
@@ -250,7 +250,7 @@ module hc_options
     !> Smallest and largest size of an attempt over that of the rejected one; the same if that one did not converge: its
     !> changes say nothing about the size
     real(wp) :: smallest_retry = 0.1_wp, largest_retry = 0.6_wp, unsolved_retry = 0.25_wp
-    !> Share of what is allowed that a step is meant to change: less than 1, since the change is estimated
+    !> Share of the allowed change that a step aims at: less than 1, since the change is estimated
     real(wp) :: aim = 0.8_wp
     !> Share of the tolerance by which one step may add to the change of the tractions, (S2)
     real(wp) :: added_share = 0.5_wp

@@ -292,7 +292,7 @@ contains
     logical, intent(in) :: candidate(:, :)
     !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; 0: as many as OpenMP would take
+    !> Threads to use; 0: the default of OpenMP
     integer, intent(in), optional :: n_threads
 
     call check_operator(lattice, pair, error, n_threads)

@@ -362,7 +362,7 @@ contains
     if (perturb_convolution) call perturb(result)
   end subroutine convolve
 
-  !> Change every value by two units in the last place of the largest one; the parity of its own bits decides the sign.
+  !> Change every value by two units in the last place of the largest one; the parity of the bits of the value decides the sign.
   pure subroutine perturb(result)
     !> Sums of the convolutions (n_col, n_row, onto)
     real(wp), intent(inout) :: result(:, :, :)

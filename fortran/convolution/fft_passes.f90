@@ -16,7 +16,7 @@ module hc_fft_passes
 
   public :: complement, pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
 
-  !> Number of the kernel that is a multiple of the first one less the second one, and has no spectrum of its own.
+  !> Number of the kernel that is a multiple of the first one less the second one, and needs no spectrum.
   integer, parameter :: complement = 0
 
   !> Number of frequencies that are multiplied at a time.
@@ -71,7 +71,7 @@ contains
     real(wp) :: re_1, im_1, re_2, im_2
 
     n = size(both)
-    ! what is imaginary at the ends belongs to no real row
+    ! imaginary parts at the ends belong to no real row
     both(0) = cmplx(real(first(0), wp), -real(second(0), wp), wp)
     both(n/2) = cmplx(real(first(n/2), wp), -real(second(n/2), wp), wp)
     do f = 1, n/2 - 1

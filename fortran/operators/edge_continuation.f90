@@ -263,7 +263,7 @@ contains
     integer, intent(in) :: node, step(6)
     !> Marks of all nodes
     integer, intent(in) :: mark(:)
-    !> First marks of its own ring and of the next
+    !> First marks of this ring and of the next
     integer, intent(in) :: own, after
     !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
     integer, intent(out) :: inner(6), beside(7)

@@ -233,7 +233,7 @@ contains
 
     rest = self%far*across
     call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e, 1.0_wp/self%unit)
-    ! what is not averaged: the mean has to be symmetric
+    ! without the average: the mean has to be symmetric
     do m = 1, 2
       call set_to_zero(self%apart, self%space%threads, self%field(1:, m))
     end do

@@ -1,4 +1,4 @@
-"""Write the pages of keys and variables in docs/, and the table of limits, from the models and tables of the program.
+"""Write the pages of keys and variables in docs/, and the table of limits, from the models and tables.
 
 Run it after a change of the deck format or of `VARIABLES`: ``python docs/deck_tables.py``.
 """

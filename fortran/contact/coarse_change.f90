@@ -1,4 +1,4 @@
-!> What a coarser lattice contributes to a load step: the change that it finds, or a first guess.
+!> Contribution of a coarser lattice to a load step: the change that it finds, or an initial guess.
 !>
 !> The coarse problem is set up so that the present fine state, at the coarse
 !> nodes, solves it exactly under the present loads: what coarse tractions

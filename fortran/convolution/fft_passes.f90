@@ -1,4 +1,4 @@
-!> What a convolution does between its 1-D transforms: pairs of rows, blocks of columns, products with spectra.
+!> Passes of a convolution between its 1-D transforms: pairs of rows, blocks of columns, products with spectra.
 !>
 !> Two real rows X and Y are the parts of one complex row. With Z = X + i Y and the transforms of real rows being
 !> hermitian, X(f) = (Z(f) + conjg(Z(-f)))/2 and Y(f) = (Z(f) - conjg(Z(-f)))/(2 i).
@@ -52,7 +52,7 @@ contains
     integer, intent(in) :: n
     !> The rows
     real(wp), intent(in) :: first(n), second(n)
-    !> The complex row; what lies beyond stays
+    !> The complex row; values beyond it stay
     complex(wp), intent(inout) :: both(n)
     integer :: col
 

@@ -88,7 +88,7 @@ contains
 
   !> Return the name of the file of some kernels; others have the same by a rare chance only, which the head rules out.
   pure function file_name(key, maker) result(name)
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -114,7 +114,7 @@ contains
   subroutine read_kernels(path, key, maker, shared, spectrum, complaint)
     !> The file
     character(len=*), intent(in) :: path
-    !> What the kernels have to depend on
+    !> Expected parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -190,7 +190,7 @@ contains
   subroutine write_kernels(path, key, maker, spectrum, word, bytes, complaint)
     !> The file
     character(len=*), intent(in) :: path
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -247,10 +247,10 @@ contains
     call c_f_pointer(start, words, [spectrum%bytes()/8])
   end function words_of
 
-  !> Hash words, and what was hashed before.
+  !> Hash words together with an earlier hash.
   pure integer(int64) function hash_of(words, before)
     integer(int64), intent(in), contiguous :: words(:)
-    !> Hash of what stands before them; 0: nothing does
+    !> Hash of the words before them; 0: none
     integer(int64), intent(in) :: before
     hash_of = xxh64(words, 8*size(words, kind=c_size_t), before)
   end function hash_of

@@ -1,7 +1,7 @@
 !> Displacements continued beyond the edge of a contact, for a better preconditioner.
 !>
 !> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The inverse of its part on the active nodes is that
-!> of the whole, minimised over what the displacement may be elsewhere:
+!> of the whole, minimised over the displacement elsewhere:
 !>
 !>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
 !>

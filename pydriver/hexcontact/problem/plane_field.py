@@ -141,7 +141,7 @@ class PlaneField:
         if self.rule is GAP and (abs(values[np.isfinite(values)]) > LARGEST).any():
             raise DeckError(f"{key}: expected lengths of at most {LARGEST:g} m, {_OR_OPEN}")
         ours = isinstance(source, np.ndarray | HeightMap | Separation)
-        return values if ours else values.copy()  # a function may keep, and change, what it returns
+        return values if ours else values.copy()  # a function may keep, and change, its result
 
     def _refuse(self, values: Array, bad: Mask, x: Array, y: Array) -> None:
         """Refuse values at the first of some points."""

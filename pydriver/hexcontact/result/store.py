@@ -170,7 +170,7 @@ class Store:
     def _read_again(self, began: float | None) -> Step | None:
         """Read all records, so that damage shows before the next step; return the last one.
 
-        The time at which the run `began` tells whether a complete output is its own if it left no records.
+        The time at which the run `began` shows whether a complete output is its own if it left no records.
         """
         journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
         left = trials.metadata if trials else None

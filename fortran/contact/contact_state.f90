@@ -191,19 +191,22 @@ contains
   end subroutine add_history
 
   !> Allocate all fields of a state with friction, without values.
-  subroutine allocate_fields(state, extent, stat)
+  subroutine allocate_fields(state, extent, error)
     !> State without fields
     type(contact_state_t), intent(inout) :: state
     !> Number of columns and rows
     integer, intent(in) :: extent(2)
-    !> 0, or another number without enough memory
-    integer, intent(out) :: stat
+    !> Allocated without enough memory
+    type(error_t), allocatable, intent(out) :: error
+    integer :: stat
 
     associate (n => extent(1), m => extent(2))
       allocate (state%pressure(n, m), state%gap(n, m), state%zone(n, m), state%traction(n, m, 2), &
                 state%relative_displacement(n, m, 2), state%slip_increment(n, m, 2), state%accumulated_slip(n, m), &
                 state%dissipation_density(n, m), stat=stat)
     end associate
+    if (stat /= 0) call raise(error, status%resources, &
+                              'not enough memory for the state of the contact: choose a smaller window')
   end subroutine allocate_fields
 
   !> Point to a field of real numbers by its name in Python; to nothing if the state has none of that name.
@@ -215,8 +218,8 @@ contains
     real(wp), pointer, contiguous :: field(:, :)
     integer :: m
 
-    field => null()
     m = merge(1, 2, name(len(name):) == 'x')
+    field => null()
     select case (name)
     case ('pressure')
       if (allocated(state%pressure)) field => state%pressure
@@ -232,6 +235,8 @@ contains
       if (allocated(state%accumulated_slip)) field => state%accumulated_slip
     case ('dissipation_density')
       if (allocated(state%dissipation_density)) field => state%dissipation_density
+    case default
+      field => null()
     end select
   end function field_of
 

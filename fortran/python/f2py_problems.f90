@@ -188,12 +188,9 @@ contains
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t), pointer :: state
-    integer :: stat
 
     allocate (state, source=numbers)
-    call allocate_fields(state, extent, stat)
-    if (stat /= 0) call raise(error, status%resources, &
-                              'not enough memory for the state of the contact: choose a smaller window')
+    call allocate_fields(state, extent, error)
     call hold(state, handle, error)
   end subroutine new_held_state
 

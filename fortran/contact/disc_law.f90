@@ -254,7 +254,7 @@ contains
     t = [-direction(2), direction(1)]
   end function normal_to
 
-  !> Compute the square of the residual of the law in a row, |q - P(q - ds/d_t)|.
+  !> Measure what the tractions of a row lack of the law, |q - P(q - ds/d_t)|, squared.
   pure subroutine residual_row(n, unit, slope, stiffness, p, qx, qy, dsx, dsy, largest, worst)
     !> Number of nodes
     integer, intent(in) :: n
@@ -312,7 +312,7 @@ contains
     real(wp), intent(in) :: unit, slope
     !> Pressure and traction
     real(wp), intent(in) :: p(n), qx(n), qy(n)
-    !> Projected traction
+    !> What is left of the traction
     real(wp), intent(out) :: cut_x(n), cut_y(n)
     real(wp) :: length, share
     integer :: i

@@ -31,7 +31,7 @@ module hc_edge_tractions
 
   public :: correct_at_edges, edge_tractions_memory
 
-  !> The elastic operator of some components, without a preconditioner: the changes are local.
+  !> The elastic operator of some components, without a preconditioner: what changes is local.
   type, extends(linear_system_t) :: elastic_part_t
     type(fft_flexibility_t), pointer :: flexibility => null()
     integer, allocatable :: component(:)
@@ -135,13 +135,13 @@ contains
     end do
   end subroutine correct_at_edges
 
-  !> Sample the difference of the shape from the hats, between the nodes and at them.
+  !> Sample what the shape has beyond the hats, between the nodes and at them.
   pure subroutine sample(shape_of, samples, n, residue, at_nodes)
     !> The shape
     type(traction_field_t), intent(in) :: shape_of
     !> Points along a spacing, and number of components
     integer, intent(in) :: samples, n
-    !> The difference between the nodes
+    !> What it has between the nodes
     type(edge_residue_t), intent(out) :: residue
     !> The same at the nodes (n_col, n_row, component) [Pa]
     real(wp), allocatable, intent(out) :: at_nodes(:, :, :)
@@ -175,7 +175,7 @@ contains
     type(elastic_pair_t), intent(in) :: pair
     !> Tuning numbers
     type(edge_options_t), intent(in) :: options
-    !> The difference between the nodes, less its hats
+    !> What is between the nodes, less the hats
     type(edge_residue_t), intent(in) :: residue
     !> Nodes in contact, and those of them that stick (n_col, n_row)
     logical, intent(in) :: contact(:, :), stick(:, :)
@@ -217,7 +217,7 @@ contains
                 error)
   end subroutine solve_again
 
-  !> Change tractions of some nodes so that their displacements become equal, without any load.
+  !> Change tractions of some nodes so that displacements become alike all over them, without any load.
   subroutine settle(system, options, nodes, moved, change, error)
     !> The operator of the components
     type(elastic_part_t), intent(inout) :: system

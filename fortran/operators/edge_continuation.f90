@@ -1,7 +1,7 @@
 !> Displacements continued beyond the edge of a contact, for a better preconditioner.
 !>
 !> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The inverse of its part on the active nodes is that
-!> of the whole, minimised over the displacement elsewhere:
+!> of the whole, minimised over what the displacement may be elsewhere:
 !>
 !>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
 !>
@@ -263,7 +263,7 @@ contains
     integer, intent(in) :: node, step(6)
     !> Marks of all nodes
     integer, intent(in) :: mark(:)
-    !> First marks of this ring and of the next
+    !> First marks of its own ring and of the next
     integer, intent(in) :: own, after
     !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
     integer, intent(out) :: inner(6), beside(7)

@@ -67,7 +67,7 @@ def of_table(
 
 
 def of_cycle(result: Result, table: Fatigue) -> xarray.Dataset:
-    """Return the fatigue parameters that a table names."""
+    """Return the fatigue parameters that a table wants."""
     constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
     given = {key: value for key, value in constants.items() if value is not None}
     cycle = {"segment": table.segment, "steps": table.steps}

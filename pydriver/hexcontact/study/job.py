@@ -66,7 +66,7 @@ class Outcome:
 def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
     """Run one case, write its file, and return the outcome, also of a failure.
 
-    An attempt `apart` writes to a separate file first, since another attempt may still run.
+    An attempt `apart` writes to a file of its own first, since another attempt may still run.
     """
     from ..problem.problem import Problem
     from ..result.store import Store

@@ -157,7 +157,7 @@ mutants: install $(STAMPS)/extra-test  ## wrong lines in copies of the sources: 
 # What coverage leaves out: tests that judge time, memory or standard error, on which counters tell; and many
 # that only repeat what others reach.
 UNCOUNTED := memory_estimates operator_counts pages threads fuzz_decks fuzz_files first_step validation_friction \
-    examples short_of_memory fortran_library
+    examples short_of_memory fortran_library developer_guide
 UNCOUNTED_TESTS := test_store.py::test_a_full_disk_is_told_apart_from_wrong_input \
     test_deck_sources.py::test_the_time_is_estimated_to_its_order_of_magnitude \
     test_resume.py::test_runs_killed_at_random_moments_go_on \

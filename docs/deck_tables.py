@@ -1,4 +1,4 @@
-"""Fill the tables of keys, limits and variables in docs/ from the models and tables of the program.
+"""Write the pages of keys and variables in docs/, and the table of limits, from the models and tables.
 
 Run it after a change of the deck format or of `VARIABLES`: ``python docs/deck_tables.py``.
 """
@@ -14,40 +14,40 @@ from typing import Any
 from hexcontact.deck import keys as deck_keys
 from hexcontact.deck import series, surfaces
 from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Several, Text, Whole, Word, WordOr
-from hexcontact.deck.table_base import Table, expectation, kind_of
+from hexcontact.deck.table_base import Table, expectation, kind_of, parts_of
 from hexcontact.problem import plausibility
-from hexcontact.study.backends.dask import Dask
+from hexcontact.study import backend
 from hexcontact.study.plan import Parameter, StudyFile
 from hexcontact.text import shown
 from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 
-PAGE = Path(__file__).with_name("keys.md")
-PAGES = (
-    PAGE,
-    PAGE.with_name("variables.md"),
-    PAGE.with_name("theory") / "expected_errors.md",
-)
-TABLES: dict[str, type[Table]] = {
-    "deck": deck_keys.Deck,
-    "body": deck_keys.Body,
-    "interface": deck_keys.Interface,
-    "friction": deck_keys.Friction,
-    "bulk": deck_keys.Bulk,
-    "grid": deck_keys.Grid,
-    "solver": deck_keys.Solver,
-    "load": deck_keys.Load,
-    "series": series.Series,
-    "columns": series.Columns,
-    "accuracy": deck_keys.Accuracy,
-    "wear": deck_keys.Wear,
-    "output": deck_keys.Output,
-    "stress": deck_keys.Stress,
-    "fatigue": deck_keys.Fatigue,
-    "study": StudyFile,
-    "parameter": Parameter,
-    "dask": Dask,
+DOCS = Path(__file__).parent
+TABLES: dict[str, type[Table]] = {  # by their headings in keys.md
+    "Top level": deck_keys.Deck,
+    "[body.1] and [body.2]": deck_keys.Body,
+    "[interface]": deck_keys.Interface,
+    "[friction]": deck_keys.Friction,
+    "[bulk]": deck_keys.Bulk,
+    "[grid]": deck_keys.Grid,
+    "[solver]": deck_keys.Solver,
+    "[accuracy]": deck_keys.Accuracy,
+    "[[load]]": deck_keys.Load,
+    "Series": series.Series,
+    "Columns of a series": series.Columns,
+    "[wear]": deck_keys.Wear,
+    "[output]": deck_keys.Output,
+    "[[stress]]": deck_keys.Stress,
+    "[[fatigue]]": deck_keys.Fatigue,
+    "Study files": StudyFile,
+    "[[parameter]] of a study": Parameter,
+    **{
+        f"[{word}] of a study": part
+        for word, (annotation, _) in backend.KEYS.items()
+        for part in parts_of(annotation)
+        if issubclass(part, Table)
+    },
 }
-BLOCK = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- table: limits -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 HEADER = ("key", "expected", "unit", "default", "example", "meaning")
@@ -152,26 +152,43 @@ def variables(belongs: Callable[[str, Variable], bool]) -> str:
 
 COORDINATES = ("step", "row", "col", "x", "y")
 OF_EACH = {word.format(name) for name in ESTIMATED for word in ("{}_error", "trial_{}")}
-OTHERS: dict[str, Callable[[], str]] = {
-    "shapes": shapes,
-    "limits": limits,
-    "coordinates": lambda: variables(lambda name, _: name in COORDINATES),
-    "fields": lambda: variables(lambda name, v: len(v.dims) > 1 and name not in COORDINATES),
-    "history": lambda: variables(lambda name, v: v.dims == ("step",) and name not in COORDINATES),
-    "trials": lambda: variables(lambda _, v: v.dims == ("trial",)),
+VARIABLES_OF: dict[str, Callable[[str, Variable], bool]] = {  # by the headings of variables.md
+    "Coordinates": lambda name, _: name in COORDINATES,
+    "Fields": lambda name, v: len(v.dims) > 1 and name not in COORDINATES,
+    "History": lambda name, v: v.dims == ("step",) and name not in COORDINATES,
+    "Lattices of estimated errors": lambda _, v: v.dims == ("trial",),
 }
 
 
-def filled(text: str) -> str:
-    """Return the page with its tables as the models have them now."""
+def page(title: str, words: str, tables: dict[str, str]) -> str:
+    parts = [f"# {title}", f"Made by `python docs/deck_tables.py`; do not edit. {words}"]
+    parts += [f"## {heading}\n\n{table.rstrip()}" for heading, table in tables.items()]
+    return "\n\n".join(parts) + "\n"
 
-    def fill(block: re.Match[str]) -> str:
-        other = OTHERS.get(block[2])
-        return block[1] + (other() if other else keys_of(TABLES[block[2]])) + block[3]
 
-    return BLOCK.sub(fill, text)
+def keys_page() -> str:
+    tables = {}
+    for heading, table in TABLES.items():
+        tables[heading] = keys_of(table)
+        if table is deck_keys.Body:
+            tables["Surfaces"] = shapes()
+    words = "[The deck](deck.md) and [studies](studies.md) explain their rules."
+    return page("Keys of decks and studies", words, tables)
 
+
+def variables_page() -> str:
+    tables = {heading: variables(belongs) for heading, belongs in VARIABLES_OF.items()}
+    return page("Variables of a result", "[The result file](netcdf.md) explains them.", tables)
+
+
+def errors_page() -> str:
+    """The page of expected errors with its table of limits."""
+    text = (DOCS / "theory/expected_errors.md").read_text(encoding="utf-8")
+    return BLOCK.sub(lambda block: block[1] + limits() + block[2], text)
+
+
+PAGES = {"keys.md": keys_page, "variables.md": variables_page, "theory/expected_errors.md": errors_page}
 
 if __name__ == "__main__":
-    for page in PAGES:
-        page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")
+    for name, written in PAGES.items():
+        (DOCS / name).write_text(written(), encoding="utf-8")

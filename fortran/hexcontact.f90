@@ -69,7 +69,7 @@ module hexcontact
   use hc_torsion, only: lubkin_t
   use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
   use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
-  use hc_stress_path, only: crossland, dang_van, deviator_amplitude
+  use hc_invariant_criteria, only: crossland, dang_van, deviator_amplitude
   use hc_plane_criteria, only: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t
   use hc_critical_plane, only: find_critical_plane
   use hc_fatigue_fields, only: find_critical_planes, find_invariants, find_ruiz_parameters

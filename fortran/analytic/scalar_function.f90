@@ -1,6 +1,6 @@
 !> Functions of one variable: zeros and integrals.
 !>
-!> What a function depends on else are components of an extension of the abstract type.
+!> Further arguments of a function are components of an extension of the abstract type.
 module hc_scalar_function
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi

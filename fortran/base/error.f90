@@ -29,11 +29,11 @@ module hc_error
   !> The one instance of the status codes.
   type(status_t), parameter :: status = status_t()
 
-  !> What went wrong.
+  !> A failure.
   type :: error_t
     !> One of the codes of `status`.
     integer :: code = 0
-    !> One sentence: what was wrong, and what was expected.
+    !> One sentence: the fault, and the expected value.
     character(len=:), allocatable :: message
   end type error_t
 

@@ -12,7 +12,7 @@ module hc_memory
 
   public :: require_memory
 
-  !> Bytes for what does not depend on the window: plans, lists, messages.
+  !> Bytes that do not depend on the window: plans, lists, messages.
   integer(int64), parameter :: margin = 8000000
 
   interface

@@ -14,7 +14,7 @@ module hc_options
             preconditioner_options_t, direct_options_t, entry_options_t, step_options_t, edge_options_t, &
             cycle_options_t, accuracy_options_t
 
-  !> What all methods share (docs/theory/friction.md, "The classification parameter", "Globalisation", "Gross sliding").
+  !> Options that all methods share (docs/theory/friction.md, "The classification parameter", "Globalisation", "Gross sliding").
   type :: contact_options_t
     !> Scale kappa of the classification parameters, (F8): r times the operator has to be of order one, so that (F5) is a
     !> step of a contracting projection
@@ -62,14 +62,14 @@ module hc_options
     !> Lattices with fewer nodes are left to one thread: the start of the others takes longer than each of the short passes
     integer :: worth_sharing = 150000
     !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
-    !> edge; coarse tolerance there: what is interpolated deserves it
+    !> edge; a tolerance that suits a start interpolated from the coarser lattice
     real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
     !> Residual below which a compliant interface is linearised with the stiffness of a node, times this share, for r': the errors
     !> that are left sit in a few nodes along the edge
     real(wp) :: close_residual = 0.3_wp, local_share = 0.3_wp
     !> Share of the residual below which nodes that should enter or leave a compliant interface wait, where projected steps stall
     real(wp) :: slight_change = 0.1_wp
-    !> Iterations in which the springs of a compliant layer are linearised anew; beyond them (exponents of 3 and more, rough
+    !> Iterations in which the springs of a compliant layer are linearised again; beyond them (exponents of 3 and more, rough
     !> surfaces) only where their linear problem is solved to this share of the whole residual: that does not stall
     integer :: most_linearized = 10
     real(wp) :: linear_share = 0.3_wp
@@ -77,7 +77,7 @@ module hc_options
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").
   type :: newton_options_t
-    !> Accuracy of a linear solution, relative to the residual at its start: sets that will change deserve no more
+    !> Accuracy of a linear solution, relative to the residual at its start: loose while the active set changes
     real(wp) :: inner_accuracy = 0.1_wp
     !> The same once residuals are small; where shear does not act on the pressure, Newton's method converges the faster for
     !> it; and of the pressure, whose iterations are the cheaper ones
@@ -94,7 +94,7 @@ module hc_options
     integer :: max_iterations = 400, max_coupled_iterations = 40, max_directions = 7
     !> Contact areas per staggered sweep: one where the shear traction moves the pressure, else until the area stands
     integer :: max_areas = 1, max_areas_uncoupled = 60
-    !> What rounding errors may leave in displacements that are carried along, relative to the largest; where more may be
+    !> Round-off that is allowed in displacements that are carried along, relative to the largest; where more may be
     !> left, they are computed afresh
     real(wp) :: displacement_rounding = 1.0e-10_wp
     !> Component of the traction across the direction of slip, relative to the largest that friction allows, that is no step
@@ -149,7 +149,7 @@ module hc_options
     integer :: max_parts = 3
     !> Nodes in contact up to which a step that failed is handed to LAPACK, and sides of the part of the window for that
     integer :: few_nodes = 16, largest_direct_side = 64
-    !> Share of the nodes of the window below which a part pays for operators of its own
+    !> Share of the nodes of the window below which a part pays for separate operators
     real(wp) :: largest_part = 0.6_wp
     !> Margin of a part about the contact, in nodes: at least, and as a fraction 1/n of the width; the contact may grow in a
     !> step
@@ -213,7 +213,7 @@ module hc_options
     integer :: max_corrections = 40
     !> Nodes in contact up to which the whole matrix is factorized for every area: kept factors save nothing there
     integer :: most_explicit = 60
-    !> Share of the rows of a factor that may come or go before it is made anew
+    !> Share of the rows of a factor that may change before it is computed again
     real(wp) :: most_exchanged = 0.1_wp
     !> Change of a direction of slip, and of a spring across it, that its factor serves for, too
     real(wp) :: largest_turn = 0.1_wp
@@ -240,7 +240,7 @@ module hc_options
     real(wp) :: first_tolerance = 1.0e-3_wp, relative_tolerance = 0.05_wp, last_tolerance = 0.5_wp
   end type entry_options_t
 
-  !> Size of load steps that are chosen on the way (docs/theory/step_control.md).
+  !> Size of adaptive load steps (docs/theory/step_control.md).
   type :: step_options_t
     !> Smallest load step, as a part of the segment, and attempts at one: a step that is not good enough then is marked
     real(wp) :: least_step = 1.0e-3_wp
@@ -250,7 +250,7 @@ module hc_options
     !> Smallest and largest size of an attempt over that of the rejected one; the same if that one did not converge: its
     !> changes say nothing about the size
     real(wp) :: smallest_retry = 0.1_wp, largest_retry = 0.6_wp, unsolved_retry = 0.25_wp
-    !> Share of what is allowed that a step is meant to change: less than 1, since the change is estimated
+    !> Share of the allowed change that a step aims at: less than 1, since the change is estimated
     real(wp) :: aim = 0.8_wp
     !> Share of the tolerance by which one step may add to the change of the tractions, (S2)
     real(wp) :: added_share = 0.5_wp

@@ -22,7 +22,7 @@ module hc_scratch
 
 contains
 
-  !> Count one user more, who needs so many bytes; what is there is lost.
+  !> Count one user more, who needs so many bytes; the content is lost.
   subroutine reserve(self, bytes, stat)
     class(scratch_t), intent(inout) :: self
     integer(int64), intent(in) :: bytes

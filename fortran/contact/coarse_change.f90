@@ -1,4 +1,4 @@
-!> What a coarser lattice contributes to a load step: the change that it finds, or a first guess.
+!> Contribution of a coarser lattice to a load step: the change that it finds, or an initial guess.
 !>
 !> The coarse problem is set up so that the present fine state, at the coarse
 !> nodes, solves it exactly under the present loads: what coarse tractions
@@ -102,7 +102,7 @@ contains
         end if
         state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
       end do
-      ! what is interpolated between tractions on the cone lies inside, and would stick
+      ! tractions interpolated between those on the cone lie inside it, and would stick
       call problem%friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
       do col = 1, size(slipping, 1)
         if (slipping(col, row) < 1.0_wp .or. state%pressure(col, row) <= 0.0_wp) cycle

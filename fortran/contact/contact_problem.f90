@@ -68,7 +68,7 @@ module hc_contact_problem
 
 contains
 
-  !> Set up a problem from what is given.
+  !> Set up a problem.
   subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error, normal_law)
     !> Problem to be set up
     type(friction_problem_t), intent(out) :: problem
@@ -326,7 +326,7 @@ contains
         call self%friction%find_zones((row - 1)*size(state%zone, 1) + 1, unit, r, state%pressure(:, row), &
                                       state%traction(:, row, 1), state%traction(:, row, 2), &
                                       state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), state%zone(:, row))
-        ! where nothing slips, rounding errors would tell which nodes on the boundary do
+        ! where nothing slips, round-off would decide which nodes on the boundary do
         where (state%zone(:, row) == slip .and. hypot(state%slip_increment(:, row, 1), state%slip_increment(:, row, 2)) <= least) &
           state%zone(:, row) = stick
       else

@@ -11,6 +11,7 @@ module hc_contact_state
   private
 
   public :: contact_state_t, new_contact_state, new_friction_state, add_fields, add_history, copy_tractions, touches_rim
+  public :: allocate_fields, field_of
   public :: check_problem, check_target, check_state
   public :: not_finite
   public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
@@ -201,6 +202,56 @@ contains
     end associate
   end subroutine add_history
 
+  !> Allocate all fields of a state with friction, without values.
+  subroutine allocate_fields(state, extent, error)
+    !> State without fields
+    type(contact_state_t), intent(inout) :: state
+    !> Number of columns and rows
+    integer, intent(in) :: extent(2)
+    !> Allocated without enough memory
+    type(error_t), allocatable, intent(out) :: error
+    integer :: stat
+
+    associate (n => extent(1), m => extent(2))
+      allocate (state%pressure(n, m), state%gap(n, m), state%zone(n, m), state%traction(n, m, 2), &
+                state%relative_displacement(n, m, 2), state%slip_increment(n, m, 2), state%accumulated_slip(n, m), &
+                state%dissipation_density(n, m), stat=stat)
+    end associate
+    if (stat /= 0) call raise(error, status%resources, &
+                              'not enough memory for the state of the contact: choose a smaller window')
+  end subroutine allocate_fields
+
+  !> Point to a field of real numbers by its name in Python; to nothing if the state has none of that name.
+  function field_of(state, name) result(field)
+    !> State
+    type(contact_state_t), intent(in), target :: state
+    !> Name, of a component of a vector with _x or _y at its end
+    character(len=*), intent(in) :: name
+    real(wp), pointer, contiguous :: field(:, :)
+    integer :: m
+
+    m = merge(1, 2, name(len(name):) == 'x')
+    field => null()
+    select case (name)
+    case ('pressure')
+      if (allocated(state%pressure)) field => state%pressure
+    case ('gap')
+      if (allocated(state%gap)) field => state%gap
+    case ('traction_x', 'traction_y')
+      if (allocated(state%traction)) field => state%traction(:, :, m)
+    case ('relative_displacement_x', 'relative_displacement_y')
+      if (allocated(state%relative_displacement)) field => state%relative_displacement(:, :, m)
+    case ('slip_increment_x', 'slip_increment_y')
+      if (allocated(state%slip_increment)) field => state%slip_increment(:, :, m)
+    case ('accumulated_slip')
+      if (allocated(state%accumulated_slip)) field => state%accumulated_slip
+    case ('dissipation_density')
+      if (allocated(state%dissipation_density)) field => state%dissipation_density
+    case default
+      field => null()
+    end select
+  end function field_of
+
   !> Copy tractions, motions and loads of a state, from which an iteration starts.
   subroutine copy_tractions(state, start, space)
     !> State they come from
@@ -258,7 +309,7 @@ contains
     logical, intent(in) :: candidate(:, :)
     !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; 0: as many as OpenMP would take
+    !> Threads to use; 0: the default of OpenMP
     integer, intent(in), optional :: n_threads
 
     call check_operator(lattice, pair, error, n_threads)

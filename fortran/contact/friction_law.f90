@@ -114,7 +114,7 @@ module hc_friction_law
       real(wp), intent(in) :: unit
       !> Pressure and traction [Pa]
       real(wp), intent(in), contiguous :: p(:), qx(:), qy(:)
-      !> What is left of the traction; nothing where there is no pressure [Pa]
+      !> Projected traction; 0 without pressure [Pa]
       real(wp), intent(out), contiguous :: cut_x(:), cut_y(:)
     end subroutine law_project
 

@@ -263,7 +263,7 @@ contains
       end do
     end do
     motion(:, 1) = load
-    ! any motion gives an upper bound, also what is left of a singular matrix
+    ! any motion gives an upper bound, also one from a singular matrix
     call eliminate(stiffness, motion)
     associate (work => dot_product(load, motion(:, 1)))
       if (.not. work > 0.0_wp) return

@@ -1,4 +1,4 @@
-!> Coulomb's law with a coefficient of its own at every node, a power of the pressure and a bound of the traction.
+!> Coulomb's law with a coefficient for each node, a power of the pressure and a bound of the traction.
 !>
 !> The traction of a node is at most
 !>

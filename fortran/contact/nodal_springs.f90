@@ -47,7 +47,7 @@ contains
     end associate
   end subroutine linearize
 
-  !> Measure |min((d_n + C) p, g + C p)|/d_n: what is wrong is a part of the displacement, of the spring, too.
+  !> Measure |min((d_n + C) p, g + C p)|/d_n: the error is a displacement, that of the spring included.
   pure subroutine violation(self, first, compliance, p, gap, candidate, worst)
     class(nodal_springs_t), intent(in) :: self
     integer, intent(in) :: first

@@ -153,7 +153,7 @@ contains
     offset = 0.0_wp
   end subroutine unilateral_linearize
 
-  !> Find the nodes in contact: those with p - r g > 0, whatever the law.
+  !> Find the nodes in contact: those with p - r g > 0, for any law.
   pure subroutine find_contact(r, p, gap, candidate, contact)
     !> Classification parameter [Pa/m]
     real(wp), intent(in) :: r

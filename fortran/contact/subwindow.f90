@@ -1,4 +1,4 @@
-!> The part of the window around the contact, and what is done where it fails: one policy for all solvers.
+!> The part of the window around the contact, and its enlargement where it fails: one policy for all solvers.
 !>
 !> Where the contact that is known fills much less than the window, a problem is solved on the part around it, and judged by
 !> one product over the window (docs/theory/multilevel.md, "Part of the window"). A part that has a solution fails where

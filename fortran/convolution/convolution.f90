@@ -36,7 +36,7 @@ module hc_convolution
     integer :: users = 1
   end type plans_t
 
-  !> What convolutions share, each with a count of its users: plans, spectra, memory. A copy is one user more.
+  !> Plans, spectra and memory that convolutions share, each with a count of its users; a copy is one more.
   !>
   !> gfortran (12 to 14) copies allocatable components without the assignment below. Such a copy lies elsewhere than its
   !> `place`: it is no user, and frees nothing.
@@ -55,7 +55,7 @@ module hc_convolution
   type :: convolution_t
     !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
-    !> What the results are multiplied with
+    !> Factor of the results
     real(wp) :: factor = 1.0_wp
     !> The kernel `complement` is this times the first one less the second one
     real(wp) :: whole = 0.0_wp
@@ -160,7 +160,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
-    !> With a cache: what the kernels depend on
+    !> With a cache: parameters of the kernels
     type(kernel_key_t), intent(in), optional :: key
     integer :: shape_wanted(3), stat
 
@@ -190,7 +190,7 @@ contains
     class(convolution_t), intent(in) :: self
     !> The cache, if there is one
     type(kernel_cache_t), pointer, intent(in), optional :: cache
-    !> With a cache: what the kernels depend on
+    !> With a cache: parameters of the kernels
     type(kernel_key_t), intent(in), optional :: key
 
     if (.not. present(cache)) return
@@ -256,7 +256,7 @@ contains
       if (j + 1 < n(2)) then
         call source%row(j + 1, kernel(:, :, 2))
       else
-        kernel(:, :, 2) = 0.0_wp                                               ! not what another row left there
+        kernel(:, :, 2) = 0.0_wp                                               ! no values of another row
       end if
       do m = 1, n_kernel
         associate (given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
@@ -347,7 +347,7 @@ contains
     do o = 1, size(result, 3)
       !$omp do schedule(static)
       do row = 1, n(2), 2
-        ! an odd last row has no companion, but what earlier products left there
+        ! an odd last row has no companion, but values of earlier products
         if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
@@ -362,7 +362,7 @@ contains
     if (perturb_convolution) call perturb(result)
   end subroutine convolve
 
-  !> Change every value by two units in the last place of the largest one; the parity of its own bits decides the sign.
+  !> Change every value by two units in the last place of the largest one; the parity of the bits of the value decides the sign.
   pure subroutine perturb(result)
     !> Sums of the convolutions (n_col, n_row, onto)
     real(wp), intent(inout) :: result(:, :, :)

@@ -1,4 +1,4 @@
-!> What a convolution does between its 1-D transforms: pairs of rows, blocks of columns, products with spectra.
+!> Passes of a convolution between its 1-D transforms: pairs of rows, blocks of columns, products with spectra.
 !>
 !> Two real rows X and Y are the parts of one complex row. With Z = X + i Y and the transforms of real rows being
 !> hermitian, X(f) = (Z(f) + conjg(Z(-f)))/2 and Y(f) = (Z(f) - conjg(Z(-f)))/(2 i).
@@ -16,7 +16,7 @@ module hc_fft_passes
 
   public :: complement, pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
 
-  !> Number of the kernel that is a multiple of the first one less the second one, and has no spectrum of its own.
+  !> Number of the kernel that is a multiple of the first one less the second one, and needs no spectrum.
   integer, parameter :: complement = 0
 
   !> Number of frequencies that are multiplied at a time.
@@ -52,7 +52,7 @@ contains
     integer, intent(in) :: n
     !> The rows
     real(wp), intent(in) :: first(n), second(n)
-    !> The complex row; what lies beyond stays
+    !> The complex row; values beyond it stay
     complex(wp), intent(inout) :: both(n)
     integer :: col
 
@@ -71,7 +71,7 @@ contains
     real(wp) :: re_1, im_1, re_2, im_2
 
     n = size(both)
-    ! what is imaginary at the ends belongs to no real row
+    ! imaginary parts at the ends belong to no real row
     both(0) = cmplx(real(first(0), wp), -real(second(0), wp), wp)
     both(n/2) = cmplx(real(first(n/2), wp), -real(second(n/2), wp), wp)
     do f = 1, n/2 - 1

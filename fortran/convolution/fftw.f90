@@ -41,7 +41,7 @@ contains
   !> Return a multiple of four not below n that is transformed fast, of the form 2^a 3^b 5^c 7^d.
   !>
   !> The least of them is not the fastest: FFTW's plans for powers of two take half of the time a
-  !> point of what others do, so that a longer transform can be the cheaper one.
+  !> point of others, so that a longer transform can be the cheaper one.
   elemental integer function good_size(n)
     !> Least length
     integer, intent(in) :: n

@@ -1,4 +1,4 @@
-!> Spectra of kernels that several problems may share, and what they depend on.
+!> Spectra of kernels that several problems may share, and their parameters.
 module hc_spectrum
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
@@ -12,7 +12,7 @@ module hc_spectrum
   public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, of_stress
   public :: of_displacement, kind_name
 
-  !> What was transformed: the kernel of the pressure, those of all blocks, that of the pressure in single
+  !> Transformed kernels: the kernel of the pressure, those of all blocks, that of the pressure in single
   !> precision, the inverses that precondition, and those of stress and displacement at a
   !> depth.
   integer, parameter :: of_pressure = 1, of_all_tractions = 2, of_pressure_rounded = 3, &

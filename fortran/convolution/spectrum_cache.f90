@@ -78,7 +78,7 @@ contains
     class(kernel_cache_t), intent(inout) :: self
     !> Existing folder, with a slash at the end, so that its name may end with a blank; empty: none
     character(len=*), intent(in) :: folder
-    !> What the numbers depend on besides the kernels: program, machine
+    !> Identity of the program and the machine
     character(len=*), intent(in) :: maker
     !> Word of this process alone
     character(len=*), intent(in) :: word
@@ -100,7 +100,7 @@ contains
   !> Look up spectra in memory, then in the folder.
   subroutine find(self, key, spectrum)
     class(kernel_cache_t), intent(inout) :: self
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> The spectra, to be released by the caller; not associated: they have to be made
     type(kernel_spectrum_t), pointer, intent(out) :: spectrum
@@ -138,7 +138,7 @@ contains
   !> Store spectra in memory and in the folder.
   subroutine store(self, key, spectrum)
     class(kernel_cache_t), intent(inout) :: self
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> The spectra, which do not change any more
     type(kernel_spectrum_t), pointer, intent(in) :: spectrum
@@ -254,7 +254,7 @@ contains
     end do
   end subroutine insert
 
-  !> Drop what was not used for longest until there is an empty place and as many bytes fit.
+  !> Drop the least recently used spectra until there is an empty place and as many bytes fit.
   subroutine make_room(self, bytes)
     class(kernel_cache_t), intent(inout) :: self
     integer(int64), intent(in) :: bytes

@@ -1,7 +1,7 @@
 !> Files of spectra of kernels: a file is complete, or does not exist.
 !>
 !> A file is written under another name and renamed; its head contains the key of the spectra, program and machine, and a hash
-!> of the whole file. Files that differ from what is expected are ignored, and so are those that another user may have written,
+!> of the whole file. Files with unexpected content are ignored, and so are those that another user may have written,
 !> unless files are shared. Files are written by C, since Fortran's run-time library does not report a full disk.
 module hc_spectrum_file
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char, c_size_t, c_int64_t, c_ptr, &
@@ -19,7 +19,7 @@ module hc_spectrum_file
   integer(int64), parameter :: layout = 4
   !> Length of the text for program and machine.
   integer, parameter :: maker_length = 256
-  !> Words of what is known of a head beforehand, and of all of it: bytes of a value, shape and hash come after.
+  !> Words of the fixed part of a head, and of a whole head: bytes of a value, shape and hash follow.
   integer, parameter :: n_known = 13 + maker_length/8, n_head = n_known + 5
   !> Status of `open_file`.
   integer(c_int), parameter :: absent = 1, foreign = 3
@@ -88,7 +88,7 @@ contains
 
   !> Return the name of the file of some kernels; others have the same by a rare chance only, which the head rules out.
   pure function file_name(key, maker) result(name)
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -114,7 +114,7 @@ contains
   subroutine read_kernels(path, key, maker, shared, spectrum, complaint)
     !> The file
     character(len=*), intent(in) :: path
-    !> What the kernels have to depend on
+    !> Expected parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -190,7 +190,7 @@ contains
   subroutine write_kernels(path, key, maker, spectrum, word, bytes, complaint)
     !> The file
     character(len=*), intent(in) :: path
-    !> What the kernels depend on
+    !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -247,10 +247,10 @@ contains
     call c_f_pointer(start, words, [spectrum%bytes()/8])
   end function words_of
 
-  !> Hash words, and what was hashed before.
+  !> Hash words together with an earlier hash.
   pure integer(int64) function hash_of(words, before)
     integer(int64), intent(in), contiguous :: words(:)
-    !> Hash of what stands before them; 0: nothing does
+    !> Hash of the words before them; 0: none
     integer(int64), intent(in) :: before
     hash_of = xxh64(words, 8*size(words, kind=c_size_t), before)
   end function hash_of

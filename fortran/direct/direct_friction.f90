@@ -29,7 +29,7 @@ module hc_direct_friction
   use hc_area_factors, only: area_factors_t
   use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
     linearize_law, evaluate, record
-  use hc_written_iteration, only: iterate_as_written
+  use hc_dissertation_iteration, only: iterate_as_written
   use hc_direct_system, only: solve_area
   implicit none
   private

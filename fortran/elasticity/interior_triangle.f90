@@ -178,7 +178,7 @@ contains
     d(z_psi_zz) = -(d(z_psi_xx) + d(z_psi_yy))
   end function potentials
 
-  !> Compute what one edge of a triangle, counter-clockwise, contributes to the derivatives.
+  !> Compute the share of one edge of a triangle, counter-clockwise, in the derivatives.
   pure function edge_terms(from, onto, value, slope, z, near) result(d)
     !> Ends of the edge relative to the point
     real(wp), intent(in) :: from(2), onto(2)

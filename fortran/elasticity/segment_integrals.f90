@@ -2,7 +2,7 @@
 !>
 !> With n the signed distance of the field point from the vertical plane through the segment, z its depth, t the
 !> abscissa along the segment from the foot of the point, N^2 = n^2 + z^2 and R^2 = t^2 + N^2. Every difference is in a
-!> form without cancellation. What becomes infinite at N = 0 or R + z = 0 is set to zero there: it occurs times z, n
+!> form without cancellation. Terms that become infinite at N = 0 or R + z = 0 are set to zero there: they occur times z, n
 !> or t only.
 !>
 !> Equations: docs/theory/interior.md, (I4), (I5).

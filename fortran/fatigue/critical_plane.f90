@@ -16,7 +16,7 @@
 module hc_critical_plane
   use hc_precision, only: wp, pi
   use hc_plane_criteria, only: plane_criterion_t, stress_extent_t
-  use hc_stress_path, only: deviator_coordinates, hydrostatic
+  use hc_invariant_criteria, only: deviator_coordinates, hydrostatic
   implicit none
   private
 

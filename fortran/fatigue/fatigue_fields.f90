@@ -5,7 +5,7 @@ module hc_fatigue_fields
   use hc_error, only: error_t, raise, status
   use hc_plane_criteria, only: plane_criterion_t
   use hc_critical_plane, only: find_critical_plane
-  use hc_stress_path, only: crossland
+  use hc_invariant_criteria, only: crossland
   use hc_fretting_parameters, only: find_ruiz
   implicit none
   private

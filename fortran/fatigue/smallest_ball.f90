@@ -1,7 +1,7 @@
 !> Smallest ball around points in a few dimensions.
 !>
 !> The radius of this ball is the amplitude of a path: of the shear traction on a plane (two dimensions), of the stress deviator
-!> (five; see hc_stress_path). The ball is found by walking: its center moves towards the center of the points that it
+!> (five; see hc_invariant_criteria). The ball is found by walking: its center moves towards the center of the points that it
 !> rests on, until another point stops it or the center lies among them (K. Fischer, B. Gärtner and M. Kutz, Fast
 !> smallest-enclosing-ball computation in high dimensions, ESA 2003, LNCS 2832, 630-641).
 module hc_smallest_ball
@@ -12,7 +12,7 @@ module hc_smallest_ball
 
   public :: find_smallest_ball
 
-  !> Relative size of what counts as zero: the number of points is small, and so are the systems.
+  !> Relative size below which a number counts as zero: the number of points is small, and so are the systems.
   real(wp), parameter :: nothing = 1.0e-11_wp
   !> Moves of the center for each point and dimension, after which the ball is taken as it is.
   integer, parameter :: most_moves = 4
@@ -102,7 +102,7 @@ contains
     shares = [1.0_wp - sum(rhs(:, 1)), rhs(:, 1)]
   end subroutine rest_center
 
-  !> Find the point that the shrinking ball meets first on the way of its center.
+  !> Find the point that the shrinking ball meets first as its center moves.
   pure subroutine find_blocking_point(points, support, center, step, scale, stopper, part)
     real(wp), intent(in), contiguous :: points(:, :), center(:), step(:)
     !> Points that the ball rests on

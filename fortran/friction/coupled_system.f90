@@ -3,7 +3,7 @@ module hc_coupled_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_shear_system, only: shear_system_t
   use hc_linear_system, only: linear_system_t
   use hc_active_set, only: active_set_t

@@ -10,7 +10,7 @@ module hc_fas_predictor
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_lattice_solver, only: solve_on_lattice
   use hc_coarse_change, only: restrict_state, balance, add_change, find_displacements
   implicit none

@@ -13,7 +13,7 @@ module hc_friction_iterate
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_globalization, only: globalization_t
   use hc_pressure_system, only: pressure_system_t
   use hc_shear_system, only: shear_system_t, new_shear_system

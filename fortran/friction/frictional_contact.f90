@@ -16,7 +16,7 @@ module hc_frictional_contact
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
-  use hc_elastic_operators, only: operators_t, new_operators, operators_memory
+  use hc_operator_set, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
   use hc_coarse_change, only: prolong_state, prolong_displacement
   use hc_fas_predictor, only: predict

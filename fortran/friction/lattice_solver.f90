@@ -13,7 +13,7 @@ module hc_lattice_solver
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_friction_iterate, only: friction_iterate_t
   use hc_displacement_check, only: check_displacements
   use hc_staggered_newton, only: staggered_sweep

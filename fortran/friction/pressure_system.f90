@@ -4,7 +4,7 @@ module hc_pressure_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_linear_system, only: linear_system_t
   use hc_active_set, only: active_set_t
   implicit none

@@ -15,7 +15,7 @@ module hc_shear_system
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
-  use hc_elastic_operators, only: operators_t
+  use hc_operator_set, only: operators_t
   use hc_frame_rows, only: turn_row, plane_row, add_springs_row, take_off_row, slip_compliance_row
   use hc_linear_system, only: linear_system_t
   use hc_active_set, only: active_set_t, new_active_set, paired_runs_t

@@ -1,4 +1,4 @@
-!> Stress of what hats on the lattice miss of a traction next to the edge of its zone.
+!> Stress of the difference between a traction and its hats, next to the edge of its zone.
 !>
 !> The traction vanishes like a root there, the hats of the nodes like straight lines. Their difference is integrated in polar
 !> coordinates about the field point:

@@ -161,7 +161,7 @@ contains
     end associate
   end function spectra_memory
 
-  !> Take the tables of a depth, from a cache or anew.
+  !> Take the tables of a depth, from a cache, or compute them.
   subroutine set_depth(self, depth, error, cache)
     class(interior_planes_t), intent(inout) :: self
     !> Depth below the surface of the body [m]

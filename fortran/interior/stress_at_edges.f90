@@ -78,7 +78,7 @@ contains
     !$omp end parallel do
   end subroutine correct_stress_at_edges
 
-  !> Choose points of the edge, whatever the field points are, of which those near a field point are kept.
+  !> Choose points of the edge, independent of the field points, of which those near a field point are kept.
   pure subroutine choose_centers(edge, at, centers, inwards)
     type(edge_traction_t), intent(in) :: edge
     !> Points (3, n), in spacings

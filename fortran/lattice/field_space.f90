@@ -61,7 +61,7 @@ contains
   type(field_space_t) function space_over(extent, n_threads) result(space)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
+    !> Threads to use; absent or 0: the default of OpenMP, one for a small window
     integer, intent(in), optional :: n_threads
 
     space%threads = 1

@@ -106,7 +106,7 @@ contains
     value = place%mean(values, outside)
   end function interpolate
 
-  !> Interpolate what vanishes like a square root at an edge: near it the square is linear, elsewhere it is itself.
+  !> Interpolate a field that vanishes like a square root at an edge: near it the square is linear, elsewhere it is itself.
   pure real(wp) function interpolate_pressure(lattice, pressure, squares, point) result(value)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice

@@ -229,7 +229,7 @@ contains
     end do
   end subroutine enclose
 
-  !> Return whether the part is so much smaller than the window that operators of its own pay.
+  !> Return whether the part is so much smaller than the window that separate operators pay.
   pure logical function is_worth_parting(self, low, high, options)
     class(lattice_t), intent(in) :: self
     !> First and last column and row of the part

@@ -46,7 +46,7 @@ module hc_contact_edges
     procedure, private :: from_stick
   end type contact_edges_t
 
-  !> What is known about the edge of a zone from its own nodes.
+  !> Data about the edge of a zone from its own nodes.
   type :: one_sided_t
     !> Distances from the edge, slopes there, and directions inwards
     real(wp), allocatable :: distance(:), slope(:), direction(:, :)
@@ -165,7 +165,7 @@ contains
     class(contact_edges_t), intent(in) :: self
     !> Nodes that stick, all in contact
     logical, intent(in) :: stick(:, :)
-    !> What friction could carry beyond the shear traction, mu p - |q|; only its values at these nodes matter [Pa]
+    !> Reserve of friction, mu p - |q|; only its values at these nodes matter [Pa]
     real(wp), intent(in) :: reserve(:, :)
     !> Nodes about the edge, and their distances
     type(edge_band_t), intent(out) :: band
@@ -240,7 +240,7 @@ contains
                             known_beyond=.false.)
   end function stick_squares
 
-  !> Compute squares, good to interpolate, of what vanishes at the edge of a zone.
+  !> Compute squares, good to interpolate, of a field that vanishes at the edge of a zone.
   pure function squares_in_band(band, options, zone, around, square, distance, known_beyond) result(field)
     !> Nodes about the edge
     type(edge_band_t), intent(in) :: band
@@ -310,9 +310,9 @@ contains
     type(edge_options_t), intent(in) :: options
     !> Those on that side
     logical, intent(in) :: part(:)
-    !> Values at the nodes, squares of what vanishes like a square root
+    !> Values at the nodes, squares of fields that vanish like a square root
     real(wp), intent(in) :: square(:)
-    !> What is found
+    !> Squares at the nodes
     type(one_sided_t), intent(out) :: seen
     logical :: whole(band%n), known(band%n)
     ! direction, 1 where it is guessed, 1 where there is no slope

@@ -211,7 +211,7 @@ contains
     end do
   end function gradient
 
-  !> Fill in what is not known with the mean of the neighbors, from the nearest nodes on.
+  !> Give nodes without a value the mean of their neighbors, from the nearest nodes on.
   pure subroutine extend(self, n_value, values, known)
     class(edge_band_t), intent(in) :: self
     !> Number of values of a node

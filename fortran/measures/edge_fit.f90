@@ -1,4 +1,4 @@
-!> Squares of what vanishes like a square root at the edge of a zone, from its values at the nodes inside.
+!> Squares of a field that vanishes like a square root at the edge of a zone, from its values at the nodes inside.
 !>
 !> They are smooth across the edge: a paraboloid through those of the nodes nearby, by least squares, says where the edge
 !> runs between the nodes, and evens out the errors of single nodes.

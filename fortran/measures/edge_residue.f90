@@ -3,7 +3,7 @@
 !>
 !> It is sampled at the points of a lattice `samples` times as fine, in the cells of the lattice next to the edges. Hats
 !> with the same weighted means about each node, the weights being a hat smoothed by a hat, have its moments up to the
-!> third; the displacement of what is left falls off so fast that a sum over the cells nearby suffices.
+!> third; the displacement of the rest falls off so fast that a sum over the cells nearby suffices.
 !>
 !> Equations: docs/theory/interior.md, (I17) and (I18).
 module hc_edge_residue

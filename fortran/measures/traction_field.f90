@@ -46,7 +46,7 @@ module hc_traction_field
     procedure :: at
     !> Tractions at all nodes
     procedure :: at_nodes
-    !> What they are beyond the hats of the nodal values at a point
+    !> Their difference from the hats of the nodal values at a point
     procedure :: beyond_hats
     !> Renew the values at the nodes after a change of the squares
     procedure :: renew
@@ -198,7 +198,7 @@ contains
     end do
   end function at_nodes
 
-  !> Compute what the field has beyond the hats of the nodal values at a point [Pa].
+  !> Compute the difference of the field from the hats of the nodal values at a point [Pa].
   pure function beyond_hats(self, point) result(more)
     class(traction_field_t), intent(in) :: self
     !> x and y [m]

@@ -78,7 +78,7 @@ contains
     type(elastic_pair_t), intent(in) :: pair
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; 0: as many as OpenMP would take
+    !> Threads to use; 0: the default of OpenMP
     integer, intent(in), optional :: n_threads
 
     call check_lattice(lattice, error)

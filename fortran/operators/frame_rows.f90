@@ -95,7 +95,7 @@ contains
     integer, intent(in) :: n
     !> Compliance of the springs, and displacements
     real(wp), intent(in) :: compliance(n), ux(n), uy(n)
-    !> Tractions if all nodes stuck, and what is left of them
+    !> Tractions if all nodes stuck; then those with the springs
     real(wp), intent(inout) :: qx(n), qy(n)
     real(wp) :: moved, stretch, left, sprung
     integer :: i

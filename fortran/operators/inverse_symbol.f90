@@ -17,7 +17,7 @@ module hc_inverse_symbol
   use hc_fft_layout_single, only: convolution_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_preconditioner_extension, only: edge_extension_t
+  use hc_edge_continuation, only: edge_extension_t
   use hc_lattice_symbol, only: lattice_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private

@@ -3,7 +3,7 @@
 !> The linear problems of contact are K x + D x = b on the active nodes: K is a part of the flexibility operator, D the
 !> compliance of springs in series with the nodes. A preconditioner M is a symmetric positive definite estimate of
 !> (K + D)^-1 there. The preconditioner of the whole library is that of symbol_preconditioner; another one extends this type and is
-!> given to hc_elastic_operators or hc_normal_lattice in its place.
+!> given to hc_operator_set or hc_normal_lattice in its place.
 !>
 !> Equations: docs/theory/preconditioner.md.
 module hc_preconditioner

@@ -27,7 +27,7 @@ module hc_shear_preconditioner
   use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
   use hc_plane_fields, only: to_plane, add_in_frames, keep_along, copy_nodes, add_nodes, set_to_zero
   use hc_inverse_symbol, only: node_compliance
-  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_edge_continuation, only: edge_extension_t, new_edge_extension
   use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner
   implicit none
   private
@@ -233,7 +233,7 @@ contains
 
     rest = self%far*across
     call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e, 1.0_wp/self%unit)
-    ! what is not averaged: the mean has to be symmetric
+    ! without the average: the mean has to be symmetric
     do m = 1, 2
       call set_to_zero(self%apart, self%space%threads, self%field(1:, m))
     end do

@@ -1,6 +1,6 @@
 !> The preconditioner of the inverse symbol on the nodes in contact, and that of the pressure.
 !>
-!> Displacements are continued beyond the edge of the contact (preconditioner_extension) and multiplied by the inverse
+!> Displacements are continued beyond the edge of the contact (hc_edge_continuation) and multiplied by the inverse
 !> symbol (inverse_symbol); the tractions beyond the edge are added to those inside by the transpose of the continuation.
 !> The preconditioner of the shear traction (shear_preconditioner) extends it.
 !>
@@ -16,7 +16,7 @@ module hc_symbol_preconditioner
   use hc_active_set, only: active_set_t
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol
   use hc_preconditioner, only: preconditioner_t
-  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_edge_continuation, only: edge_extension_t, new_edge_extension
   implicit none
   private
 

@@ -266,7 +266,7 @@ contains
     real(c_double), intent(in) :: coefficient(:)
     !> Bound of the shear traction, infinite or huge: none [Pa]; power of the pressure; ratio of the coefficients along and across,
     !> of which `coefficient` is the geometric mean, and angle of the direction along from x [rad]
-    real(c_double), intent(in) :: law(4)
+    real(c_double), intent(in) :: law(:)
     !> Number of nodes of the window
     integer, intent(in) :: n_node
     !> The law

@@ -13,7 +13,7 @@ module hc_f2py_problems
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t
-  use hc_contact_state, only: contact_state_t, n_load
+  use hc_contact_state, only: contact_state_t, allocate_fields, field_of, n_load
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
@@ -188,16 +188,9 @@ contains
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t), pointer :: state
-    integer :: stat
 
     allocate (state, source=numbers)
-    associate (n => extent(1), m => extent(2))
-      allocate (state%pressure(n, m), state%gap(n, m), state%zone(n, m), state%traction(n, m, 2), &
-                state%relative_displacement(n, m, 2), state%slip_increment(n, m, 2), state%accumulated_slip(n, m), &
-                state%dissipation_density(n, m), stat=stat)
-    end associate
-    if (stat /= 0) call raise(error, status%resources, &
-                              'not enough memory for the state of the contact: choose a smaller window')
+    call allocate_fields(state, extent, error)
     call hold(state, handle, error)
   end subroutine new_held_state
 
@@ -207,43 +200,16 @@ contains
     character(len=*), intent(in) :: name
     integer(c_int64_t), intent(out) :: place
     type(error_t), allocatable, intent(out) :: error
+    real(wp), pointer, contiguous :: field(:, :)
 
     place = 0
-    select case (name)
-    case ('pressure')
-      if (allocated(state%pressure)) place = address_of(state%pressure)
-    case ('gap')
-      if (allocated(state%gap)) place = address_of(state%gap)
-    case ('zone')
+    if (name == 'zone') then
       if (allocated(state%zone)) place = transfer(c_loc(state%zone), 0_c_intptr_t)
-    case ('traction_x', 'traction_y')
-      if (allocated(state%traction)) place = address_of(state%traction(:, :, component_of(name)))
-    case ('relative_displacement_x', 'relative_displacement_y')
-      if (allocated(state%relative_displacement)) place = address_of(state%relative_displacement(:, :, component_of(name)))
-    case ('slip_increment_x', 'slip_increment_y')
-      if (allocated(state%slip_increment)) place = address_of(state%slip_increment(:, :, component_of(name)))
-    case ('accumulated_slip')
-      if (allocated(state%accumulated_slip)) place = address_of(state%accumulated_slip)
-    case ('dissipation_density')
-      if (allocated(state%dissipation_density)) place = address_of(state%dissipation_density)
-    case default
-      place = 0
-    end select
+    else
+      field => field_of(state, name)
+      if (associated(field)) place = transfer(c_loc(field), 0_c_intptr_t)
+    end if
     if (place == 0) call raise(error, status%bad_handle, 'the state has no field '//name)
   end subroutine find_field
-
-  !> Return the component that the name of a field ends with: 1 (x) or 2 (y).
-  pure integer function component_of(name)
-    character(len=*), intent(in) :: name
-
-    component_of = merge(1, 2, name(len(name):) == 'x')
-  end function component_of
-
-  !> Return the address of a field.
-  integer(c_int64_t) function address_of(field)
-    real(wp), intent(in), target, contiguous :: field(:, :)
-
-    address_of = transfer(c_loc(field), 0_c_intptr_t)
-  end function address_of
 
 end module hc_f2py_problems

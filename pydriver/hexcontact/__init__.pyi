@@ -1,4 +1,4 @@
-# Public names, each with its home: type checkers read it, and __init__.py imports from there what is used.
+# Public names, each with its home: type checkers read it, and __init__.py imports a name at its first use.
 from . import analytic as analytic
 from . import errors as errors
 from . import fatigue as fatigue

@@ -234,7 +234,7 @@ class Case(Problem):
             netCDF file to write; each step is on the disk before the next begins. Without it the result is in
             memory only, whatever the deck says.
         overwrite : bool
-            Replace an output that is there already.
+            Replace an output that exists.
         on_step : callable, optional
             Called with each finished `Step`, after it was written; with a target accuracy, of every lattice.
             If it returns a true value, or raises `hexcontact.StopRun`, the run ends there; any other
@@ -279,7 +279,7 @@ class Case(Problem):
         output : path, optional
             netCDF file to write; each step is on the disk before the next begins.
         overwrite : bool
-            Replace an output that is there already.
+            Replace an output that exists.
 
         Returns
         -------

@@ -93,7 +93,7 @@ def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     """Raise one sentence for an exception by a damaged or foreign file, or a device.
 
-    Below the package damage takes any form. What the package itself trips over is a defect of it, unless a
+    Below the package damage takes any form. An error raised by the package itself is a defect of it, unless a
     value is missing or wrong.
     """
     require_ordinary(path, kind)

@@ -7,7 +7,7 @@ module test_fas_predictor
     force_control, displacement_control
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t
-  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_operator_set, only: operators_t, new_operators
   use hc_lattice_solver, only: solve_on_lattice
   use hc_fas_predictor, only: predict
   use hc_frictional_contact, only: frictional_contact_t

@@ -3,7 +3,7 @@ module test_fatigue
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_smallest_ball, only: find_smallest_ball
-  use hc_stress_path, only: crossland, dang_van, deviator_amplitude, largest_shear, deviator_coordinates
+  use hc_invariant_criteria, only: crossland, dang_van, deviator_amplitude, largest_shear, deviator_coordinates
   use hc_plane_criteria, only: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t
   use hc_critical_plane, only: find_critical_plane
   use hc_strain_life, only: strain_life_t, new_strain_life

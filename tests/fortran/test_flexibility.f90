@@ -15,7 +15,7 @@ module test_flexibility
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol
-  use hc_preconditioner_extension, only: edge_extension_t
+  use hc_edge_continuation, only: edge_extension_t
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private

@@ -18,7 +18,7 @@ module test_friction
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: constraints_t, iteration_t
   use hc_projected_cg, only: projected_cg
-  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_operator_set, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use testing, only: test_t, new_test, check, check_raised, check_true, largest, coordinate

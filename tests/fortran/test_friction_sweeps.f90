@@ -9,7 +9,7 @@ module test_friction_sweeps
   use hc_contact_residuals, only: tangential_compliances
   use hc_contact_problem, only: near_reach
   use hc_coulomb, only: coulomb_t
-  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_operator_set, only: operators_t, new_operators
   use hc_friction_iterate, only: friction_iterate_t
   use hc_displacement_check, only: check_displacements
   use hc_active_zones, only: classify

@@ -14,7 +14,7 @@ module test_normal_contact
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_lattice_symbol, only: kernel_symbols, lattice_symbols
   use hc_transfer, only: prolong, prolong_edge
-  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_edge_continuation, only: edge_extension_t, new_edge_extension
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol
   use hc_options, only: preconditioner_options_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control

@@ -15,7 +15,7 @@ module test_preconditioner
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_coulomb, only: coulomb_t
-  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_operator_set, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t
   use hc_lattice_solver, only: solve_on_lattice

@@ -1,99 +1,275 @@
-"""docs/developer.md: the way of a load leads through procedures that exist, and the examples work."""
+"""docs/developer.md: procedures on the way of a load exist, and additions work in a copy of the sources."""
 
-import __future__
-
-import importlib
+import os
 import re
+import shutil
+import subprocess
 import sys
-import threading
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import matplotlib.figure
 import pytest
-from typer.testing import CliRunner
-
-import hexcontact
-from hexcontact.cli import app, frame
-from hexcontact.plotting import registry
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/developer.md").read_text(encoding="utf-8")
+SOURCES = ("fortran", "pydriver", "tests", "docs", "cases")
+BUILDS = ("build/editable", "build/release")
+COUNTS = {"One file": 1, "Two files": 2, "Three files": 3, "Five files": 5}
+MOST = {"a friction law": 5, "a nodal output field": 3}
+
+COMMON = """
+import hexcontact
+from hexcontact import Case
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+BALL = {**STEEL, "surface": {"shape": "sphere", "radius": "10 mm"}}
+"""
 
 
-def executed(heading: str, module: str, number: int = 0, **others: Any) -> None:
-    """Execute a program of the guide as if it stood in a module, with copies of its names and others."""
-    section = re.search(rf"^## {heading}\n(.*?)(?=^## )", PAGE, re.MULTILINE | re.DOTALL)
-    assert section
-    program = re.findall(r"^```python\n(.*?)^```", section[1], re.MULTILINE | re.DOTALL)[number]
-    importlib.import_module(module)
-    names = {
-        **vars(sys.modules[module]),
-        **others,
-    }  # not its attribute in the package, which a function may hide
-    exec(compile(program, "developer.md", "exec", __future__.annotations.compiler_flag), names)
+def sections() -> dict[str, str]:
+    """Return the additions of the page that name files, by their headings."""
+    parts = re.findall(r"^## Add ([^\n]+)\n(.*?)(?=^## )", PAGE, re.MULTILINE | re.DOTALL)
+    return {heading: text for heading, text in parts if changes_of(text)}
+
+
+def changes_of(text: str) -> list[tuple[str, str, str]]:
+    """Return what a section changes: file, old lines (none: the end of the file) and new ones."""
+    found = []
+    for language, block in re.findall(r"^```(\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        if language == "diff":
+            for file, hunks in re.findall(
+                r"^--- ([^\n]+)\n(.*?)(?=^--- |\Z)", block, re.MULTILINE | re.DOTALL
+            ):
+                for hunk in re.split(r"^@@\n", hunks, flags=re.MULTILINE):
+                    lines = hunk.splitlines(keepends=True)
+                    old, new = (
+                        "".join(line[1:] for line in lines if line[0] in side) for side in (" -", " +")
+                    )
+                    found.append((file, old, new))
+        elif named := re.match(r"[#!] (\S+/\S+\.\w+)\n", block):
+            found.append((named[1], "", block[named.end() :]))
+    return found
+
+
+def change(root: Path, file: str, old: str, new: str) -> None:
+    """Make a change; the old lines stand once in the file."""
+    path = root / file
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    if old:
+        assert f"\n{text}".count(f"\n{old}") == 1, f"{file}:\n{old}"
+        text = f"\n{text}".replace(f"\n{old}", f"\n{new}")[1:]
+    else:
+        text = f"{text}\n\n{new}" if text else new
+    path.write_text(text, encoding="utf-8")
+
+
+def run(*words: str | Path, root: Path) -> str:
+    """Run a program on the package of the copy."""
+    environment = os.environ | {
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
+        "PYTHONPATH": str(root / "pydriver"),
+        "OMP_NUM_THREADS": "1",
+    }
+    done = subprocess.run(words, capture_output=True, text=True, cwd=root, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the sources with all additions, built from a copy of the last build, if there is one."""
+    root = tmp_path_factory.mktemp("guide")
+    unwanted = shutil.ignore_patterns("__pycache__", "*.so", "flat.py")
+    for name in SOURCES:
+        shutil.copytree(ROOT / name, root / name, ignore=unwanted)
+    for path in [path for path in ROOT.iterdir() if path.is_file()]:
+        shutil.copy2(path, root)
+    build = root / "build/guide"
+    for built in [ROOT / name for name in BUILDS if (ROOT / name / "build.ninja").exists()][:1]:
+        shutil.copytree(built, build)
+        rules, times = build / "build.ninja", (built / "build.ninja").stat()
+        rules.write_text(rules.read_text().replace(f"regenerate {ROOT} ", f"regenerate {root} "))
+        os.utime(rules, ns=(times.st_atime_ns, times.st_mtime_ns))
+    if not build.exists():
+        run("meson", "setup", build, "-Dpython=true", "-Dtests=false", "-Doptimization=0", root=root)
+    for text in sections().values():
+        for file, old, new in changes_of(text):
+            change(root, file, old, new)
+    [extension] = re.findall(r"^build (pydriver/_core\S+\.so):", (build / "build.ninja").read_text(), re.M)
+    run("ninja", "-C", build, extension, root=root)
+    for made in (build / extension, build / "pydriver/flat.py"):
+        shutil.copy2(made, root / "pydriver/hexcontact/core")
+    run(sys.executable, "docs/deck_tables.py", root=root)
+    return root
+
+
+def used(copy: Path, program: str) -> str:
+    """Run a program in the copy, and return what it prints."""
+    return run(sys.executable, "-c", COMMON + program, root=copy)
 
 
 def test_procedures_that_a_load_passes_are_there() -> None:
     way = re.findall(r"^\| `(\w+/[\w/.]+)` \| `(\w+)` \|", PAGE, re.MULTILINE)
     assert len(way) > 10
     for file, name in way:
-        assert re.search(rf"\b(?:def |class |subroutine |procedures\.){name}\b", (ROOT / file).read_text()), (
-            file,
-            name,
-        )
+        text = (ROOT / file).read_text()
+        assert re.search(rf"\b(?:def |class |subroutine |procedures\.){name}\b", text), (file, name)
 
 
-def test_example_of_a_surface_has_its_closed_solution(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.analytic import compare
-    from hexcontact.deck import surfaces
+def test_additions_have_as_many_files_as_the_page_says() -> None:
+    counted = {heading: len({file for file, *_ in changes_of(text)}) for heading, text in sections().items()}
+    said = {heading: text.strip().partition(".")[0].partition(":")[0] for heading, text in sections().items()}
+    assert counted == {heading: COUNTS[words] for heading, words in said.items()}
+    assert len(counted) == 8
+    assert {heading: counted[heading] for heading in MOST} == MOST
 
-    monkeypatch.setattr(surfaces, "SHAPES", dict(surfaces.SHAPES))
-    monkeypatch.setattr(compare, "_SHAPES", dict(compare._SHAPES))
-    executed("Add a surface with a closed-form solution", "hexcontact.deck.surfaces")
-    executed("Add a surface with a closed-form solution", "hexcontact.analytic.compare", 1)
-    surface = {"shape": "steepening", "radius": "10 mm", "factor": 3000.0}
-    case = hexcontact.Case(
-        body_1={**STEEL, "surface": surface}, body_2=STEEL, nodes_in_radius=12, normal_load=100.0
+
+def test_rules_of_the_house_hold_with_all_additions(copy: Path) -> None:
+    files = [f"tests/python/test_{name}.py" for name in ("rooms", "house", "flat_procedures", "schema")]
+    keys = "tests/python/test_deck.py::test_the_deck_reference_is_up_to_date"
+    run(sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *files, keys, root=copy)
+
+
+def test_a_surface_has_its_closed_solution(copy: Path) -> None:
+    printed = used(
+        copy,
+        """
+surface = {"shape": "steepening", "radius": "10 mm", "factor": 3000.0}
+case = Case(body_1={**STEEL, "surface": surface}, body_2=STEEL, nodes_in_radius=12, normal_load=100.0)
+comparison = case.run().compare()
+print(abs(comparison["approach"].error), abs(comparison["max_pressure"].error))
+""",
     )
-    comparison = case.run().compare()
-    # second order of the spacing, as for spheres
-    assert comparison["approach"].error == pytest.approx(0.0, abs=2e-3)
-    assert comparison["max_pressure"].error == pytest.approx(0.0, abs=2e-3)
+    assert all(float(error) < 2e-3 for error in printed.split())  # of second order, as for spheres
 
 
-def test_examples_of_a_figure_and_a_command_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_ENTRIES", dict(registry._ENTRIES))
-    monkeypatch.setattr(frame.app, "registered_commands", [*app.app.registered_commands])
-    executed("Add a figure", "hexcontact.plotting.history")
-    executed("Add a command", "hexcontact.cli.show")
-    case = hexcontact.Case(
-        body_1={**STEEL, "surface": {"shape": "sphere", "radius": "10 mm"}},
-        body_2={"rigid": True},
-        nodes_in_radius=6,
-        friction_coefficient=0.3,
-        loads=[{"normal_load": 50.0, "steps": 2}],
+def test_a_nodal_field_is_in_the_result(copy: Path) -> None:
+    printed = used(
+        copy,
+        """
+import numpy as np
+loads = [{"normal_load": 50.0}, {"tangential_load_x": 5.0}]
+result = Case(body_1=BALL, body_2=STEEL, nodes_in_radius=8, friction_coefficient=0.3, loads=loads).run()
+step = result.dataset.isel(step=-1)
+length = np.hypot(step["traction_x"], step["traction_y"])
+reserve = step["friction_reserve"]
+print(float(abs(reserve - (0.3 * step["pressure"] - length)).max() / step["pressure"].max()))
+print(float(reserve.where(step["zone"] == 1).min() > 0.0), float(abs(reserve.where(step["zone"] == 2)).max()))
+print(reserve.attrs["units"])
+""",
     )
-    result = case.run(tmp_path / "out.nc")
-    drawn = registry.entries()["work"].draw(result)
-    assert isinstance(drawn, matplotlib.figure.Figure)
-    assert drawn.axes[0].lines[0].get_ydata().tolist() == result.dissipated_energy.values.tolist()
-    done = CliRunner().invoke(frame.app, ["energy", str(tmp_path / "out.nc")])
-    assert done.exit_code == 0
-    assert [line.split()[0] for line in done.output.splitlines()] == ["1", "2"]
+    error, sticks, slips, unit = printed.split()
+    assert float(error) < 1e-12
+    assert float(sticks) == 1.0
+    assert float(slips) < 10.0  # Pa, of a bound of 1e8
+    assert unit == "Pa"
 
 
-def test_example_of_a_study_backend_yields_what_the_jobs_return(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.study import backend
+def test_a_friction_law_bounds_the_traction(copy: Path) -> None:
+    printed = used(
+        copy,
+        """
+import numpy as np
+limit, mu = 120e6, 0.3
+tables = {"body": {1: BALL, 2: STEEL}, "grid": {"nodes_in_radius": 8},
+          "friction": {"coefficient": mu, "shear_limit": limit, "transition": "smooth"},
+          "load": [{"normal_load": 50.0}, {"tangential_load_x": 4.0}]}
+result = Case.from_dict(tables).run()
+step = result.dataset.isel(step=-1)
+length = np.hypot(step["traction_x"], step["traction_y"])
+bound = limit * np.tanh(mu * step["pressure"] / limit)
+excess = (length - bound) / limit
+print(float(excess.max()), float(abs(excess).where(step["zone"] == 2).max()))
+print(int((step["zone"] == 1).sum()), int((step["zone"] == 2).sum()))
+print(result.dataset.attrs["friction_law"])
+del tables["friction"]["shear_limit"]
+try:
+    Case.from_dict(tables)
+except hexcontact.DeckError as error:
+    print(error)
+""",
+    )
+    excess, zones, law, message = printed.splitlines()
+    assert all(float(share) < 1e-7 for share in excess.split())  # above the bound, and off it in slip
+    assert all(int(nodes) > 10 for nodes in zones.split())
+    assert law == "coefficient 0.3, shear traction of at most 120.0 MPa, smooth"
+    assert message == 'friction.shear_limit: missing; expected the limit of transition = "smooth"'
 
-    monkeypatch.setattr(backend, "BACKENDS", dict(backend.BACKENDS))
-    monkeypatch.setattr(backend, "KEYS", dict(backend.KEYS))
-    monkeypatch.setattr(backend, "solve_case", lambda job, apart: f"outcome of {job}, {apart}")
-    others = {"Queue": SimpleNamespace, "connected": lambda address: ThreadPoolExecutor(1)}
-    executed("Add a study backend", "hexcontact.study.backends.dask", **others)
-    with backend.BACKENDS["queue"](SimpleNamespace(address="here"), 2) as pool:
-        found = list(backend.outcomes(pool, ["one", "two"], threading.Event()))
-    assert found == ["outcome of one, True", "outcome of two, True"]
+
+def test_a_fatigue_criterion_is_that_of_the_deck(copy: Path) -> None:
+    printed = used(
+        copy,
+        """
+import numpy as np
+from hexcontact import fatigue
+history = np.zeros((3, 6))
+history[:, 0] = [0.0, 300e6, 100e6]
+print(float(fatigue.sines(history, slope=0.2)))
+loads = [{"normal_load": 50.0}, *({"tangential_load_x": load} for load in (5.0, -5.0, 5.0))]
+result = Case(body_1=BALL, body_2=STEEL, nodes_in_radius=6, friction_coefficient=0.3, loads=loads).run()
+found = result.fatigue("sines", "crossland", steps=[2, 3, 4], sines_slope=0.0, crossland_slope=0.0)
+print(float(abs(found["sines"] - found["crossland"]).max()), found["sines"].attrs["sines_slope"])
+""",
+    )
+    value, apart, slope = map(float, printed.split())
+    assert value == pytest.approx(150e6 / 3**0.5 + 0.2 * 50e6, rel=1e-12)  # half the range, and its middle
+    assert apart == slope == 0.0
+
+
+def test_a_deck_key_reaches_the_solver(copy: Path) -> None:
+    printed = used(
+        copy,
+        """
+loads = [{"normal_load": 50.0}, {"tangential_load_x": 10.0}]
+case = Case(body_1=BALL, body_2={"rigid": True}, nodes_in_radius=8, friction_coefficient=0.3, loads=loads)
+print(int(case.run().dataset["cuts"].sum()))
+for most in (1, 0):
+    try:
+        case.changed(max_sweeps=most).run()
+    except hexcontact.HexcontactError as error:
+        print(str(error).splitlines()[0])
+""",
+    )
+    cuts, halved, message = printed.splitlines()
+    assert cuts == "0"
+    assert "did not converge" in halved  # no step ends in one active set
+    assert "halving the step 6 times" in halved
+    assert "solver.max_sweeps = 0: expected a whole number of at least 1" in message
+
+
+def test_a_figure_is_an_option_of_the_command(copy: Path, tmp_path: Path) -> None:
+    printed = used(
+        copy,
+        f"""
+from hexcontact.plotting import FIGURES
+loads = [{{"normal_load": 50.0, "steps": 2}}]
+case = Case(body_1=BALL, body_2={{"rigid": True}}, nodes_in_radius=6, friction_coefficient=0.3, loads=loads)
+result = case.run({str(tmp_path / "out.nc")!r})
+drawn = FIGURES["work"](result).axes[0].lines[0].get_ydata().tolist()
+print(drawn == result.dissipated_energy.values.tolist() != [0.0, 0.0])
+""",
+    )
+    assert printed == "True\n"
+    command = [sys.executable, "-m", "hexcontact"]
+    run(*command, "plot", tmp_path / "out.nc", "--what", "work", "--output", tmp_path / "work.png", root=copy)
+    assert (tmp_path / "work.png").stat().st_size > 1000
+    lines = run(*command, "energy", tmp_path / "out.nc", root=copy).splitlines()
+    assert [line.split()[0] for line in lines] == ["1", "2"]
+
+
+def test_a_backend_runs_the_cases_of_a_study(copy: Path, tmp_path: Path) -> None:
+    deck = """
+    body.1 = { young_modulus = 210e9, poisson_ratio = 0.3, surface = { shape = "sphere", radius = "10 mm" } }
+    body.2.rigid = true
+    grid.nodes_in_radius = 4
+    load = [{ normal_load = 50.0 }]
+    """
+    study = f"""
+    deck = "ball.toml"
+    output = "{tmp_path / "cases.nc"}"
+    threads = 2
+    parameter = [{{ key = "load.1.normal_load", values = [10.0, 20.0] }}]
+    """
+    (tmp_path / "ball.toml").write_text(deck)
+    (tmp_path / "study.toml").write_text(study)
+    run(sys.executable, "-m", "hexcontact", "study", tmp_path / "study.toml", root=copy)
+    assert (tmp_path / "cases.nc").exists()
+    assert len([path for path in tmp_path.rglob("*.nc") if path.name != "cases.nc"]) == 2

@@ -100,7 +100,7 @@ class SuperposedContact:
 
     With p(P), delta(P) and a(P) of the contact without friction and P* = P - Q/mu, the shear traction is
     q = mu (p(P) - p(P*)), the stick zone is the contact under P*, and the shift is (1 + gamma/2) mu
-    (delta(P) - delta(P*)). Exact for beta = 0 and gamma = 0, whatever the surfaces; for gamma > 0 as exact as
+    (delta(P) - delta(P*)). Exact for beta = 0 and gamma = 0 and any surfaces; for gamma > 0 as exact as
     Mindlin's.
 
     Parameters
@@ -247,7 +247,7 @@ def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
 class PlaneCattaneo:
     """Cylinders of alike materials pressed by P', then sheared across their axes by Q' (Cattaneo, Mindlin).
 
-    Plane strain; exact whatever Poisson's ratio is. The middle of a contact much longer than wide.
+    Plane strain; exact for any Poisson's ratio. The middle of a contact much longer than wide.
 
     Parameters
     ----------

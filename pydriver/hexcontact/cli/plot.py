@@ -64,7 +64,7 @@ def _help() -> str:
 
 
 def _kind(entry: Entry) -> str:
-    """Return what the FILE of a figure is: a result, a study or a table."""
+    """Return the kind of the FILE of a figure: a result, a study or a table."""
     return "study" if entry.of_a_study else "table" if entry.of_a_table else "result"
 
 

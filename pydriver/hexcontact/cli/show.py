@@ -108,7 +108,7 @@ def export(
         return
     result = open_result(file)
     steps = None if step is None else steps_of(step, labels_of(result))
-    # first what may be refused
+    # first the tables that may be refused
     written = write.histories_to_csv(result, folder, stem) if histories else []
     written += write.volumes_to_vtk(result, folder, stem) if vtk else []
     written += [write.to_vtk(result, folder, stem, steps, source)] if vtk else []

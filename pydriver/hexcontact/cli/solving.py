@@ -51,7 +51,7 @@ class Messages:
         return self.quiet or (self.log_level is not None and self.log_file is None)
 
     def interrupted(self, signaled: Interrupted, saved: str, **about: Any) -> NoReturn:
-        """Report what is saved after a signal and end the process, also while the core computes."""
+        """Report the saved steps after a signal and end the process, also while the core computes."""
         message = f"interrupted; {saved}"
         with contextlib.suppress(OSError):  # standard error may be closed
             log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))

@@ -31,7 +31,7 @@ _Zone = tuple[Array, Mask, bool]  # fields and zones of the core; whether it is 
 def tractions_memory(
     n_row: int, n_col: int, contact: int, sheared: bool, unlike: bool, threads: int = 0
 ) -> int:
-    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns."""
+    """Return the memory (bytes) of `ContactEdges.tractions`, besides its arguments and its result."""
     return int(flat.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
 
 
@@ -222,7 +222,7 @@ class ContactEdges:
     ) -> tuple[Array, float]:
         """Return the stress (Pa) that hats of the corrected tractions miss next to the edges.
 
-        `corrected` is what `tractions` returns; points are x, y and depth below the surface of the body (m).
+        `corrected` is the result of `tractions`; points are x, y and depth below the surface of the body (m).
         The share of the edge of the contact near them follows where the pressure does not vanish like a
         root, so that nothing is corrected.
         """

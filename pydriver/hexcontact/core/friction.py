@@ -62,14 +62,15 @@ class FrictionLaw:
     def as_arguments(self) -> tuple[Array, list[float]]:
         """Return coefficients and other numbers as the core takes them, with a largest number for inf."""
         most = np.finfo(float).max
-        law = [min(self.shear_limit, most), self.power, self.ratio, self.angle]
-        return np.minimum(np.ravel(self.coefficient), most), law
+        numbers = [min(getattr(self, field.name), most) for field in dataclasses.fields(self)[1:]]
+        return np.minimum(np.ravel(self.coefficient), most), numbers
 
     @property
     def limits(self) -> tuple[float | Array, float] | None:
         """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
-        plain = self.power == self.ratio == 1.0 and bool(np.isfinite(self.coefficient).all())
-        return (self.coefficient, self.shear_limit) if plain else None
+        plain = all(getattr(self, field.name) == field.default for field in dataclasses.fields(self)[2:])
+        finite = bool(np.isfinite(self.coefficient).all())
+        return (self.coefficient, self.shear_limit) if plain and finite else None
 
     def bound_at(self, row: int, col: int, pressure: float, traction: tuple[float, float]) -> float:
         """Return the largest traction of a node in the direction of a given one (Pa)."""
@@ -148,6 +149,8 @@ class ContactState(NormalSolution):
     residual_torque: float = 0.0
     sliding: bool = False
     cuts: int = 0
+    # a field of the table of variables needs no line above
+    __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
 
 class FrictionalContact(Contact):

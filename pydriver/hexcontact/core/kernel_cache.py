@@ -251,7 +251,7 @@ def _pruned(folder: Path, bound: int) -> int:
 
 
 def _maker() -> str:
-    """Identify what the bits of a spectrum depend on: program, processor, libraries for mathematics."""
+    """Identify what decides the bits of a spectrum: program, processor, libraries for mathematics."""
     from .._version import __version__
 
     core = Path(flat.LIBRARY).stat()

@@ -87,7 +87,7 @@ def _left_on_machine() -> int:
 
     with contextlib.suppress(psutil.Error, OSError):
         return int(psutil.virtual_memory().available)
-    return os.sysconf("SC_PHYS_PAGES") * mmap.PAGESIZE  # without /proc, which would tell how much is taken
+    return os.sysconf("SC_PHYS_PAGES") * mmap.PAGESIZE  # without /proc, which has the memory in use
 
 
 def _left_in_limits() -> Iterator[int]:
@@ -144,7 +144,7 @@ def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, 
 def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
     """Return limit less usage, without the file cache, which the kernel frees on demand."""
     allowed = _number_in(limit)
-    if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is what no machine has
+    if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is more than any machine has
         return None
     try:
         used, known = _number_in(usage), _read(statistics).split()

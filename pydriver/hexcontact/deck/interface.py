@@ -14,6 +14,7 @@ from pydantic import ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from ..arrays import Array
+from ..text import quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .table_base import Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, to_si
@@ -219,10 +220,29 @@ class Friction(Table):
         None, "bound of the shear traction, ❘q❘ ≤ min(μp, limit); none if absent", '"300 MPa"'
     )
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers of the law besides its coefficient, by their names in `core.friction.FrictionLaw`."""
+        return {} if self.shear_limit is None else {"shear_limit": self.shear_limit}
+
+    def __str__(self) -> str:
+        """Return the law in words."""
+        mu = self.coefficient
+        if isinstance(mu, NodalCoefficient):
+            law = f"coefficient {mu}" if mu.in_deck != FROM_PYTHON else "coefficient by node"
+            law += ", bilinear" * isinstance(mu.in_deck, dict)
+        elif isinstance(mu, TwoCoefficients):
+            law = f"coefficients {mu}"
+        else:
+            law = f"coefficient {mu:g}" if self.numbers or mu != math.inf else "no slip (coefficient inf)"
+        if self.shear_limit is not None:
+            law += f", shear traction of at most {quantity(self.shear_limit, 'Pa')}"
+        return law
+
 
 def coulomb(friction: Friction | None, interface: Interface | None) -> float | None:
     """Return the coefficient of friction; NaN if it is not the whole law; None without friction."""
     if friction is None:
         return math.nan if interface and interface.friction_limit else None
     mu = friction.coefficient
-    return mu if isinstance(mu, float) and (friction.shear_limit is None or not mu) else math.nan
+    return mu if isinstance(mu, float) and not (mu and friction.numbers) else math.nan

@@ -6,6 +6,7 @@ large as the tractions of the cycle, or 128 MiB.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -197,8 +198,6 @@ def _computed(
     energy: Array | None,
 ) -> dict[str, Array]:
     """Return the quantities of a parameter at some points; `energy` is that of Smith, Watson and Topper."""
-    young_modulus, nu = moduli["young_modulus"], moduli["poisson_ratio"]
-    numbers: list[Any] = [getattr(criteria, key) for key in NEEDS[name]]
     if name == "ruiz":
         assert slip is not None
         path = np.ascontiguousarray(np.moveaxis(slip, -1, 0))  # point, step, component
@@ -206,16 +205,12 @@ def _computed(
         return {"ruiz_f1": found.f1, "ruiz_f2": found.f2, "slip_amplitude": found.slip_amplitude}
     if name == "life":
         if energy is None:
-            energy = fatigue.smith_watson_topper(history, young_modulus, nu).value
-        return {name: fatigue.life(energy, young_modulus, *numbers)}
-    if name in ("crossland", "dang_van"):
-        return {name: getattr(fatigue, name)(history, *numbers)}
-    if name == "smith_watson_topper":
-        plane = fatigue.smith_watson_topper(history, young_modulus, nu)
-    elif name == "findley":
-        plane = fatigue.findley(history, *numbers)
-    else:
-        plane = fatigue.fatemi_socie(history, numbers[0], moduli["shear_modulus"], numbers[1])
+            energy = _by_name("smith_watson_topper", criteria, moduli, history).value
+        numbers = [getattr(criteria, key) for key in NEEDS[name]]
+        return {name: fatigue.life(energy, moduli["young_modulus"], *numbers)}
+    plane = _by_name(name, criteria, moduli, history)
+    if not isinstance(plane, fatigue.CriticalPlane):
+        return {name: plane}
     x, y, z = np.where(plane.value == 0.0, np.nan, plane.normal.T)
     x, y, z = np.where(x < 0.0, (-x, -y, -z), (x, y, z))  # of the two normals the one that points along x
     return {
@@ -223,6 +218,17 @@ def _computed(
         f"{name}_polar": np.arccos(np.clip(z, -1.0, 1.0)),
         f"{name}_azimuth": np.arctan2(y, x),
     }
+
+
+def _by_name(name: str, criteria: Criteria, moduli: Mapping[str, float], history: Array) -> Any:
+    """Call the function of a parameter with those of the moduli and constants that it takes."""
+    constants = {key.removeprefix(f"{name}_"): getattr(criteria, key) for key in NEEDS[name]}
+    return getattr(fatigue, name)(history, **constants, **_moduli_of(name, moduli))
+
+
+def _moduli_of(name: str, moduli: Mapping[str, float]) -> dict[str, float]:
+    """Return the moduli that a parameter depends on."""
+    return {key: moduli[key] for key in inspect.signature(getattr(fatigue, name)).parameters if key in moduli}
 
 
 def _surface_slip(lattice: Lattice, steps: Sequence[Fields], where: Region) -> Array:
@@ -246,12 +252,10 @@ def _about(key: str, criteria: Criteria, moduli: Mapping[str, float]) -> dict[st
         return {"long_name": meaning.long_name.format(MEANINGS[name].long_name), "units": meaning.units}
     meaning = MEANINGS[key]
     attributes = {k: value for k, value in meaning._asdict().items() if value}
-    constants = {name: getattr(criteria, name) for name in NEEDS.get(key, ())}
-    if key in ("smith_watson_topper", "life"):
-        constants |= {name: moduli[name] for name in ("young_modulus", "poisson_ratio")}
-    elif key == "fatemi_socie":
-        constants["shear_modulus"] = moduli["shear_modulus"]
-    return attributes | constants
+    if key not in NEEDS:
+        return attributes
+    constants = {name: getattr(criteria, name) for name in NEEDS[key]}
+    return attributes | constants | _moduli_of("smith_watson_topper" if key == "life" else key, moduli)
 
 
 def tabulated(where: Region, part: slice, history: Array, numbers: Sequence[int]) -> pandas.DataFrame:

@@ -226,7 +226,7 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
 
 
 def map_of(field: xarray.DataArray) -> str:
-    """Return the colors of a parameter: what is worst is bright."""
+    """Return the colors of a parameter: the worst value is bright."""
     return "viridis_r" if field.name == "life" else "viridis"
 
 

@@ -398,7 +398,7 @@ def field_map(
 ) -> Figure:
     """Draw a field over the contact area: tractions to the edges, others linear between the nodes.
 
-    What adds up over the load steps is also drawn where the contact was before.
+    Fields that add up over the load steps are also drawn where the contact was before.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ class LoadStep:
     """One load step, or a segment whose load steps are chosen during its solution."""
 
     index: int  # counts from 0 over the whole history
-    segment: int  # counts from 0; each turn of a repeated path is a segment of its own
+    segment: int  # counts from 0; each turn of a repeated path is one segment
     label: str  # name of the segment, may be empty
     z: Target  # targets of the normal motion, the two tangential ones and the rotation about z
     x: Target

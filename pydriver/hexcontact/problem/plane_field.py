@@ -411,7 +411,7 @@ class PlaneField:
         if self.rule is GAP and (abs(values[np.isfinite(values)]) > LARGEST).any():
             raise DeckError(f"{key}: expected lengths of at most {LARGEST:g} m, {_OR_OPEN}")
         ours = isinstance(source, np.ndarray | HeightMap | Separation)
-        return values if ours else values.copy()  # a function may keep, and change, what it returns
+        return values if ours else values.copy()  # a function may keep, and change, its result
 
     def _refuse(self, values: Array, bad: Mask, x: Array, y: Array) -> None:
         """Refuse values at the first of some points."""
@@ -464,11 +464,9 @@ class FrictionField:
 
     def __init__(self, friction: Friction | None, interface: Interface | None = None) -> None:
         mu: Any = friction.coefficient if friction else 0.0
-        numbers: dict[str, float] = {}
+        numbers = friction.numbers if friction else {}
         if friction is None and interface and (limit := interface.friction_limit):
             mu, numbers["power"] = limit
-        if friction and friction.shear_limit is not None:
-            numbers["shear_limit"] = friction.shear_limit
         if isinstance(mu, TwoCoefficients):
             mean = math.sqrt(mu.along * mu.across)
             numbers |= {"ratio": mu.along / mu.across, "angle": mu.angle}

@@ -146,7 +146,7 @@ LIMITS = (
 """All limits, in the order of the warnings."""
 
 _OPEN = (-math.inf, math.inf)
-_CORNERS = ("points", "line", "plane")  # keys of a region with depths of its own
+_CORNERS = ("points", "line", "plane")  # keys of a region that has depths
 _ASSUMED = 0.5  # Q/mu P of shear that is prescribed by a motion: a ring of a fifth of the radius
 _NOTICED = 0.2  # Q/mu P below which slip dissipates next to no energy
 _ALIKE = 0.02  # beta up to which the shear of pressing is less than 1.5 % of the pressure

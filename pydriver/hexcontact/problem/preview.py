@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from ..core.lattice import Lattice
-from ..deck.interface import FROM_PYTHON, NodalCoefficient, TwoCoefficients
 from ..deck.keys import Body, Bulk
 from ..deck.kinds import Quantity
 from ..deck.surfaces import Surface
@@ -175,18 +174,7 @@ def law_in_words(case: Problem) -> str:
     if friction is None and layer and layer.friction_limit:
         exponent = layer.friction_exponent or layer.exponent
         return f"limit {layer.friction_coefficient:.6g} Pa/m^{exponent:g} ψ^{exponent:g} of the interface"
-    mu: Any = friction.coefficient if friction else 0.0
-    if isinstance(mu, NodalCoefficient):
-        law = f"coefficient {mu}" if mu.in_deck != FROM_PYTHON else "coefficient by node"
-        law += ", bilinear" * isinstance(mu.in_deck, dict)
-    elif isinstance(mu, TwoCoefficients):
-        law = f"coefficients {mu}"
-    else:
-        unbounded = mu == math.inf and math.isinf(case.friction_coefficient)
-        law = "no slip (coefficient inf)" if unbounded else f"coefficient {mu:g}"
-    if friction is None or friction.shear_limit is None:
-        return law
-    return f"{law}, shear traction of at most {quantity(friction.shear_limit, 'Pa')}"
+    return str(friction)
 
 
 def _method(case: Problem, lattice: Lattice) -> str:

@@ -214,7 +214,7 @@ class Problem:
     def solved_pair(self) -> ElasticPair:
         """Compliances of the bodies; in a full contact a billionth of that of the interface at the most.
 
-        Half-spaces that carry the same tractions everywhere move as a whole; what is left keeps the operators
+        Half-spaces that carry the same tractions everywhere move as a whole; the rest keeps the operators
         regular.
         """
         pair = self.pair

@@ -1,1 +1,1 @@
-"""What a run leaves: load steps, the result file and its journal, tables and exports made from them."""
+"""Results of a run: load steps, the result file and its journal, tables and exports made from them."""

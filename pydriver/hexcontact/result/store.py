@@ -1,6 +1,6 @@
 """The store of a run: a journal of finished steps, from which the result file is made.
 
-While a run continues, each finished step is a small file of its own in the journal beside the output
+While a run continues, each finished step is a small file in the journal beside the output
 (``out.nc.d/000012.npz``), with all its fields, written under a temporary name, flushed to disk and renamed.
 ``out.nc`` is assembled from the records, one step in memory at a time, and only replaced as a whole. So a run
 that is killed at any moment loses at most its present step, and the earlier ``out.nc`` is readable.
@@ -175,7 +175,7 @@ class Store:
     def _read_again(self, began: float | None) -> Step | None:
         """Read all records, so that damage shows before the next step; return the last one.
 
-        The time at which the run `began` tells whether a complete output is its own if it left no records.
+        The time at which the run `began` shows whether a complete output is its own if it left no records.
         """
         journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
         left = trials.metadata if trials else None

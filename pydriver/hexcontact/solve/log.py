@@ -134,7 +134,7 @@ class _File(logging.FileHandler):
 
 
 class _Stream(logging.StreamHandler[IO[str]]):
-    """Writes to standard error, also if its reader is gone."""
+    """Writes to standard error, also if its reader has ended."""
 
     def handleError(self, record: logging.LogRecord) -> None:
         pass

@@ -75,7 +75,7 @@ class Session:
     output : path, optional
         netCDF file to write. Without it all steps are in memory.
     overwrite : bool
-        Replace an output that is there already.
+        Replace an output that exists.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Backend that runs the cases of a study in processes of this machine.
 
-Each thread has a process of its own, so that a process that dies (mostly out of memory) loses one known case.
+Each thread has one process, so that a process that dies (mostly out of memory) loses one known case.
 Processes block signals; the parent ends them.
 """
 

@@ -17,7 +17,7 @@
 !> same area.
 !>
 !> Theory: docs/direct_method.md.
-module hc_written_iteration
+module hc_dissertation_iteration
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
@@ -212,4 +212,4 @@ contains
     self%sums = reshape([self%sums, now], [2, size(self%sums, 2) + 1])
   end subroutine add
 
-end module hc_written_iteration
+end module hc_dissertation_iteration

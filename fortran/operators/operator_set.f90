@@ -3,7 +3,7 @@
 !> A field with several components is one vector, one component after the other.
 !>
 !> Equations: docs/theory/discretisation.md, (D4); docs/theory/preconditioner.md.
-module hc_elastic_operators
+module hc_operator_set
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
@@ -140,4 +140,4 @@ contains
     call self%tangential%clear()
   end subroutine clear
 
-end module hc_elastic_operators
+end module hc_operator_set

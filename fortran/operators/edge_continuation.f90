@@ -12,7 +12,7 @@
 !> 1 - sqrt(ring/(rings + 1)).
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
-module hc_preconditioner_extension
+module hc_edge_continuation
   use hc_precision, only: wp, sp
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbors
@@ -440,4 +440,4 @@ contains
     !$omp end do
   end subroutine add_up
 
-end module hc_preconditioner_extension
+end module hc_edge_continuation

@@ -1,4 +1,4 @@
-!> Amplitude and mean of a stress path by invariants: Crossland and Dang Van.
+!> Fatigue criteria of stress invariants: Crossland, Dang Van.
 !>
 !> A stress is (xx, yy, zz, xy, yz, xz), tension positive [Pa]. In the coordinates
 !>
@@ -7,7 +7,7 @@
 !> of the deviator S the distance from the origin is sqrt(J2). The amplitude sqrt(J2,a) of a path is the radius of the
 !> smallest ball around it, and the center of this ball is its mean (I. V. Papadopoulos et al., Int. J. Fatigue 19 (1997)
 !> 219-235).
-module hc_stress_path
+module hc_invariant_criteria
   use hc_precision, only: wp, pi
   use hc_smallest_ball, only: find_smallest_ball
   implicit none
@@ -97,4 +97,4 @@ contains
     end do
   end function dang_van
 
-end module hc_stress_path
+end module hc_invariant_criteria

@@ -21,14 +21,11 @@ class lines {
   }
 
   void transform(const T *in, T *out) const {
-    for (std::size_t line = 0; line < count_; ++line, in += 2 * n_, out += 2 * n_) {
-      if (lanes_ == 8) in_lanes<8>(in, out);
-      else if (lanes_ == 4) in_lanes<4>(in, out);
-      else {
-        std::copy(in, in + 2 * n_, out);
-        short_.exec(reinterpret_cast<pocketfft::detail::cmplx<T> *>(out), T(1), pocketfft::detail::FORWARD);
-      }
-    }
+    if (lanes_ == 8) return in_lanes<8>(in, out);
+    if (lanes_ == 4) return in_lanes<4>(in, out);
+    std::copy(in, in + 2 * n_ * count_, out);
+    for (std::size_t line = 0; line < count_; ++line, out += 2 * n_)
+      short_.exec(reinterpret_cast<complex<T> *>(out), T(1), pocketfft::detail::FORWARD);
   }
 
  private:
@@ -162,16 +159,27 @@ class lines {
 
   template <std::size_t L>
   void in_lanes(const T *in, T *out) const {
-    using V = typename lanes_of<T, L>::type;
+    pocketfft::detail::arr<complex<typename lanes_of<T, L>::type>> y(m_);
+    for (std::size_t line = 0; line < count_; ++line, in += 2 * n_, out += 2 * n_) {
+      take<L>(in, y.data());
+      short_.exec(y.data(), T(1), pocketfft::detail::FORWARD);
+      join<L>(y.data(), out);
+    }
+  }
+
+  template <std::size_t L, typename V>
+  void take(const T *in, complex<V> *y) const {
     using U = typename lanes_of<T, L>::unaligned;
-    pocketfft::detail::arr<complex<V>> y(m_);
     for (std::size_t k = 0; k < m_; ++k, in += 2 * L) {
       V r = load<U>(in), i = load<U>(in + L);
       unzip(r, i);
       y[k] = complex<V>(r, i);
     }
-    short_.exec(y.data(), T(1), pocketfft::detail::FORWARD);
+  }
 
+  template <std::size_t L, typename V>
+  void join(const complex<V> *y, T *out) const {
+    using U = typename lanes_of<T, L>::unaligned;
     const T *w = twiddle_.data();
     for (std::size_t k = 0; k < m_; k += L) {
       const std::size_t width = std::min(L, m_ - k);

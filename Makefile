@@ -60,7 +60,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package wheel wheel-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -194,6 +194,16 @@ wheel-check: wheel $(STAMPS)/extra-test  ## Fortran unit tests on its build, and
 	@$(pip) install --quiet --no-deps --target $(WHEEL_SITE) build/wheelhouse/*.whl
 	@cp .ci/sitecustomize.py $(WHEEL_SITE)
 	@PYTHONPATH=$(CURDIR)/$(WHEEL_SITE) $(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
+
+# Lower bounds of pyproject.toml, without what tests and builds need.
+OLDEST := build/oldest
+oldest-check: install $(STAMPS)/extra-test  ## the tests of make check with the oldest dependencies that pyproject.toml admits
+	@rm -rf $(OLDEST) && $(py) -m venv $(OLDEST)
+	@$(py) -c "import tomllib; p = tomllib.load(open('pyproject.toml', 'rb'))['project']; print('\n'.join(w.replace('>=', '==') for w in p['dependencies'] + p['optional-dependencies']['dask']))" > $(OLDEST)/oldest.txt
+	@$(OLDEST)/bin/python -m pip install --quiet -r $(OLDEST)/oldest.txt -r $(STAMPS)/extra-test.txt -c $(OLDEST)/oldest.txt
+	@mkdir $(OLDEST)/site && cp -r pydriver/hexcontact $(OLDEST)/site
+	@cp $(BUILD)/pydriver/_core*.so $(BUILD)/pydriver/flat.py $(OLDEST)/site/hexcontact/core/
+	@PYTHONPATH=$(CURDIR)/$(OLDEST)/site $(OLDEST)/bin/python -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 
 # --- development -------------------------------------------------------------
 

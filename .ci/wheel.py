@@ -1,7 +1,8 @@
 """Build a wheel that holds the libraries it needs: ``make wheel``.
 
-pip builds it with pocketfft, auditwheel copies the shared libraries into it and names the systems that it runs on. Licences
-of the copies are added; a library that is not in `NOTICES` is an error. The wheel goes to build/wheelhouse.
+pip builds it with pocketfft, auditwheel copies the shared libraries into it and names the systems that it
+runs on. Licences of the copies are added; a library that is not in `NOTICES` is an error. The wheel goes to
+build/wheelhouse.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ NOTICES = {
     "libgomp": GCC,
     "libgcc_s": GCC,
     "libquadmath": (
-        "of GCC, under the GNU Lesser General Public License 2.1 or later: a separate shared library, which may be "
-        "replaced by another version; its source is libquadmath of https://gcc.gnu.org"
+        "of GCC, under the GNU Lesser General Public License 2.1 or later: a separate shared library, which "
+        "may be replaced by another version; its source is libquadmath of https://gcc.gnu.org"
     ),
     "libopenblas": (
         "OpenBLAS, Copyright (c) 2011-2014, The OpenBLAS Project, under the BSD-3-Clause licence; "
-        "LAPACK in it, Copyright (c) 1992-2013 The University of Tennessee and others, under the modified BSD licence; "
-        "https://github.com/OpenMathLib/OpenBLAS"
+        "LAPACK in it, Copyright (c) 1992-2013 The University of Tennessee and others, under the modified BSD "
+        "licence; https://github.com/OpenMathLib/OpenBLAS"
     ),
 }
 """Where the libraries come from and their licences, by the beginning of the file's name."""
@@ -49,11 +50,19 @@ def run(*words: str | Path, folder: Path = ROOT) -> str:
 def built(folder: str, scratch: Path) -> Path:
     """Return the wheel that pip builds, with what the build folder has."""
     settings = [f"-Cbuild-dir={folder}"]
-    settings += [
-        f"-Csetup-args={word}"
-        for word in ("-Dfft=pocketfft", "-Dopenmp=enabled", "-Dtests=true")
-    ]
-    run(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", *settings, "-w", scratch, ".")
+    settings += [f"-Csetup-args={word}" for word in ("-Dfft=pocketfft", "-Dopenmp=enabled", "-Dtests=true")]
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-build-isolation",
+        "--no-deps",
+        *settings,
+        "-w",
+        scratch,
+        ".",
+    )
     [path] = scratch.glob("*.whl")
     return path
 

@@ -2,8 +2,8 @@
 
     python tests/bench/transforms.py FOLDER FOLDER
 
-Each folder holds a package hexcontact (of `pip install --target`). Processes of one thread alternate; the least processor
-time of all turns counts. Prints rows for docs/tuning.md and the largest difference of the pressures.
+Each folder holds a package hexcontact (of `pip install --target`). Processes of one thread alternate; the least
+processor time of all turns counts. Prints rows for docs/tuning.md and the largest difference of the pressures.
 """
 
 from __future__ import annotations
@@ -18,7 +18,12 @@ from typing import Any
 
 SPACINGS = 18.7 / 51
 """Spacings in the contact radius, over the side: half of the window is in contact."""
-TASKS = [(31, "without friction"), (128, "without friction"), (512, "without friction"), (128, "10 steps with friction")]
+TASKS = [
+    (31, "without friction"),
+    (128, "without friction"),
+    (512, "without friction"),
+    (128, "10 steps with friction"),
+]
 TURNS = 7
 
 
@@ -60,12 +65,18 @@ def main() -> None:
             for which, folder in enumerate(sys.argv[1:3]):
                 words = [sys.executable, __file__, "solve", str(side), kind]
                 environment = os.environ | {"PYTHONPATH": folder, "OMP_NUM_THREADS": "1"}
-                answer = json.loads(subprocess.run(words, env=environment, check=True, stdout=subprocess.PIPE).stdout)
+                answer = json.loads(
+                    subprocess.run(words, env=environment, check=True, stdout=subprocess.PIPE).stdout
+                )
                 times[which].append(answer["seconds"])
                 found[which] = answer["pressure"]
         first, second = map(min, times)
         apart = max(abs(a - b) for a, b in zip(*found, strict=True))
-        print(f"| {side} × {side} | {kind} | {1e3 * first:.3g} | {1e3 * second:.3g} | {second / first:.2f} | {apart:.0e} |", flush=True)
+        print(
+            f"| {side} × {side} | {kind} | {1e3 * first:.3g} | {1e3 * second:.3g} "
+            f"| {second / first:.2f} | {apart:.0e} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

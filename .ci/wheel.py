@@ -31,8 +31,8 @@ NOTICES = {
     ),
     "libopenblas": (
         "OpenBLAS, Copyright (c) 2011-2014, The OpenBLAS Project, under the BSD-3-Clause licence; "
-        "LAPACK in it, Copyright (c) 1992-2013 The University of Tennessee and others, under the modified BSD "
-        "licence; https://github.com/OpenMathLib/OpenBLAS"
+        "LAPACK in it, Copyright (c) 1992-2013 The University of Tennessee and others, under the modified "
+        "BSD licence; https://github.com/OpenMathLib/OpenBLAS"
     ),
 }
 """Where the libraries come from and their licences, by the beginning of the file's name."""

@@ -2,8 +2,8 @@
 
     python tests/bench/transforms.py FOLDER FOLDER
 
-Each folder holds a package hexcontact (of `pip install --target`). Processes of one thread alternate; the least
-processor time of all turns counts. Prints rows for docs/tuning.md and the largest difference of the pressures.
+Each folder holds a package hexcontact (of `pip install --target`). Processes of one thread alternate; the
+least processor time of all turns counts. Prints rows for docs/tuning.md with the largest difference of pressures.
 """
 
 from __future__ import annotations

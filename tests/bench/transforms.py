@@ -3,7 +3,7 @@
     python tests/bench/transforms.py FOLDER FOLDER
 
 Each folder holds a package hexcontact (of `pip install --target`). Processes of one thread alternate; the
-least processor time of all turns counts. Prints rows for docs/tuning.md with the largest difference of pressures.
+least processor time of all turns counts. Prints rows for docs/tuning.md.
 """
 
 from __future__ import annotations

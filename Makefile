@@ -19,6 +19,8 @@ COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
 PERTURBED_BUILD := build/perturbed
 PERTURBED_SITE := build/perturbed-site
+WHEEL_BUILD := build/wheel
+WHEEL_SITE := build/wheel-site
 FLANG := flang-22
 FLANG_BUILD := build/flang
 
@@ -58,7 +60,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -181,6 +183,27 @@ coverage-report:
 
 package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build them and use them outside the checkout
 	@$(py) .ci/package.py
+
+# With pocketfft, so that nothing in it is under the GPL but what GCC's runtime exception covers.
+wheel: $(STAMPS)/build-tools $(STAMPS)/extra-wheel  ## a wheel that needs no compiler, BLAS or FFTW, in build/wheelhouse
+	@$(py) .ci/wheel.py $(WHEEL_BUILD)
+
+wheel-check: wheel $(STAMPS)/extra-test  ## Fortran unit tests on its build, and the tests of make check on the wheel itself
+	@meson test -C $(WHEEL_BUILD) --print-errorlogs
+	@rm -rf $(WHEEL_SITE)
+	@$(pip) install --quiet --no-deps --target $(WHEEL_SITE) build/wheelhouse/*.whl
+	@cp .ci/sitecustomize.py $(WHEEL_SITE)
+	@PYTHONPATH=$(CURDIR)/$(WHEEL_SITE) $(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
+
+# Lower bounds of pyproject.toml, without what tests and builds need.
+OLDEST := build/oldest
+oldest-check: install $(STAMPS)/extra-test  ## the tests of make check with the oldest dependencies that pyproject.toml admits
+	@rm -rf $(OLDEST) && $(py) -m venv $(OLDEST)
+	@$(py) -c "import tomllib; p = tomllib.load(open('pyproject.toml', 'rb'))['project']; print('\n'.join(w.replace('>=', '==') for w in p['dependencies'] + p['optional-dependencies']['dask']))" > $(OLDEST)/oldest.txt
+	@$(OLDEST)/bin/python -m pip install --quiet -r $(OLDEST)/oldest.txt -r $(STAMPS)/extra-test.txt -c $(OLDEST)/oldest.txt
+	@mkdir $(OLDEST)/site && cp -r pydriver/hexcontact $(OLDEST)/site
+	@cp $(BUILD)/pydriver/_core*.so $(BUILD)/pydriver/flat.py $(OLDEST)/site/hexcontact/core/
+	@PYTHONPATH=$(CURDIR)/$(OLDEST)/site $(OLDEST)/bin/python -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 
 # --- development -------------------------------------------------------------
 

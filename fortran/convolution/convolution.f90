@@ -218,7 +218,7 @@ contains
                          self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
     call unlock(fftw_planner)
     if (.not. (c_associated(self%held%plans%row) .and. c_associated(self%held%plans%column))) then
-      call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
+      call raise(error, status%resources, 'the transforms of this window cannot be planned; use another window')
     end if
   end subroutine make_plans
 

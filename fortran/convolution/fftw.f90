@@ -1,4 +1,4 @@
-!> The few procedures of FFTW 3 that the library calls, and good transform sizes.
+!> The few procedures of FFTW 3 that the library calls, by FFTW or by pocketfft.cpp (-Dfft=pocketfft), and good transform sizes.
 module hc_fftw
   use, intrinsic :: iso_c_binding, only: c_int, c_ptr, ck => c_double_complex
   use hc_precision, only: wp

@@ -176,8 +176,8 @@ class Procedure:
         return f"{name} != 0" if given.kind == "flag" else name
 
 
-def main(source: str, fortran: str, python: str) -> None:
-    """Write both files."""
+def main(source: str, fortran: str, python: str, built: str = "") -> None:
+    """Write both files; the one of Python keeps what the core was built with."""
     table = tomllib.loads(Path(source).read_text())
     kinds = table["kinds"] | {name: kind_of(name, record) for name, record in table["records"].items()}
     rows = [Procedure(name, row, kinds) for name, row in table["procedures"].items()]
@@ -191,7 +191,7 @@ def main(source: str, fortran: str, python: str) -> None:
     Path(fortran).write_text("\n".join([*text, *(row.fortran() for row in rows), "end module hc_flat\n"]))
     lines = ["from typing import NamedTuple\n\nimport numpy as np\n\nfrom . import _core"]
     lines += ["from .calls import called, flattened, record, shaped\n\n_flat = _core.hc_flat"]
-    lines += ["LIBRARY = str(_core.__file__)\n"]
+    lines += [f"LIBRARY = str(_core.__file__)\nBUILT = {built!r}\n"]
     for kind, row in table["records"].items():
         numbers = [f"    {n.name}: {NUMBER[n.kind][2]}  # [{n.unit}]" for n in parsed(row["numbers"])]
         lines += [f'\nclass {kind}(NamedTuple):\n    """{row["does"]}"""\n', *numbers, ""]

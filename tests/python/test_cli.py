@@ -409,6 +409,11 @@ def test_check_says_what_would_be_run(deck: Path) -> None:
 
 def test_help_and_version(tmp_path: Path) -> None:
     assert hexcontact_(tmp_path, "--version").stdout == f"hexcontact {hexcontact.__version__}\n"
+    told = hexcontact_(tmp_path, "--version", "--verbose").stdout
+    assert re.search(
+        r"FFT: (fftw3|pocketfft) \d.*BLAS: \w+ \d.*OpenMP: (yes|no)\n  threads: \d+\n", told, re.DOTALL
+    )
+    assert f"numpy {np.__version__}\n" in told
     overall = hexcontact_(tmp_path, "--help").stdout
     for command in ("run", "check", "new", "info", "plot", "verify"):
         assert command in overall

@@ -181,6 +181,19 @@ def test_every_dependency_has_its_reason() -> None:
     assert {name for name in names if f"| {name} |" not in page} == set()
 
 
+@pytest.mark.parametrize("recipe", ["conda/recipe.yaml", "spack/package.py"])
+def test_recipes_have_the_bounds_of_the_project(recipe: str) -> None:
+    text = (ROOT / "packaging" / recipe).read_text().replace("matplotlib-base", "matplotlib")
+    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    found = re.findall(r"^ +- ([\w-]+) >=([\d.]+)$|\"py-([\w-]+)@([\d.]+):\"\)$", text, re.MULTILINE)
+    assert {canonical(word): word.partition(">=")[2] for word in wanted} == {
+        canonical(conda or spack): bound or bound_of_spack
+        for conda, bound, spack, bound_of_spack in found
+        if (conda, bound) not in {("meson-python", "0.17"), ("numpy", "2.0")}
+    }
+    assert hexcontact.__version__ in text
+
+
 def test_every_package_that_is_imported_is_a_dependency() -> None:
     trees = [ast.parse(path.read_text()) for path in (ROOT / "pydriver").rglob("*.py")]
     nodes = [node for tree in trees for node in ast.walk(tree)]

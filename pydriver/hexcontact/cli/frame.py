@@ -435,13 +435,31 @@ def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Ca
 def _print_version(wanted: bool) -> None:
     if wanted:
         print(f"hexcontact {__version__}")
+        if "--verbose" in sys.argv:
+            _print_build()
         raise typer.Exit()
+
+
+def _print_build() -> None:
+    """Print compiler, libraries, threads, and the versions of packages."""
+    import platform
+    from importlib import metadata
+
+    from ..core import flat, memory
+
+    print("core", *flat.BUILT.split("; "), f"threads: {memory.threads()}", flat.LIBRARY, sep="\n  ")
+    packages = ("numpy", "scipy", "netCDF4", "xarray", "pandas", "pydantic", "matplotlib")
+    versions = (f"{name} {metadata.version(name)}" for name in packages)
+    print(f"Python {platform.python_version()}", *versions, sep="\n  ")
 
 
 @app.callback(epilog=f"Example: {_EXAMPLE}")
 def _hexcontact(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="With --version: compiler, FFT, BLAS, threads, packages, too.")
     ] = False,
 ) -> None:
     """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.

@@ -2,5 +2,6 @@
 from typing import Any
 
 LIBRARY: str
+BUILT: str
 
 def __getattr__(name: str) -> Any: ...

@@ -49,7 +49,8 @@ def drawing(ax: Axes | None, width: float, height: float, equal: bool = False) -
     New axes may be for equal scales of x and y.
     """
     if ax is not None:
-        return cast(Figure, ax.get_figure(root=True)), ax
+        # of a subfigure, the whole figure; get_figure(root=True) came with matplotlib 3.10
+        return cast(Any, ax.figure).figure, ax
     figure = Figure(figsize=(width, height), layout="compressed" if equal else "constrained")
     return figure, figure.add_subplot()
 

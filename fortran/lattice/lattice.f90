@@ -6,8 +6,7 @@
 !>
 !> so that any pair of basis vectors gives a regular triangulation with the
 !> three edge directions basis(:, 1), basis(:, 2) and basis(:, 2) - basis(:, 1).
-!> The 60-degree lattice of the dissertation, eq. (5.1), is the default; no
-!> other module depends on its angle. A window is the rhombus of nodes in
+!> The 60-degree lattice of the dissertation, eq. (5.1), is the default. A window is the rhombus of nodes in
 !> memory; a field over it is an array of shape (n_col, n_row).
 !>
 !> Equations: docs/theory/discretisation.md, (D1), (D2).
@@ -19,7 +18,7 @@ module hc_lattice
   implicit none
   private
 
-  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors, floor_half
+  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, oblique_basis, edge_directions, neighbors, floor_half
 
   !> Steps in column and row to the six neighbors of a node, along the edges of the triangulation.
   integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
@@ -44,6 +43,8 @@ module hc_lattice
     procedure :: cell_area
     !> Length of the longest edge of the triangulation [m]
     procedure :: spacing => lattice_spacing
+    !> Columns and rows per length across them [1/m]
+    procedure :: lines_per_length
     !> Coordinates of every node of the window, and of those of one row [m]
     procedure :: coordinates, row_coordinates
     !> The lattice of every second node of this one
@@ -110,6 +111,26 @@ contains
     basis(:, 2) = spacing*[0.5_wp, 0.5_wp*sqrt(3.0_wp)]
   end function equilateral_basis
 
+  !> Return a basis with its first vector along x; that of the equilateral lattice at a ratio of 1 and 60 degrees.
+  pure function oblique_basis(spacing, ratio, angle) result(basis)
+    !> Length of the first vector [m], of the second one over it, and angle of the second one from x [rad]
+    real(wp), intent(in) :: spacing, ratio, angle
+    !> Basis vectors as columns [m]
+    real(wp) :: basis(2, 2)
+
+    basis = spacing*rounded(reshape([1.0_wp, 0.0_wp, ratio*cos(angle), ratio*sin(angle)], [2, 2]))
+  end function oblique_basis
+
+  !> Return a basis in spacings, that of the equilateral lattice to the bit if it differs by rounding errors only.
+  pure function rounded(basis)
+    !> Basis vectors as columns
+    real(wp), intent(in) :: basis(2, 2)
+    real(wp) :: rounded(2, 2)
+
+    rounded = basis
+    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) rounded = equilateral_basis(1.0_wp)
+  end function rounded
+
   !> Return the three edge directions of the triangulation, as columns [m].
   pure function edge_directions(basis) result(edges)
     !> Basis vectors as columns [m]
@@ -139,6 +160,13 @@ contains
     class(lattice_t), intent(in) :: self
     lattice_spacing = maxval(norm2(edge_directions(self%basis), dim=1))
   end function lattice_spacing
+
+  !> Return how many columns and rows a straight line across them meets per length [1/m].
+  pure function lines_per_length(self) result(lines)
+    class(lattice_t), intent(in) :: self
+    real(wp) :: lines(2)
+    lines = norm2(self%basis(:, 2:1:-1), dim=1)/self%cell_area()
+  end function lines_per_length
 
   !> Compute the coordinates of all nodes of the window.
   pure subroutine coordinates(self, x, y)
@@ -175,8 +203,7 @@ contains
     class(lattice_t), intent(in) :: self
     real(wp) :: basis(2, 2)
 
-    basis = self%basis/self%spacing()
-    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) basis = equilateral_basis(1.0_wp)
+    basis = rounded(self%basis/self%spacing())
   end function unit_basis
 
   !> Return the lattice of every second node: node (i, j) of it is node (2 i, 2 j) of this one; nodes

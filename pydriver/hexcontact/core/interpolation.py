@@ -62,6 +62,7 @@ def section_ends(
 
 def crossings(lattice: Lattice, start: Point, end: Point) -> Array:
     """Return where a line crosses edges of triangles, as distances from its start (m), with its ends."""
-    most = 8 + int(4.0 * math.dist(start, end) / lattice.spacing)  # rows are sqrt(3)/2 spacings apart
+    lines = np.linalg.norm(np.linalg.inv(lattice.basis), axis=0)  # columns and rows per length across them
+    most = 8 + int(2.0 * math.dist(start, end) * lines.sum())
     distance, count = flat.crossings_of_line(lattice, start, end, most)
     return np.asarray(distance[:count])

@@ -32,7 +32,7 @@ module hc_staggered_newton
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: precondition_constraints, satisfy_constraints, step_ahead, solution_accurate
-  use hc_projected_cg, only: projected_cg
+  use hc_step_equation, only: solve_step_equation
   implicit none
   private
 
@@ -170,7 +170,7 @@ contains
       else
         scale = now%problem%normal_compliance*scale
       end if
-      call projected_cg(now%pressure, nodes, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
+      call solve_step_equation(now%pressure, nodes, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
@@ -260,7 +260,7 @@ contains
         goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
                                                               now%pressure_feels_shear)))
         goal = max(goal, options%final_accuracy*now%tolerance)
-        call projected_cg(now%shear, nodes, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
+        call solve_step_equation(now%shear, nodes, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
                           residual, iterations, outcome, error, drift)
         if (allocated(error)) return
         if (drift > options%displacement_rounding*scale) call displace(now, x, ax, error)

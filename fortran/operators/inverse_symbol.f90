@@ -100,7 +100,8 @@ contains
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
     call new_pyramid(pyramid, lattice%basis)
-    self%self_compliance = pair%lambda_1*pyramid%normal_kernel(0.0_wp, 0.0_wp)
+    ! K1(0) to three decimals: a preconditioner needs no more
+    self%self_compliance = self%unit*(anint(1.0e3_wp*pyramid%normal_kernel(0.0_wp, 0.0_wp)/lattice%spacing())/1.0e3_wp)
     self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
     key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
     call self%convolution%find_spectra(found, error, cache, key)

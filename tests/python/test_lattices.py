@@ -1,4 +1,4 @@
-"""Lattices with other cells than equilateral triangles: square, flat and oblique ones, to the same accuracy."""
+"""Lattices with square, flat and oblique cells, to the accuracy of the equilateral one."""
 
 import math
 from pathlib import Path
@@ -22,7 +22,7 @@ CELLS = {"equilateral": (1.0, 60), "square": (1.0, 90), "flat": (0.5, 90), "obli
 
 
 def sphere(cells: str, spacings: float, **arguments) -> Case:
-    """Hertz's contact on cells as large as those of an equilateral lattice with some spacings in the radius."""
+    """Hertz's contact on cells as large as equilateral ones with some spacings in the radius."""
     ratio, angle = CELLS[cells]
     spacing = RADIUS / spacings * math.sqrt(math.sqrt(0.75) / (ratio * math.sin(math.radians(angle))))
     grid = {"spacing": spacing, "cell_ratio": ratio, "cell_angle": f"{angle} deg"}
@@ -75,7 +75,8 @@ def test_stress_beside_the_edge(cells: str) -> None:
         _, [known] = fields.at_points(fine, loads, 1, 0.3, points)
         loads = np.array([[hats, MU * hats, 0 * hats]])
         _, [found] = fields.at_points(step.lattice, loads, 1, 0.3, points)
-        more, refused = edges.stress(np.array([MU * nodal[0], 0 * nodal[0]]), none, law, loads[0], 1, 0.3, points)
+        shear = np.array([MU * nodal[0], 0 * nodal[0]])
+        more, refused = edges.stress(shear, none, law, loads[0], 1, 0.3, points)
         plane = [0, 1, 3] if depth == 0.0 else slice(None)
         assert refused == 0.0
         assert abs(found + more - known)[:, plane].max() < 6e-3 * p0
@@ -99,7 +100,9 @@ def test_the_file_and_the_deck_in_it_have_the_lattice(tmp_path: Path) -> None:
     usual = case.changed(cell_angle="60 deg", cell_ratio=1.0)
     assert usual.lattice.pattern == Lattice(1.0, 0, 0, 1, 1).pattern
     lattice = Lattice(1e-4, -9, -9, 19, 19, (1e-5, 0.0), 0.7, 1.3)
-    given = Case(body_1=STEEL, body_2=STEEL, gap=lambda x, y: 25 * (x**2 + y**2), lattice=lattice, approach=5e-6)
+    given = Case(
+        body_1=STEEL, body_2=STEEL, gap=lambda x, y: 25 * (x**2 + y**2), lattice=lattice, approach=5e-6
+    )
     assert given.lattice == lattice
     assert given.deck.grid.cell_angle == 1.3
 
@@ -112,7 +115,7 @@ def test_the_basis_is_that_of_the_equilateral_lattice_to_the_bit() -> None:
 
 
 def test_the_operator_is_that_of_turned_cells() -> None:
-    """A square lattice under a quarter turn: the response along y to a load along y is that along x to one along x."""
+    """On a square lattice the response along y to a load along y is that along x to one along x."""
     lattice = Lattice(1.0, -4, -4, 9, 9, cell_angle=math.pi / 2)
     operator = FlexibilityOperator(lattice, ElasticPair(1.0, 0.3, 0.5))
     load, none = np.zeros((9, 9)), np.zeros((9, 9))

@@ -147,7 +147,7 @@ class Grid(Table):
     center: Point | None = meaning(None, "middle of the window; where the bodies touch first if absent")
     origin: Point = meaning((0.0, 0.0), "a point of the plane that is a node")
     cell_ratio: Annotated[float, Quantity(NUMBER, at_least=0.25, at_most=4.0)] = meaning(
-        1.0, "distance of neighboring nodes along the second basis vector of the lattice over the spacing", "0.5"
+        1.0, "distance of nodes along the second basis vector of the lattice over the spacing", "0.5"
     )
     cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] = meaning(
         math.pi / 3, "angle of the second basis vector from x; 60 deg: the equilateral lattice", '"90 deg"'

@@ -305,8 +305,8 @@ def pattern_of(grid: Grid) -> Pattern:
 def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Lattice:
     """Return the window of a deck, given an estimate of the contact.
 
-    ``extent = "auto"`` is the smallest parallelogram about the estimated contact (its bounds plus the coarse cell
-    with the edge) with a margin of two nodes.
+    ``extent = "auto"`` is the smallest parallelogram about the estimated contact (its bounds plus the coarse
+    cell with the edge) with a margin of two nodes.
     """
     lower, upper = estimate.bounds.T
     pattern = pattern_of(grid)
@@ -315,7 +315,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         if grid.window is not None:
             return centered(spacing, center, grid.window, pattern)
         if isinstance(grid.extent, tuple):
-            return Lattice.covering(spacing, center, *grid.extent, *pattern)
+            return Lattice.covering(spacing, center, grid.extent[0], grid.extent[1], *pattern)
         return enclosing(lower, upper, spacing, MARGIN, pattern)
 
     nodes = grid.nodes_across or 0  # one of the three is always given
@@ -376,7 +376,9 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
             needed = f'["{length_x}", "{length_y}"]'
         else:
-            needed_window = enclosing(estimate.lower, estimate.upper, lattice.spacing, MARGIN, lattice.pattern)
+            needed_window = enclosing(
+                estimate.lower, estimate.upper, lattice.spacing, MARGIN, lattice.pattern
+            )
             needed = f"[{needed_window.n_row}, {needed_window.n_col}] nodes"
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"

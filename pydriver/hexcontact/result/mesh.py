@@ -22,8 +22,8 @@ _CHUNK = 1 << 16  # triangles
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
     """Return the nodes at the corners of each triangle of a window, counterclockwise, shape (n, 3).
 
-    The diagonal from the second to the fourth corner halves each cell into triangles, on which tractions are linear. Node (row
-    j, col i) has the number ``j*n_col + i``.
+    The diagonal from the second to the fourth corner halves each cell into triangles, on which tractions are
+    linear. Node (row j, col i) has the number ``j*n_col + i``.
     """
     first = np.arange(n_row * n_col, dtype=np.int32).reshape(n_row, n_col)[:-1, :-1].ravel()
     right, up, across = first + 1, first + n_col, first + n_col + 1

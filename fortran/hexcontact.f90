@@ -10,7 +10,7 @@ module hexcontact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_options, only: options_t
-  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
   use hc_field_space, only: field_space_t, space_over
   use hc_triangle_integrals, only: triangle_integral, triangle_integrals, is_supported, vertex_kernels, &
                                    load_displacement, linear_load_displacement, &

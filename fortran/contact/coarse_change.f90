@@ -23,9 +23,10 @@ module hc_coarse_change
 
 contains
 
-  !> Restrict a state to the coarse nodes.
+  !> Restrict a state to the coarse nodes, whose law of friction begins a step there.
   subroutine restrict_state(problem, fine, coarse_problem, coarse)
-    type(friction_problem_t), intent(in) :: problem, coarse_problem
+    type(friction_problem_t), intent(in) :: problem
+    type(friction_problem_t), intent(inout) :: coarse_problem
     type(contact_state_t), intent(in) :: fine
     type(contact_state_t), intent(out) :: coarse
 
@@ -33,9 +34,11 @@ contains
       call new_friction_state(coarse, to, coarse_problem%space)
       coarse%pressure = restrict_field(from, fine%pressure, to)
       coarse%gap = restrict_field(from, fine%gap, to)
+      coarse%zone = nint(restrict_field(from, real(fine%zone, wp), to))
       coarse%traction = restrict_vector(from, fine%traction, to)
       coarse%relative_displacement = restrict_vector(from, fine%relative_displacement, to)
     end associate
+    call coarse_problem%friction%begin_step(coarse%zone)
     coarse%motion = fine%motion
     coarse%load = coarse_problem%resultants(coarse%pressure, coarse%traction)
   end subroutine restrict_state

@@ -19,7 +19,7 @@ module hc_contact_problem
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, separated, stick, &
     slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
     sweeps_used_up, loads_not_carried, out_of_range
-  use hc_contact_residuals, only: tangential_compliances, normal_residual, &
+  use hc_contact_residuals, only: tangential_compliances, largest_compliance, normal_residual, &
     tangential_residual, force_residual, relative, least_traction
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t
@@ -117,7 +117,7 @@ contains
     type(friction_problem_t), intent(inout) :: self
 
     self%near_compliance = tangential_compliances(self%lattice, self%pair, near_reach)
-    self%tangential_compliance = self%near_compliance(0, 0, 1)
+    self%tangential_compliance = largest_compliance(self%near_compliance(0, 0, :))
   end subroutine set_geometry
 
   !> Return whether pressure and shear traction act strongly on each other, by |beta| min(mu, 1).

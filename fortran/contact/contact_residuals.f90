@@ -13,7 +13,7 @@ module hc_contact_residuals
   implicit none
   private
 
-  public :: normal_self_compliance, tangential_self_compliance, tangential_compliances
+  public :: normal_self_compliance, tangential_self_compliance, tangential_compliances, largest_compliance
   public :: normal_residual, tangential_residual, tangential_scale, force_residual, relative, least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
@@ -38,9 +38,7 @@ contains
     normal_self_compliance = pair%lambda_1*k(k_1)
   end function normal_self_compliance
 
-  !> Compute the tangential displacement of a node under its own pyramid of unit traction, with its spring if there is one [m/Pa].
-  !>
-  !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2.
+  !> Compute the tangential displacement d_t of a node under its own pyramid of unit traction, with its spring [m/Pa].
   pure real(wp) function tangential_self_compliance(lattice, pair)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
@@ -49,8 +47,23 @@ contains
     real(wp) :: own(1, 1, 3)
 
     own = tangential_compliances(lattice, pair, 0)
-    tangential_self_compliance = own(1, 1, 1)
+    tangential_self_compliance = largest_compliance(own(1, 1, :))
   end function tangential_self_compliance
+
+  !> Return the largest eigenvalue of the tangential compliances of a node [m/Pa].
+  !>
+  !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2 and all directions are alike but for
+  !> rounding errors.
+  pure real(wp) function largest_compliance(own)
+    !> Along x, across, along y [m/Pa]
+    real(wp), intent(in) :: own(3)
+    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
+
+    largest_compliance = own(1)
+    associate (half => 0.5_wp*(own(1) - own(3)))
+      if (max(abs(half), abs(own(2))) > rounding*own(1)) largest_compliance = 0.5_wp*(own(1) + own(3)) + hypot(half, own(2))
+    end associate
+  end function largest_compliance
 
   !> Compute the tangential displacements of the nodes around a pyramid of unit traction, with the spring of its node if there
   !> is one: along x under a traction along x, across, and along y under one along y [m/Pa].

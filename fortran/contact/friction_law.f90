@@ -15,6 +15,9 @@
 !> The tractions that a law allows are a disc, |q| <= b(p), or after a stretch A of the plane, |A^-1 q| <= b(p), an ellipse:
 !> (F16) of docs/theory/friction.md. The direction of a slipping node is the outward normal n of its boundary then, and the
 !> traction is a b(p) n + c b(p) t + tau t with the point (a, c) of the boundary that has this normal.
+!>
+!> A law may depend on the zones at the end of the step before, as static and kinetic friction do. Solvers give them to it at the
+!> beginning of each step, on every lattice.
 module hc_friction_law
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -51,6 +54,8 @@ module hc_friction_law
     procedure :: find_lengths, find_boundary
     !> The same law on another lattice: a coarser one, or a part
     procedure :: on_lattice
+    !> Take the zones at the beginning of a step
+    procedure :: begin_step
   end type friction_law_t
 
   abstract interface
@@ -216,6 +221,13 @@ contains
       across(i) = direction(1, i)*point(2) - direction(2, i)*point(1)
     end do
   end subroutine find_boundary
+
+  !> Take the zones at the end of the step before; a law that depends on them overrides this.
+  pure subroutine begin_step(self, zone)
+    class(friction_law_t), intent(inout) :: self
+    !> Zone of each node (n_col, n_row)
+    integer, intent(in) :: zone(:, :)
+  end subroutine begin_step
 
   !> Copy the law to another lattice; a law whose numbers differ from node to node overrides this.
   subroutine on_lattice(self, from, onto, law)

@@ -71,6 +71,7 @@ contains
       call new_friction_state(before, lattice, whole%problem%space)
       before%pressure = start%pressure(west:east, south:north)
       before%gap = start%gap(west:east, south:north)
+      before%zone = start%zone(west:east, south:north)
       before%traction = start%traction(west:east, south:north, :)
       before%relative_displacement = start%relative_displacement(west:east, south:north, :)
       before%motion = start%motion

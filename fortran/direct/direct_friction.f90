@@ -27,7 +27,7 @@ module hc_direct_friction
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: exchange
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
+  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, classify, enter, is_unsupported, &
     linearize_law, evaluate, record
   use hc_dissertation_iteration, only: iterate_as_written
   use hc_direct_system, only: solve_area
@@ -93,6 +93,7 @@ contains
     integer :: sweeps
     logical :: guessed
 
+    call self%problem%friction%begin_step(start%zone)
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
       return
@@ -328,7 +329,7 @@ contains
 
     n = size(it%p)
     it%contact = reshape(start%pressure > 0.0_wp, [n])
-    if (.not. is_near) it%contact = reshape(ring(start%pressure > 0.0_wp), [n])
+    if (.not. is_near) it%contact = reshape(self%problem%lattice%dilated(start%pressure > 0.0_wp), [n])
     it%contact = it%candidate .and. it%contact
     if (.not. any(it%contact)) it%contact = it%candidate
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)

@@ -11,7 +11,7 @@ module hc_direct_iterate
   implicit none
   private
 
-  public :: direct_iterate_t, new_direct_iterate, infinite, unloaded, ring, classify, enter, is_unsupported, linearize_law, &
+  public :: direct_iterate_t, new_direct_iterate, infinite, unloaded, classify, enter, is_unsupported, linearize_law, &
             evaluate, record
 
   !> A compliance that leaves no traction across the direction of slip.
@@ -78,20 +78,6 @@ contains
     unloaded(:, normal) = it%initial_gap - it%motion(normal)
     unloaded(:, along_x:) = -reshape(problem%rigid_displacement(it%motion), [size(it%p), 2]) - it%reference
   end function unloaded
-
-  !> An area with the ring of lattice neighbours around it.
-  pure function ring(area) result(wider)
-    !> Area (n_col, n_row)
-    logical, intent(in) :: area(:, :)
-    logical :: wider(size(area, 1), size(area, 2))
-    integer :: sign
-
-    wider = area
-    do sign = -1, 1, 2
-      wider = wider .or. eoshift(area, sign, dim=1) .or. eoshift(area, sign, dim=2) &
-              .or. eoshift(eoshift(area, sign, dim=1), -sign, dim=2)
-    end do
-  end function ring
 
   !> Stick or slip at every node in contact.
   pure subroutine classify(problem, share, it)

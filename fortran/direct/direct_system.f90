@@ -11,7 +11,7 @@ module hc_direct_system
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_area_factors, only: area_factors_t, factored_area_t
-  use hc_direct_iterate, only: direct_iterate_t, evaluate, infinite, unloaded, ring
+  use hc_direct_iterate, only: direct_iterate_t, evaluate, infinite, unloaded
   use hc_area_system, only: area_t, solve_with_factors
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_disc_law, only: normal_to
@@ -205,7 +205,7 @@ contains
     sticks = .false.
     sticks(area%stuck) = .true.
     ! those next to a node that does not stick may be the next to slip or to leave
-    edge = reshape(ring(reshape(.not. sticks, problem%lattice%extent)), [size(it%p)])
+    edge = reshape(problem%lattice%dilated(reshape(.not. sticks, problem%lattice%extent)), [size(it%p)])
     do i = 1, size(area%sliding)
       side(:, i) = normal_to(it%direction(:, area%sliding(i)))
     end do

@@ -28,7 +28,7 @@ module hc_dissertation_iteration
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, record
+  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, record
   use hc_direct_system, only: solve_area
   implicit none
   private
@@ -138,7 +138,7 @@ contains
       else if (shrinks) then
         return
       else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then
-        wider = it%candidate .and. reshape(ring(reshape(it%contact, problem%lattice%extent)), [size(it%p)])
+        wider = it%candidate .and. reshape(problem%lattice%dilated(reshape(it%contact, problem%lattice%extent)), [size(it%p)])
         where (wider .and. .not. it%contact) it%zone = stick
         it%contact = wider
       else

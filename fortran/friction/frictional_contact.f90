@@ -174,6 +174,7 @@ contains
     integer :: sweeps
     logical :: guessed, touching
 
+    call self%problem%friction%begin_step(start%zone)
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
       return

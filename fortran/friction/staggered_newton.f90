@@ -32,7 +32,7 @@ module hc_staggered_newton
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
-  use hc_projected_cg, only: projected_cg
+  use hc_step_equation, only: solve_step_equation
   implicit none
   private
 
@@ -221,7 +221,7 @@ contains
     end if
     iteration%tolerance = iteration%tolerance*scale
     iteration%most = options%max_iterations
-    call projected_cg(now%pressure, nodes, constraints, rhs, now%p, now%w, iteration, error)
+    call solve_step_equation(now%pressure, nodes, constraints, rhs, now%p, now%w, iteration, error)
     if (allocated(error)) return
     if (iteration%drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
     if (allocated(error)) return
@@ -409,7 +409,7 @@ contains
                                                             now%pressure_feels_shear)))
     scale = found%scale
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
-    call projected_cg(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
+    call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
     if (allocated(error)) return
     if (iteration%drift > options%displacement_rounding*scale) call displace(now, found%x, found%ax, error)
     if (allocated(error)) return

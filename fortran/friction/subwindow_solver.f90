@@ -89,6 +89,7 @@ contains
     real(wp) :: work
     logical :: found, solved, to_part
 
+    call self%problem%friction%begin_step(start%zone)
     work = 0.0_wp
     sweeps = 0
     to_part = self%problem%space%max(start%pressure) > 0.0_wp

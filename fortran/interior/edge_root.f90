@@ -18,9 +18,6 @@ module hc_edge_root
 
   public :: edge_root_t, fit_edge_root, hat_moments, node_place, gauss_rule
 
-  !> Columns and rows on either side of a node that its moments reach.
-  integer, parameter, public :: n_beside = 4
-
   !> Terms of C: 1, t, n, t^2, t n, n^2.
   integer, parameter :: n_term = 6
   !> Nodes that are compared: along the edge, outside and inside it.
@@ -143,8 +140,9 @@ contains
     !> Places of the nodes along the edge and inwards, and moments
     real(wp), allocatable, intent(out) :: nodes(:, :), moments(:)
     real(wp) :: at(2), square, gradient(2), away
-    integer :: col, row, range(2, 2), n, pass, low(2), high(2)
+    integer :: col, row, range(2, 2), n, n_beside, pass, low(2), high(2)
 
+    n_beside = size(hats, 1)/2
     range = window(lattice, root%center, reach + inside)
     do pass = 1, 2
       n = 0
@@ -173,12 +171,13 @@ contains
   pure function hat_moments(lattice) result(weights)
     type(lattice_t), intent(in) :: lattice
     !> By the differences of column and row
-    real(wp) :: weights(-n_beside:n_beside, -n_beside:n_beside)
+    real(wp), allocatable :: weights(:, :)
     type(place_t) :: there
     real(wp) :: at(2)
-    integer :: i, j, k
+    integer :: i, j, k, n_beside
 
-    weights = 0.0_wp
+    n_beside = ceiling(radius*lattice%spacing()*maxval(lattice%lines_per_length()) + 1.0_wp)
+    allocate (weights(-n_beside:n_beside, -n_beside:n_beside), source=0.0_wp)
     do j = 1, 2*nint(radius)*n_fine
       do i = 1, 2*nint(radius)*n_fine
         at = ([i, j] - 0.5_wp)/n_fine - radius
@@ -282,13 +281,14 @@ contains
     type(lattice_t), intent(in) :: lattice
     real(wp), intent(in) :: center(2), distance
     integer :: range(2, 2)
-    real(wp) :: at(2, 1), basis(2, 2)
+    real(wp) :: at(2, 1), basis(2, 2), lines(2)
 
     basis = lattice%basis
+    lines = distance*max(1.2_wp, lattice%spacing()*lattice%lines_per_length())
     at(:, 1) = center*lattice%spacing() - lattice%origin
     call eliminate(basis, at)
-    range(:, 1) = max(floor(at(:, 1) - 1.2_wp*distance) - lattice%first + 1, 1)
-    range(:, 2) = min(ceiling(at(:, 1) + 1.2_wp*distance) - lattice%first + 1, lattice%extent)
+    range(:, 1) = max(floor(at(:, 1) - lines) - lattice%first + 1, 1)
+    range(:, 2) = min(ceiling(at(:, 1) + lines) - lattice%first + 1, lattice%extent)
   end function window
 
   !> Compute a Gauss rule on (0, 1).

@@ -4,7 +4,7 @@ module hc_stress_at_edges
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
   use hc_interpolation, only: interpolate, place_t, place_of
-  use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments, node_place, n_beside
+  use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments, node_place
   use hc_edge_stress, only: edge_correction, most_away, most_deep
   use hc_interior_fields, only: yz, xz
   implicit none
@@ -47,8 +47,7 @@ contains
     !> Share of the edge near these points where the traction is no root; at least the value on entry
     real(wp), intent(inout) :: refused
     type(edge_root_t), allocatable :: roots(:)
-    real(wp), allocatable :: centers(:, :), inwards(:, :), loads(:, :), at(:, :)
-    real(wp) :: hats(-n_beside:n_beside, -n_beside:n_beside)
+    real(wp), allocatable :: centers(:, :), inwards(:, :), loads(:, :), at(:, :), hats(:, :)
     real(wp) :: more(6)
     integer :: i, k
 

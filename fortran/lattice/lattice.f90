@@ -6,8 +6,7 @@
 !>
 !> so that any pair of basis vectors gives a regular triangulation with the
 !> three edge directions basis(:, 1), basis(:, 2) and basis(:, 2) - basis(:, 1).
-!> The 60-degree lattice of the dissertation, eq. (5.1), is the default; no
-!> other module depends on its angle. A window is the rhombus of nodes in
+!> The 60-degree lattice of the dissertation, eq. (5.1), is the default. A window is the rhombus of nodes in
 !> memory; a field over it is an array of shape (n_col, n_row).
 !>
 !> Equations: docs/theory/discretisation.md, (D1), (D2).
@@ -19,10 +18,14 @@ module hc_lattice
   implicit none
   private
 
-  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors, floor_half
+  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, oblique_basis, edge_directions, neighbors, &
+            neighbor_steps, opposite_pairs, floor_half
 
   !> Steps in column and row to the six neighbors of a node, along the edges of the triangulation.
   integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
+
+  !> The neighbors by pairs on opposite sides.
+  integer, parameter :: opposite_pairs(6) = [1, 4, 2, 5, 6, 3]
 
   !> Nodes of a window and size of an index that default integers can still work with.
   integer, parameter :: most_nodes = 2**29 - 1, largest_index = most_nodes
@@ -37,6 +40,8 @@ module hc_lattice
     integer :: first(2) = 0
     !> Number of columns and rows of the window
     integer :: extent(2) = 0
+    !> Whether the window repeats along columns and rows; else it ends, and there is nothing beyond
+    logical :: periodic(2) = .false.
   contains
     !> Number of nodes in the window
     procedure :: size => lattice_size
@@ -44,12 +49,21 @@ module hc_lattice
     procedure :: cell_area
     !> Length of the longest edge of the triangulation [m]
     procedure :: spacing => lattice_spacing
+    !> Columns and rows per length across them [1/m]
+    procedure :: lines_per_length
     !> Coordinates of every node of the window, and of those of one row [m]
     procedure :: coordinates, row_coordinates
     !> The lattice of every second node of this one
     procedure :: coarsened
     !> Basis vectors over the spacing
     procedure :: unit_basis
+    !> Column and row of a neighbor of a node
+    procedure :: neighbor
+    !> Values of the neighbors at all nodes
+    procedure, private :: shifted_field, shifted_zone
+    generic :: shifted => shifted_field, shifted_zone
+    !> Sum and largest value over each node and its neighbors; nodes within some steps of a zone
+    procedure :: ring_sum, ring_max, dilated
     !> The part of the window around some nodes: its columns and rows, whether it pays, its lattice
     procedure :: enclose, is_worth_parting, subwindow
   end type lattice_t
@@ -110,6 +124,26 @@ contains
     basis(:, 2) = spacing*[0.5_wp, 0.5_wp*sqrt(3.0_wp)]
   end function equilateral_basis
 
+  !> Return a basis with its first vector along x; that of the equilateral lattice at a ratio of 1 and 60 degrees.
+  pure function oblique_basis(spacing, ratio, angle) result(basis)
+    !> Length of the first vector [m], of the second one over it, and angle of the second one from x [rad]
+    real(wp), intent(in) :: spacing, ratio, angle
+    !> Basis vectors as columns [m]
+    real(wp) :: basis(2, 2)
+
+    basis = spacing*rounded(reshape([1.0_wp, 0.0_wp, ratio*cos(angle), ratio*sin(angle)], [2, 2]))
+  end function oblique_basis
+
+  !> Return a basis in spacings, that of the equilateral lattice to the bit if it differs by rounding errors only.
+  pure function rounded(basis)
+    !> Basis vectors as columns
+    real(wp), intent(in) :: basis(2, 2)
+    real(wp) :: rounded(2, 2)
+
+    rounded = basis
+    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) rounded = equilateral_basis(1.0_wp)
+  end function rounded
+
   !> Return the three edge directions of the triangulation, as columns [m].
   pure function edge_directions(basis) result(edges)
     !> Basis vectors as columns [m]
@@ -139,6 +173,13 @@ contains
     class(lattice_t), intent(in) :: self
     lattice_spacing = maxval(norm2(edge_directions(self%basis), dim=1))
   end function lattice_spacing
+
+  !> Return how many columns and rows a straight line across them meets per length [1/m].
+  pure function lines_per_length(self) result(lines)
+    class(lattice_t), intent(in) :: self
+    real(wp) :: lines(2)
+    lines = norm2(self%basis(:, 2:1:-1), dim=1)/self%cell_area()
+  end function lines_per_length
 
   !> Compute the coordinates of all nodes of the window.
   pure subroutine coordinates(self, x, y)
@@ -175,9 +216,119 @@ contains
     class(lattice_t), intent(in) :: self
     real(wp) :: basis(2, 2)
 
-    basis = self%basis/self%spacing()
-    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) basis = equilateral_basis(1.0_wp)
+    basis = rounded(self%basis/self%spacing())
   end function unit_basis
+
+  !> Return column and row of a neighbor of a node, from 1 on; 0 beyond the end of the window.
+  pure function neighbor(self, node, k) result(there)
+    class(lattice_t), intent(in) :: self
+    !> Column and row of the node, from 1 on
+    integer, intent(in) :: node(2)
+    !> Number of the neighbor in `neighbors`
+    integer, intent(in) :: k
+    integer :: there(2)
+
+    there = node + neighbors(:, k)
+    where (self%periodic) there = modulo(there - 1, self%extent) + 1
+    if (any(there < 1 .or. there > self%extent)) there = 0
+  end function neighbor
+
+  !> Return the values of a field at a neighbor of each node; 0 beyond the end of the window.
+  pure function shifted_field(self, field, k) result(shifted)
+    class(lattice_t), intent(in) :: self
+    !> Field over the window (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    !> Number of the neighbor in `neighbors`
+    integer, intent(in) :: k
+    real(wp) :: shifted(size(field, 1), size(field, 2))
+    integer :: d
+
+    shifted = field
+    do d = 1, 2
+      if (self%periodic(d)) then
+        shifted = cshift(shifted, neighbors(d, k), dim=d)
+      else
+        shifted = eoshift(shifted, neighbors(d, k), dim=d)
+      end if
+    end do
+  end function shifted_field
+
+  !> Return which nodes have a neighbor in a zone; there is none beyond the end of the window.
+  pure function shifted_zone(self, zone, k) result(shifted)
+    class(lattice_t), intent(in) :: self
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    !> Number of the neighbor in `neighbors`
+    integer, intent(in) :: k
+    logical :: shifted(size(zone, 1), size(zone, 2))
+    integer :: d
+
+    shifted = zone
+    do d = 1, 2
+      if (self%periodic(d)) then
+        shifted = cshift(shifted, neighbors(d, k), dim=d)
+      else
+        shifted = eoshift(shifted, neighbors(d, k), dim=d)
+      end if
+    end do
+  end function shifted_zone
+
+  !> Sum a field over each node and its neighbors.
+  pure function ring_sum(self, field) result(total)
+    class(lattice_t), intent(in) :: self
+    !> Field over the window (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: total(size(field, 1), size(field, 2))
+    integer :: k
+
+    total = field
+    do k = 1, size(opposite_pairs)
+      total = total + self%shifted(field, opposite_pairs(k))
+    end do
+  end function ring_sum
+
+  !> Return the largest value of a field at each node and its neighbors.
+  pure function ring_max(self, field) result(largest)
+    class(lattice_t), intent(in) :: self
+    !> Field over the window (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: largest(size(field, 1), size(field, 2))
+    integer :: k
+
+    largest = field
+    do k = 1, size(neighbors, 2)
+      largest = max(largest, self%shifted(field, k))
+    end do
+  end function ring_max
+
+  !> Find the nodes within some steps of a zone.
+  pure function dilated(self, zone, steps) result(wider)
+    class(lattice_t), intent(in) :: self
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    !> Steps; absent: one
+    integer, intent(in), optional :: steps
+    logical :: wider(size(zone, 1), size(zone, 2)), before(size(zone, 1), size(zone, 2))
+    integer :: k, step, n
+
+    n = 1
+    if (present(steps)) n = steps
+    wider = zone
+    do step = 1, n
+      before = wider
+      do k = 1, size(neighbors, 2)
+        wider = wider .or. self%shifted(before, k)
+      end do
+    end do
+  end function dilated
+
+  !> Return the steps to the neighbors in a list of the nodes of a window, column by column.
+  pure function neighbor_steps(n_col) result(steps)
+    !> Number of columns
+    integer, intent(in) :: n_col
+    integer :: steps(6)
+    steps = neighbors(1, :) + n_col*neighbors(2, :)
+  end function neighbor_steps
 
   !> Return the lattice of every second node: node (i, j) of it is node (2 i, 2 j) of this one; nodes
   !> outside the window of this one are left out.
@@ -189,6 +340,7 @@ contains
     coarse%basis = 2.0_wp*self%basis
     coarse%origin = self%origin
     last = self%first + self%extent - 1
+    coarse%periodic = self%periodic
     coarse%first = -floor_half(-self%first)
     coarse%extent = floor_half(last) - coarse%first + 1
   end function coarsened

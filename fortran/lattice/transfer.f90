@@ -122,9 +122,10 @@ contains
         beyond = 0.0_wp
         n = 0
         do k = 1, size(neighbors, 2)
-          near = [col, row] + neighbors(:, k)
-          next = near + neighbors(:, k)
-          if (any(min(near, next) < 1) .or. any(max(near, next) > shape(coarse))) cycle
+          near = coarse_lattice%neighbor([col, row], k)
+          if (near(1) == 0) cycle
+          next = coarse_lattice%neighbor(near, k)
+          if (next(1) == 0) cycle
           if (.not. min(coarse(near(1), near(2)), coarse(next(1), next(2))) > 0.0_wp) cycle
           beyond = beyond + min(2.0_wp*coarse(near(1), near(2))**2 - coarse(next(1), next(2))**2, 0.0_wp)
           n = n + 1
@@ -189,8 +190,8 @@ contains
         ! beyond the edge: that of the neighbors in contact
         n = 0
         do k = 1, size(neighbors, 2)
-          near = [col, row] + neighbors(:, k)
-          if (any(near < 1) .or. any(near > shape(coarse_pressure))) cycle
+          near = coarse_lattice%neighbor([col, row], k)
+          if (near(1) == 0) cycle
           if (.not. coarse_pressure(near(1), near(2)) > 0.0_wp) cycle
           ratio(col, row, :) = ratio(col, row, :) + coarse(near(1), near(2), :)/coarse_pressure(near(1), near(2))
           n = n + 1

@@ -25,11 +25,12 @@ module hc_linear_system
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
   integer, parameter :: solution_accurate = 1, iterations_used_up = 2, solution_broke_off = 3
 
-  !> A symmetric positive definite operator with a preconditioner, the identity unless it is overridden, on fields that
-  !> are vectors over all nodes.
+  !> An operator with a preconditioner, the identity unless it is overridden, on fields that are vectors over all nodes.
   type, abstract :: linear_system_t
     !> Space of the vectors
     type(field_space_t) :: space
+    !> The operator is symmetric and positive definite; else hc_step_equation chooses GMRES
+    logical :: symmetric = .true.
   contains
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product

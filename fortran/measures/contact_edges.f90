@@ -5,7 +5,8 @@
 !> gap^(2/3) and (mu p - |q|)^2, each divided by its slope, are distances from the edge. The edge runs where they change
 !> sign: a polygon through the triangles of the lattice, for zones of any shape.
 !>
-!> Distances are in spacings, positive inside. Fields have the shape (n_col, n_row).
+!> Distances are in spacings of the equilateral lattice to which a linear map takes the nodes, positive inside. Fields
+!> have the shape (n_col, n_row).
 !>
 !> Equations: docs/theory/edges.md, (B2) to (B4).
 module hc_contact_edges
@@ -60,7 +61,7 @@ contains
   pure subroutine new_contact_edges(edges, lattice, pressure, gap, contact, candidate, options)
     !> Edges to be set up
     type(contact_edges_t), intent(out) :: edges
-    !> Equilateral lattice and window
+    !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Contact pressure [Pa] and gap [m]; the gap of nodes that can never touch does not matter
     real(wp), intent(in) :: pressure(:, :), gap(:, :)

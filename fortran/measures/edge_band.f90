@@ -2,6 +2,9 @@
 !>
 !> Values at the nodes of a band are vectors. Where only some of them are known, a mask goes with them.
 !>
+!> Lengths are measured as the linear map of the lattice to the equilateral one of unit spacing makes them. The layer of the
+!> solution at an edge is as wide in them for any basis and any direction of the edge, and areas are those of cells.
+!>
 !> Theory: docs/theory/edges.md.
 module hc_edge_band
   use hc_precision, only: wp
@@ -44,7 +47,7 @@ module hc_edge_band
 
 contains
 
-  !> Return the positions of the six neighbors, in spacings.
+  !> Return the positions of the six neighbors on the equilateral lattice, in spacings.
   pure function to_neighbors() result(to)
     !> x and y of each (2, 6)
     real(wp) :: to(2, n_beside)

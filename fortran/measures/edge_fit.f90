@@ -1,7 +1,8 @@
 !> Squares of a field that vanishes like a square root at the edge of a zone, from its values at the nodes inside.
 !>
 !> They are smooth across the edge: a paraboloid through those of the nodes nearby, by least squares, says where the edge
-!> runs between the nodes, and evens out the errors of single nodes.
+!> runs between the nodes, and evens out the errors of single nodes. Lengths are those of the equilateral lattice to which a
+!> linear map takes the nodes; a paraboloid stays one.
 !>
 !> Equations: docs/theory/interior.md, (I16).
 module hc_edge_fit

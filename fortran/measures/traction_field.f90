@@ -89,7 +89,7 @@ contains
       limit = field%friction*traction(:, :, 1)
       if (allocated(field%bound)) limit = min(limit, field%bound)
       field%reserve = merge(max(limit - norm2(traction(:, :, 2:3), dim=3), 0.0_wp), 0.0_wp, stick)
-      field%direction = directions(traction(:, :, 2:3), limit, contact)
+      field%direction = directions(lattice, traction(:, :, 2:3), limit, contact)
       field%stick_squares = edges%stick_squares(stick, field%reserve)
       ! where stick reaches the edge of the contact that is its edge, too, and the reserve says no more than the pressure
       where (stick .and. .not. near(contact .and. .not. stick, tuning%reach)) &
@@ -272,7 +272,9 @@ contains
   end function place_at
 
   !> Compute the shear traction over its limit at the nodes in contact, and the mean of them at those next to the contact.
-  pure function directions(shear, limit, contact) result(direction)
+  pure function directions(lattice, shear, limit, contact) result(direction)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
     !> Shear traction (n_col, n_row, direction) and its limit [Pa]
     real(wp), intent(in) :: shear(:, :, :), limit(:, :)
     !> Nodes in contact
@@ -290,8 +292,8 @@ contains
         total = 0.0_wp
         beside = 0
         do k = 1, size(neighbors, 2)
-          associate (at => [col, row] + neighbors(:, k))
-            if (any(at < 1 .or. at > shape(contact))) cycle
+          associate (at => lattice%neighbor([col, row], k))
+            if (at(1) == 0) cycle
             if (.not. contact(at(1), at(2))) cycle
             total = total + direction(at(1), at(2), :)
             beside = beside + 1

@@ -112,7 +112,7 @@ contains
   !>
   !> Near the edge p^2 is linear in r^2, since p grows like the square root of the distance. A straight line through the
   !> nodes with a_A - 6 l_e <= r <= a_A - l_e gives the zero; a_A is the area-equivalent radius.
-  pure real(wp) function edge_radius(x, y, pressure, spacing, center)
+  pure real(wp) function edge_radius(x, y, pressure, spacing, center, cell_area)
     !> Coordinates of the nodes [m]
     real(wp), intent(in) :: x(:, :), y(:, :)
     !> Contact pressure [Pa]
@@ -121,12 +121,16 @@ contains
     real(wp), intent(in) :: spacing
     !> Center of the contact [m]
     real(wp), intent(in) :: center(2)
+    !> Area of a cell; absent: that of the equilateral lattice [m^2]
+    real(wp), intent(in), optional :: cell_area
     type(edge_options_t) :: options
     real(wp), allocatable :: distance(:), square(:)
-    real(wp) :: around, inner, outer, slope, start
+    real(wp) :: around, inner, outer, slope, start, cell
 
     edge_radius = ieee_value(1.0_wp, ieee_quiet_nan)
-    around = area_radius(count(pressure > 0.0_wp), unit_cell*spacing**2)
+    cell = unit_cell*spacing**2
+    if (present(cell_area)) cell = cell_area
+    around = area_radius(count(pressure > 0.0_wp), cell)
     inner = max(around - options%inner_ring*spacing, 0.0_wp)
     outer = around - options%outer_ring*spacing
     if (outer <= 0.0_wp) return

@@ -15,7 +15,7 @@
 module hc_edge_continuation
   use hc_precision, only: wp, sp
   use hc_options, only: preconditioner_options_t
-  use hc_lattice, only: neighbors
+  use hc_lattice, only: neighbor_steps
   use hc_field_space, only: field_space_t
   use hc_active_set, only: find_span
   implicit none
@@ -74,7 +74,7 @@ contains
 
     n_col = size(active, 1)
     width = n_col + 2
-    step = neighbors(1, :) + width*neighbors(2, :)
+    step = neighbor_steps(width)
     call mark_window(active, space, mark, within)
     n_active = space%count(active)
     call find_edge(active, mark, step, space, frontier)

@@ -12,6 +12,7 @@ module hc_inverse_symbol
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution
   use hc_fft_layout_single, only: convolution_memory
@@ -29,8 +30,6 @@ module hc_inverse_symbol
 
   !> Blocks (onto, from) of the symmetric inverse.
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
-  !> Self-compliance d_n of a node over lambda_1 and the spacing: K1(0) of the equilateral lattice.
-  real(wp), parameter :: self_ratio = 2.854_wp
   !> Excess over the stiffest spring below which a spring counts as equal to it, over t of (P7): single precision
   real(wp), parameter :: negligible = 1.0e-3_wp
   !> Kernels of the tangential inverse.
@@ -41,6 +40,8 @@ module hc_inverse_symbol
     type(convolution_t), private :: convolution
     !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
     real(wp) :: unit = 1.0_wp
+    !> Displacement of a node by its own pyramid, d_n [m/Pa]
+    real(wp), private :: self_compliance = 0.0_wp
     !> Of the tangential flexibility
     logical, private :: tangential = .false.
     !> Columns, rows and components of the fields
@@ -87,6 +88,7 @@ contains
     integer :: length(2), b, i, n_component
     real(wp) :: scale, matrix(3), layer, basis(2, 2), gamma
     real(wp), allocatable :: symbol(:, :)
+    type(pyramid_t) :: pyramid
     logical :: found
 
     if (present(tangential)) self%tangential = tangential
@@ -97,6 +99,9 @@ contains
                          space, error)
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
+    call new_pyramid(pyramid, lattice%basis)
+    ! K1(0) to three decimals: a preconditioner needs no more
+    self%self_compliance = self%unit*(anint(1.0e3_wp*pyramid%normal_kernel(0.0_wp, 0.0_wp)/lattice%spacing())/1.0e3_wp)
     self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
     key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
     call self%convolution%find_spectra(found, error, cache, key)
@@ -208,7 +213,7 @@ contains
     !> Active nodes (n)
     logical, intent(in), contiguous :: active(:)
     type(error_t), allocatable :: error
-    real(wp) :: stiffest, self_compliance, elastic, softer
+    real(wp) :: stiffest, elastic, softer
     real(sp) :: stretch
     logical :: found
     integer :: block, i
@@ -225,11 +230,10 @@ contains
         return
       end if
     end if
-    self_compliance = self_ratio*self%unit
     stiffest = minval(compliance, mask=active .and. compliance > 0.0_wp)
-    elastic = options%wave_of_nodes*self_compliance + options%wave_of_springs*stiffest
-    self%loose = max(self_compliance, (1.0_wp + negligible)*stiffest)
-    self%height = real(self_compliance/(self_compliance + stiffest), sp)
+    elastic = options%wave_of_nodes*self%self_compliance + options%wave_of_springs*stiffest
+    self%loose = max(self%self_compliance, (1.0_wp + negligible)*stiffest)
+    self%height = real(self%self_compliance/(self%self_compliance + stiffest), sp)
     ! the spectrum is the inverse of the symbol over the number of frequencies
     stretch = real(stiffest/self%unit*product(real(good_size(self%shape(:2)), wp)), sp)
     !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)

@@ -20,7 +20,7 @@ module hc_shear_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
-  use hc_lattice, only: lattice_t, neighbors
+  use hc_lattice, only: lattice_t, neighbor_steps
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -294,7 +294,7 @@ contains
     real(sp), allocatable :: swap(:, :)
     integer :: k, m, shift(6)
 
-    shift = step*(neighbors(1, :) + self%extent(1)*neighbors(2, :))
+    shift = step*neighbor_steps(self%extent(1))
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m)
     do k = 1, size(self%near%first)
       do m = 1, 2

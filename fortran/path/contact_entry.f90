@@ -13,6 +13,7 @@
 !> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory/load_path.md, (L1), (L2)).
 module hc_contact_entry
   use hc_precision, only: wp
+  use hc_lattice, only: opposite_pairs
   use hc_error, only: error_t
   use hc_options, only: entry_options_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
@@ -23,10 +24,6 @@ module hc_contact_entry
   private
 
   public :: solve_with_entry, entry_displacement
-
-  !> The six neighbors of a node.
-  integer, parameter :: n_neighbor = 6
-  integer, parameter :: neighbor(2, n_neighbor) = reshape([1, 0, -1, 0, 0, 1, 0, -1, 1, -1, -1, 1], [2, n_neighbor])
 
   !> What is carried inwards from the nodes outside.
   type :: carried_t
@@ -193,7 +190,7 @@ contains
     logical, allocatable :: entered(:, :), outside(:, :), known(:, :), attached(:, :)
     integer, allocatable :: node(:, :)
     real(wp) :: share(2)
-    integer :: i, k, col, row, c, r
+    integer :: i, k, col, row, c, r, there(2)
 
     allocate (displacement, mold=after%relative_displacement)
     displacement = 0.0_wp
@@ -205,16 +202,17 @@ contains
     else
       gap = max(problem%initial_gap - before%motion(normal), 0.0_wp)
     end if
-    edge_pressure = widened(widened(after%pressure))
+    edge_pressure = problem%lattice%ring_max(problem%lattice%ring_max(after%pressure))
     node = by_falling_gap(entered, gap)
     allocate (carried(size(gap, 1), size(gap, 2)), known(size(gap, 1), size(gap, 2)), attached(size(gap, 1), size(gap, 2)))
     known = .false.
     attached = .false.
     do i = size(node, 2), 1, -1
-      do k = 1, n_neighbor
-        c = node(1, i) + neighbor(1, k)
-        r = node(2, i) + neighbor(2, k)
-        if (.not. inside(gap, c, r)) cycle
+      do k = 1, size(opposite_pairs)
+        there = problem%lattice%neighbor(node(:, i), opposite_pairs(k))
+        if (there(1) == 0) cycle
+        c = there(1)
+        r = there(2)
         if (before%pressure(c, r) > 0.0_wp .or. attached(c, r)) attached(node(1, i), node(2, i)) = .true.
         if (outside(c, r)) then
           known(c, r) = .true.
@@ -249,13 +247,14 @@ contains
       integer, intent(in) :: col, row
       type(carried_t) :: sum_of
       real(wp) :: weight, total
-      integer :: k, c, r
+      integer :: k, c, r, there(2)
 
       total = 0.0_wp
-      do k = 1, n_neighbor
-        c = col + neighbor(1, k)
-        r = row + neighbor(2, k)
-        if (.not. inside(gap, c, r)) cycle
+      do k = 1, size(opposite_pairs)
+        there = problem%lattice%neighbor([col, row], opposite_pairs(k))
+        if (there(1) == 0) cycle
+        c = there(1)
+        r = there(2)
         weight = gap(c, r) - gap(col, row)
         if (weight <= 0.0_wp .or. .not. known(c, r)) cycle
         total = total + weight
@@ -286,7 +285,7 @@ contains
       type(carried_t) :: next, further
       real(wp) :: growth(2), total, weight
       real(wp), allocatable :: squares(:, :), products(:, :, :)
-      integer :: col, row, k, c, r
+      integer :: col, row, k, c, r, there(2)
 
       allocate (squares, mold=gap)
       allocate (products, mold=after%traction)
@@ -299,10 +298,11 @@ contains
           total = 0.0_wp
           associate (here => carried(col, row))
             if (any(here%closed <= 0.0_wp)) cycle
-            do k = 1, n_neighbor
-              c = col + neighbor(1, k)
-              r = row + neighbor(2, k)
-              if (.not. inside(gap, c, r)) cycle
+            do k = 1, size(opposite_pairs)
+              there = problem%lattice%neighbor([col, row], opposite_pairs(k))
+              if (there(1) == 0) cycle
+              c = there(1)
+              r = there(2)
               weight = gap(c, r) - gap(col, row)
               if (weight <= 0.0_wp .or. .not. outside(c, r)) cycle
               next = seen_from(c, r, here%lattice_gap)
@@ -318,9 +318,9 @@ contains
         end do
       end do
       do k = 1, problem%options%entry%along_edge
-        squares = with_neighbors(squares)
-        products(:, :, 1) = with_neighbors(products(:, :, 1))
-        products(:, :, 2) = with_neighbors(products(:, :, 2))
+        squares = problem%lattice%ring_sum(squares)
+        products(:, :, 1) = problem%lattice%ring_sum(products(:, :, 1))
+        products(:, :, 2) = problem%lattice%ring_sum(products(:, :, 2))
       end do
       do row = 1, size(gap, 2)
         do col = 1, size(gap, 1)
@@ -338,14 +338,6 @@ contains
 
   end function entry_displacement
 
-  !> Return whether the window has such a node.
-  pure logical function inside(field, col, row)
-    real(wp), intent(in) :: field(:, :)
-    integer, intent(in) :: col, row
-
-    inside = col >= 1 .and. col <= size(field, 1) .and. row >= 1 .and. row <= size(field, 2)
-  end function inside
-
   !> Return what a gap measures of the distance from an edge that slips, and from one that sticks.
   pure function measures(gap, lattice_gap)
     real(wp), intent(in) :: gap, lattice_gap
@@ -354,30 +346,6 @@ contains
     measures(1) = (gap + lattice_gap)**(2.0_wp/3.0_wp) - lattice_gap**(2.0_wp/3.0_wp)
     measures(2) = gap
   end function measures
-
-  !> Return the largest value at a node and its neighbors.
-  pure function widened(field) result(largest)
-    real(wp), intent(in) :: field(:, :)
-    real(wp) :: largest(size(field, 1), size(field, 2))
-    integer :: k
-
-    largest = field
-    do k = 1, n_neighbor
-      largest = max(largest, eoshift(eoshift(field, neighbor(1, k), dim=1), neighbor(2, k), dim=2))
-    end do
-  end function widened
-
-  !> Sum the values at a node and its neighbors.
-  pure function with_neighbors(field) result(total)
-    real(wp), intent(in) :: field(:, :)
-    real(wp) :: total(size(field, 1), size(field, 2))
-    integer :: k
-
-    total = field
-    do k = 1, n_neighbor
-      total = total + eoshift(eoshift(field, neighbor(1, k), dim=1), neighbor(2, k), dim=2)
-    end do
-  end function with_neighbors
 
   !> Sort the nodes of a set by their gap, the largest first: columns and rows (heap sort).
   pure function by_falling_gap(set, gap) result(node)

@@ -16,7 +16,6 @@ module test_direct_friction
   use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange
   use hc_block_cholesky, only: solve_blocks
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
-  use hc_direct_iterate, only: ring
   use hc_area_factors, only: area_factors_t, factored_area_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_lapack, only: dposv
@@ -134,11 +133,12 @@ contains
   !> Six neighbours in the middle of the window, those inside of it at a corner; never around the rim.
   subroutine test_ring(error)
     type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: window
     logical :: area(5, 4), line(3, 1)
 
     area = .false.
     area(3, 2) = .true.
-    call check_true(error, all(pack(ring(area), .true.) .eqv. [ &
+    call check_true(error, all(pack(window%dilated(area), .true.) .eqv. [ &
                                  .false., .false., .true., .true., .false., &
                                  .false., .true., .true., .true., .false., &
                                  .false., .true., .true., .false., .false., &
@@ -146,14 +146,14 @@ contains
     if (allocated(error)) return
     area = .false.
     area(1, 1) = .true.
-    call check(error, count(ring(area)), 3, 'the acute corner')
+    call check(error, count(window%dilated(area)), 3, 'the acute corner')
     if (allocated(error)) return
     area = .false.
     area(5, 1) = .true.
-    call check(error, count(ring(area)), 4, 'the obtuse corner')
+    call check(error, count(window%dilated(area)), 4, 'the obtuse corner')
     if (allocated(error)) return
     line(:, 1) = [.true., .false., .false.]
-    call check_true(error, all(pack(ring(line), .true.) .eqv. [.true., .true., .false.]), 'a window of one row')
+    call check_true(error, all(pack(window%dilated(line), .true.) .eqv. [.true., .true., .false.]), 'a window of one row')
   end subroutine test_ring
 
   !> Whole sets as long as the number of wrong nodes falls, then the last one alone.

@@ -15,7 +15,7 @@ module test_interior
   use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_edge_tractions, only: correct_at_edges
-  use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments, n_beside
+  use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments
   use hc_stress_invariants, only: principal_stresses, von_mises
   use testing, only: test_t, new_test, check, check_raised, check_true, open_table
   implicit none
@@ -372,7 +372,7 @@ contains
     integer, parameter :: n = 16
     type(lattice_t) :: lattice
     type(edge_root_t) :: root
-    real(wp) :: hats(-n_beside:n_beside, -n_beside:n_beside)
+    real(wp), allocatable :: hats(:, :)
     real(wp), dimension(2*n + 1, 2*n + 1) :: x, y, squares
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)

@@ -2,7 +2,7 @@
 module test_lattice
   use hc_precision, only: wp
   use hc_error, only: error_t, status
-  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
   use hc_field_space, only: field_space_t
   use hc_transfer, only: prolong, restrict_field, restrict_mask
   use testing, only: test_t, new_test, check, check_raised, check_succeeded, check_true
@@ -24,6 +24,9 @@ contains
       new_test('coordinates', test_coordinates), &
       new_test('bad_input', test_bad_input), &
       new_test('coarsened', test_coarsened), &
+      new_test('oblique', test_oblique), &
+      new_test('rings', test_rings), &
+      new_test('periodic', test_periodic), &
       new_test('prolongation', test_prolongation), &
       new_test('prolonged_hat', test_prolonged_hat) &
     ]
@@ -71,6 +74,75 @@ contains
     call new_lattice(lattice, reshape([0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], [2, 2]), [0, 0], [3, 3], raised)
     call check_raised(error, raised, status%invalid_input, 'a clockwise basis')
   end subroutine test_bad_input
+
+  !> At a ratio of 1 and 60 degrees the basis is equilateral to the bit; lines are apart by the heights of the cell.
+  subroutine test_oblique(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+
+    call check(error, reshape(oblique_basis(0.3_wp, 1.0_wp, acos(0.5_wp)), [4]), reshape(equilateral_basis(0.3_wp), [4]), 0.0_wp, &
+               'equilateral')
+    if (allocated(error)) return
+    call new_lattice(lattice, oblique_basis(2.0_wp, 0.5_wp, acos(0.0_wp)), [0, 0], [2, 2], error)
+    if (allocated(error)) return
+    call check(error, lattice%lines_per_length(), [0.5_wp, 1.0_wp], thr, 'columns and rows per length')
+  end subroutine test_oblique
+
+  !> Beyond the end of a window there is nothing: a corner has two neighbors or three.
+  subroutine test_rings(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp) :: ones(4, 3)
+    logical :: zone(4, 3)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-1, -2], [4, 3], error)
+    if (allocated(error)) return
+    ones = 1.0_wp
+    call check(error, reshape(lattice%ring_sum(ones), [12]), real([3, 5, 5, 4, 5, 7, 7, 5, 4, 5, 5, 3], wp), 0.0_wp, 'sums')
+    if (allocated(error)) return
+    zone = .false.
+    zone(1, 3) = .true.
+    call check_true(error, count(lattice%dilated(zone)) == 4 .and. count(lattice%dilated(zone, 2)) == 9, 'nodes near a corner')
+    if (allocated(error)) return
+    call check_true(error, all(lattice%ring_max(merge(2.0_wp, 1.0_wp, zone)) > 1.5_wp .eqv. lattice%dilated(zone)), 'largest')
+    if (allocated(error)) return
+    call check_true(error, all(lattice%neighbor([1, 3], 5) == [1, 2]) .and. all(lattice%neighbor([1, 3], 4) == 0), 'neighbors')
+  end subroutine test_rings
+
+  !> Every node of a window that repeats has six neighbors, so that the sum of all rings is seven times that of the field.
+  subroutine test_periodic(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice, coarse
+    real(wp) :: field(6, 4), sums(6, 4)
+    integer :: i, k, there(2)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [6, 4], error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    field = reshape([(real(i**2, wp), i=1, 24)], [6, 4])
+    sums = lattice%ring_sum(field)
+    call check(error, sum(sums), 7.0_wp*sum(field), thr, 'sum of all rings')
+    if (allocated(error)) return
+    ! the corner (1, 1) has the neighbors (2, 1), (6, 1), (1, 2), (1, 4), (2, 4) and (6, 2)
+    call check(error, sums(1, 1), field(1, 1) + field(2, 1) + field(6, 1) + field(1, 2) + field(1, 4) + field(2, 4) + field(6, 2), &
+               thr, 'ring of a corner')
+    if (allocated(error)) return
+    do k = 1, 6
+      there = lattice%neighbor([1, 4], k)
+      call check(error, field(there(1), there(2)), lattice_value(lattice%shifted(field, k)), 0.0_wp, 'value of a neighbor')
+      if (allocated(error)) return
+    end do
+    coarse = lattice%coarsened()
+    call check_true(error, all(coarse%periodic) .and. all(coarse%extent == [3, 2]), 'half of the nodes repeat, too')
+
+  contains
+
+    real(wp) function lattice_value(shifted)
+      real(wp), intent(in) :: shifted(:, :)
+      lattice_value = shifted(1, 4)
+    end function lattice_value
+
+  end subroutine test_periodic
 
   !> Every even node of the window, of positive and negative index, and no other.
   subroutine test_coarsened(error)

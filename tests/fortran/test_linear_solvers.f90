@@ -6,6 +6,7 @@ module test_linear_solvers
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_projected_cg, only: freeing_cg => projected_cg
   use hc_projected_gmres, only: freeing_gmres => projected_gmres
+  use hc_step_equation, only: solve_step_equation
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, &
     precondition_packed_constraints => precondition_constraints, step_ahead, solution_accurate, iterations_used_up, &
@@ -39,6 +40,7 @@ contains
       new_test('step_ahead', test_step_ahead), &
       new_test('outcomes', test_outcomes), &
       new_test('norm_of_gmres', test_norm_of_gmres), &
+      new_test('step_equation', test_step_equation), &
       new_test('products_that_are_carried', test_products_that_are_carried), &
       new_test('restarts_of_gmres', test_restarts_of_gmres), &
       new_test('ends_of_gmres', test_ends_of_gmres) &
@@ -268,6 +270,45 @@ contains
     end do
     call check(error, outcome, solution_accurate, 'as many directions as unknowns are enough')
   end subroutine test_norm_of_gmres
+
+  !> A matrix that is not symmetric is solved by GMRES, with a constraint; conjugate gradients would not solve it.
+  subroutine test_step_equation(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    type(active_set_t) :: nodes
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    real(wp), allocatable :: rhs(:)
+    real(wp) :: x(5), ax(5)
+    real(wp), parameter :: right(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp]
+    integer :: i
+
+    system%matrix = 0.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+      if (i > 1) system%matrix(i, i - 1) = -4.0_wp
+    end do
+    call new_active_set(nodes, [(.true., i=1, 5)], system%space)
+    do i = 1, 2
+      system%symmetric = i == 1
+      x = 1.0_wp
+      ax = matmul(system%matrix, x)
+      rhs = right
+      constraints%columns = reshape([1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp], [5, 1])
+      call precondition_packed_constraints(system, nodes, 5, constraints%columns, constraints%mb, error)
+      if (allocated(error)) return
+      iteration = iteration_t(tolerance=1.0e-12_wp, most=30)
+      call solve_step_equation(system, nodes, constraints, rhs, x, ax, iteration, error)
+      if (allocated(error)) return
+      if (i == 1) call check_true(error, iteration%outcome /= solution_accurate, 'conjugate gradients fail')
+      if (allocated(error)) return
+    end do
+    call check(error, iteration%outcome, solution_accurate, 'outcome')
+    if (allocated(error)) return
+    call check(error, matmul(system%matrix, x) - constraints%multiplier(1), right, 1.0e-11_wp, 'equation')
+    if (allocated(error)) return
+    call check(error, sum(x), 5.0_wp, 1.0e-13_wp, 'constraint')
+  end subroutine test_step_equation
 
   !> The product that is carried along is that of the unknowns: with a preconditioner of single precision before a row
   !> that is a billion times larger, and the rounding errors of a start that is far off are told.

@@ -5,7 +5,7 @@ module test_nodal_friction
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    separated, slip, normal, about_z
+    separated, stick, slip, normal, about_z
   use hc_friction_law, only: friction_law_t
   use hc_coulomb, only: coulomb_t
   use hc_nodal_coulomb, only: nodal_coulomb_t
@@ -13,6 +13,7 @@ module test_nodal_friction
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true, largest, coordinate
@@ -26,7 +27,79 @@ module test_nodal_friction
   real(wp), parameter :: load = 4.0_wp/3.0_wp, inner = 0.5_wp, outer = 0.2_wp, ring = 0.6_wp
   real(wp), parameter :: pi = acos(-1.0_wp)
 
+  !> Static and kinetic friction: nodes that slip at the end of a step have the coefficient `outer` in the next one, others `inner`.
+  type, extends(nodal_coulomb_t) :: kinetic_t
+  contains
+    procedure :: begin_step => remember
+  end type kinetic_t
+
 contains
+
+  !> Set the coefficients of a step by the zones before it.
+  pure subroutine remember(self, zone)
+    class(kinetic_t), intent(inout) :: self
+    integer, intent(in) :: zone(:, :)
+    self%coefficient = reshape(merge(outer, inner, zone == slip), [size(zone)])
+  end subroutine remember
+
+  !> Nodes that slipped carry the kinetic coefficient times the pressure at most in the next step, the others the static one: in all
+  !> solvers, on parts of the window and with coarser lattices.
+  subroutine test_static_and_kinetic(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: alike, nodal
+    type(windowed_friction_t) :: windowed
+    type(direct_friction_t) :: dense
+    type(friction_problem_t) :: problem
+    type(kinetic_t) :: law
+    type(contact_state_t) :: on_window(2), on_part(2), direct(2)
+    real(wp), allocatable :: length(:, :), bound(:, :)
+    logical, allocatable :: slipped(:, :)
+
+    call new_nodal(inner, inner, 1.0e9_wp, alike, error)
+    if (allocated(error)) return
+    problem = alike%problem
+    deallocate (problem%friction)
+    ! no structure constructor: gfortran 12 frees the components of a parent in it twice
+    law%coefficient = spread(inner, 1, problem%lattice%size())
+    allocate (problem%friction, source=law)
+    call new_frictional_contact(nodal, problem, error, 2)
+    if (.not. allocated(error)) call new_windowed_friction(windowed, problem, error, 2)
+    if (.not. allocated(error)) call new_direct_friction(dense, problem, error)
+    if (.not. allocated(error)) call two_steps(nodal, on_window)
+    if (.not. allocated(error)) call two_steps(windowed, on_part)
+    if (.not. allocated(error)) call two_steps(dense, direct)
+    if (allocated(error)) return
+    slipped = on_window(1)%zone == slip
+    length = norm2(on_window(2)%traction, dim=3)
+    bound = merge(outer, inner, slipped)*on_window(2)%pressure
+    call check_true(error, all(length <= bound + 1.0e-9_wp), 'within the bound')
+    if (allocated(error)) return
+    associate (slides => on_window(2)%zone == slip)
+      call check_true(error, any(slipped .and. slides) .and. any(slides .and. .not. slipped) .and. &
+                      any(on_window(2)%zone == stick), 'some nodes go on slipping, some begin, some stick')
+      if (allocated(error)) return
+      call check(error, largest(merge(length - bound, 0.0_wp, slides)), 0.0_wp, 1.0e-8_wp, 'on the bound')
+    end associate
+    if (allocated(error)) return
+    call check(error, largest(on_part(2)%traction - on_window(2)%traction), 0.0_wp, 1.0e-6_wp, 'on a part of the window')
+    if (allocated(error)) return
+    call check(error, largest(direct(2)%traction - on_window(2)%traction), 0.0_wp, 1.0e-6_wp, 'by the explicit matrix')
+
+  contains
+
+    !> Press and shear, then shear more.
+    subroutine two_steps(contact, state)
+      class(friction_solver_t), intent(inout) :: contact
+      type(contact_state_t), intent(out) :: state(2)
+
+      call solve(contact, [f, d, d, d], [load, 0.15_wp, 0.0_wp, 0.0_wp], state(1), error)
+      if (allocated(error)) return
+      call contact%solve_step(state(1), state(1)%relative_displacement, &
+                              load_target_t([f, d, d, d], [load, 0.25_wp, 0.0_wp, 0.0_wp]), 1.0e-10_wp, 200, state(2), error)
+      if (.not. allocated(error)) call check_true(error, state(2)%converged, 'converged')
+    end subroutine two_steps
+
+  end subroutine test_static_and_kinetic
 
   subroutine collect_nodal_friction(tests)
     !> Tests of this suite
@@ -38,6 +111,7 @@ contains
       new_test('torsion', test_torsion), &
       new_test('tresca', test_tresca), &
       new_test('methods_agree', test_methods_agree), &
+      new_test('static_and_kinetic', test_static_and_kinetic), &
       new_test('other_lattices', test_other_lattices), &
       new_test('smooth_nodes', test_smooth_nodes), &
       new_test('direction', test_direction), &

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from hexcontact.analytic import hertz_ellipse
 from hexcontact.case import Body, Case
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
-from hexcontact.core.lattice import Lattice
+from hexcontact.core.lattice import Lattice, Pattern
 from hexcontact.deck import keys as tables
 from hexcontact.deck.faults import Source
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
@@ -704,7 +704,7 @@ def test_the_estimate_resolves_the_narrow_side_of_an_ellipse(degrees: float) -> 
     pair = ElasticPair.from_materials(210e9, 0.3, None, None)
     ellipse = hertz_ellipse(pair.effective_modulus, one + two, normal_load=100.0)
     gap = Separation(Cylinder(radius=0.05), Cylinder(radius=0.05, angle=f"{degrees} deg"))
-    estimate = estimate_contact(pair, gap, (0.0, 0.0), (0.0, 0.0), normal_load=100.0)
+    estimate = estimate_contact(pair, gap, (0.0, 0.0), Pattern(), normal_load=100.0)
     # eight spacings or more in the half-width, whose edge is known to a fraction of one
     assert estimate.cell <= ellipse.semi_minor / 7
     assert estimate.half_width == pytest.approx(ellipse.semi_minor, rel=0.05)

@@ -45,7 +45,8 @@ def test_sphere_of_any_materials(first: dict, second: dict, method: str) -> None
     assert float(step["approach"]) / hertz.approach - 1 == pytest.approx(-2.557e-4, abs=6e-8)
     exact = hertz.pressure(np.hypot(x, y))
     assert np.linalg.norm(p - exact) / np.linalg.norm(exact) == pytest.approx(0.01373, abs=1e-6)
-    assert measures.edge_radius(x, y, p, 1e-3 / 14) == pytest.approx(1.0037e-3, rel=1.4e-6)
+    edge = measures.edge_radius(x, y, p, 1e-3 / 14, case.lattice.cell_area)
+    assert edge == pytest.approx(1.0037e-3, rel=1.4e-6)
     # the load is the sum of the nodal pressures over their cells
     assert p.sum() * np.sqrt(0.75) * (1e-3 / 14) ** 2 == pytest.approx(hertz.normal_load, rel=1e-8)
 
@@ -81,7 +82,8 @@ def test_sphere_anywhere_on_the_lattice() -> None:
         exact = hertz.pressure(np.hypot(x - center[0], y - center[1]))
         assert np.linalg.norm(p - exact) / np.linalg.norm(exact) < 0.0105
         assert float(step["approach"]) == pytest.approx(hertz.approach, rel=1.8e-4)
-        assert measures.edge_radius(x, y, p, 1e-3 / 20, center) == pytest.approx(1e-3, rel=2.1e-3)
+        edge = measures.edge_radius(x, y, p, 1e-3 / 20, case.lattice.cell_area, center)
+        assert edge == pytest.approx(1e-3, rel=2.1e-3)
         # the pressure is centered where the sphere is
         assert (p * x).sum() / p.sum() == pytest.approx(center[0], abs=3.5e-8)
         assert (p * y).sum() / p.sum() == pytest.approx(center[1], abs=3.5e-8)

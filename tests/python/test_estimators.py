@@ -60,13 +60,15 @@ def test_edge_radius_of_the_exact_pressure(center: tuple[float, float]) -> None:
     hertz = analytic.hertz_sphere(1.0, 1.0, contact_radius=11.37)
     pressure = hertz.pressure(np.hypot(x - center[0], y - center[1]))
     # p^2 of Hertz is exactly linear in r^2
-    assert measures.edge_radius(x, y, pressure, 1.0, center) == pytest.approx(11.37, rel=1e-12)
+    radius = measures.edge_radius(x, y, pressure, 1.0, np.sqrt(0.75), center)
+    assert radius == pytest.approx(11.37, rel=1e-12)
 
 
 def test_edge_radius_of_too_few_nodes() -> None:
     x, y = lattice(5)
-    assert np.isnan(measures.edge_radius(x, y, np.where(np.hypot(x, y) < 0.5, 1.0, 0.0), 1.0))
-    assert np.isnan(measures.edge_radius(x, y, np.zeros_like(x), 1.0))
+    few = np.where(np.hypot(x, y) < 0.5, 1.0, 0.0)
+    assert np.isnan(measures.edge_radius(x, y, few, 1.0, np.sqrt(0.75)))
+    assert np.isnan(measures.edge_radius(x, y, np.zeros_like(x), 1.0, np.sqrt(0.75)))
 
 
 @pytest.mark.parametrize("angle", [-80, -20, 0, 35, 90])

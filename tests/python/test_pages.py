@@ -56,7 +56,11 @@ def test_pictures_of_the_pages_are_those_that_the_program_draws(name: str) -> No
 
 @pytest.mark.parametrize(
     ("load", "share", "algorithm"),
-    [("36 N", "0.25 mu P", "incremental"), ("54 N", "0.65 mu P", "static"), ("84 N", "0.8 mu P", "incremental")],
+    [
+        ("36 N", "0.25 mu P", "incremental"),
+        ("54 N", "0.65 mu P", "static"),
+        ("84 N", "0.8 mu P", "incremental"),
+    ],
 )
 def test_numbers_of_the_path_picture_are_those_of_its_study(load: str, share: str, algorithm: str) -> None:
     kept = pd.read_csv(MAKE["PATHS"], index_col=[0, 1, 2]).loc[(float(load.split()[0]), share, algorithm)]

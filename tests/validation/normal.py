@@ -55,7 +55,8 @@ class Solved:
     @property
     def edge_radius(self) -> float:
         """A from p^2 at the edge, about x = y = 0."""
-        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing)
+        cell = np.sqrt(0.75) * self.spacing**2
+        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
 
 
 def solve(body_1: Mapping[str, Any], body_2: Mapping[str, Any], **arguments: Any) -> Solved:

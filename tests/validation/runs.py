@@ -78,7 +78,8 @@ class State:
     @property
     def edge_radius(self) -> float:
         """A from p^2 at the edge, about x = y = 0."""
-        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing)
+        cell = np.sqrt(0.75) * self.spacing**2
+        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
 
     @property
     def stick_fraction(self) -> float:

@@ -125,7 +125,7 @@ class ContactEdges:
 
     Nodes are in contact, and can touch (`candidate`). Where a contact ends at nodes that cannot, as at the
     rim of a punch, its pressure does not vanish, and its edge is that of the cells of its nodes. Basis
-    vectors of the (equilateral) lattice are rows, `start` is the position of node [0, 0].
+    vectors of the lattice are rows, `start` is the position of node [0, 0].
     """
 
     def __init__(

@@ -25,9 +25,27 @@ class Nodes(NamedTuple):
     shape: tuple[int, ...]
 
 
+class Pattern(NamedTuple):
+    """A lattice but for its spacing: position of node (0, 0) [m], and its cells, as `Lattice` has them."""
+
+    origin: tuple[float, float] = (0.0, 0.0)
+    cell_ratio: float = 1.0
+    cell_angle: float = math.pi / 3
+
+    def window(self, spacing: float, row_first: int, col_first: int, n_row: int, n_col: int) -> Lattice:
+        """Return a window of it."""
+        return Lattice(spacing, row_first, col_first, n_row, n_col, *self)
+
+    def coordinates(self, x: Array | float, y: Array | float) -> tuple[Array, Array]:
+        """Return the coordinates (m) of points along the two basis vectors, from node (0, 0)."""
+        inverse = np.linalg.inv(self.window(1.0, 0, 0, 1, 1).basis)
+        dx, dy = np.asarray(x, float) - self.origin[0], np.asarray(y, float) - self.origin[1]
+        return dx * inverse[0, 0] + dy * inverse[1, 0], dx * inverse[0, 1] + dy * inverse[1, 1]
+
+
 @dataclass(frozen=True)
 class Lattice:
-    """A window of an equilateral lattice.
+    """A window of a lattice, which is equilateral unless its cells are given.
 
     Node (row j, col i), with absolute integer indices, lies at ``origin + i*basis[0] + j*basis[1]``;
     fields over the window are arrays of shape ``(n_row, n_col)``.
@@ -35,13 +53,17 @@ class Lattice:
     Parameters
     ----------
     spacing
-        Distance of neighboring nodes [m].
+        Distance of neighboring nodes along x, the length of the first basis vector [m].
     row_first, col_first
         Smallest row and column index.
     n_row, n_col
         Number of rows and columns.
     origin
         Position of node (0, 0) [m].
+    cell_ratio
+        Length of the second basis vector over that of the first.
+    cell_angle
+        Angle of the second basis vector from x [rad].
     """
 
     spacing: float
@@ -50,10 +72,15 @@ class Lattice:
     n_row: int
     n_col: int
     origin: tuple[float, float] = (0.0, 0.0)
+    cell_ratio: float = 1.0
+    cell_angle: float = math.pi / 3
 
     def __post_init__(self) -> None:
         if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:
             raise DeckError(f"spacing = {self.spacing!r}: expected {_LENGTH}")
+        number(self.cell_ratio, "cell_ratio", "a positive number", lambda ratio: 0 < ratio < np.inf)
+        kind = "an angle in radians between 0 and pi"
+        number(self.cell_angle, "cell_angle", kind, lambda angle: 0 < angle < np.pi)
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
         origin = reals(self.origin, "origin")
@@ -72,21 +99,26 @@ class Lattice:
         length_x: float,
         length_y: float,
         origin: tuple[float, float] = (0.0, 0.0),
+        cell_ratio: float = 1.0,
+        cell_angle: float = math.pi / 3,
     ) -> Lattice:
-        """Return the smallest window whose rhombus covers a rectangle.
+        """Return the smallest window whose parallelogram covers a rectangle.
 
         Parameters
         ----------
         spacing
-            Distance of neighboring nodes [m].
+            Distance of neighboring nodes along x [m].
         center
             Center of the rectangle [m].
         length_x, length_y
             Full sides of the rectangle [m].
         origin
             Position of node (0, 0) [m].
+        cell_ratio, cell_angle
+            Length of the second basis vector over that of the first, and its angle from x [rad].
         """
-        unit = cls(spacing, 0, 0, 1, 1, origin)
+        pattern = Pattern(origin, cell_ratio, cell_angle)
+        unit = pattern.window(spacing, 0, 0, 1, 1)
         half = 0.5 * np.array([length_x, length_y])
         signs = np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)])
         indices = (signs * half + np.asarray(center) - origin) @ np.linalg.inv(unit.basis)
@@ -95,12 +127,17 @@ class Lattice:
         last = np.ceil(indices.max(axis=0) - 1e-9).astype(int)
         n_col, n_row = (last - first + 1).tolist()
         col_first, row_first = first.tolist()
-        return cls(spacing, row_first, col_first, n_row, n_col, origin)
+        return pattern.window(spacing, row_first, col_first, n_row, n_col)
+
+    @property
+    def pattern(self) -> Pattern:
+        """The lattice but for spacing and window."""
+        return Pattern(self.origin, self.cell_ratio, self.cell_angle)
 
     @cached_property
     def basis(self) -> Array:
         """Basis vectors, one a row [m]."""
-        basis: Array = flat.lattice_basis(self.spacing)
+        basis: Array = flat.lattice_basis(self.spacing, self.cell_ratio, self.cell_angle)
         return basis
 
     @cached_property
@@ -237,6 +274,7 @@ def section_ends(
 
 def crossings(lattice: Lattice, start: Point, end: Point) -> Array:
     """Return where a line crosses edges of triangles, as distances from its start (m), with its ends."""
-    most = 8 + int(4.0 * math.dist(start, end) / lattice.spacing)  # rows are sqrt(3)/2 spacings apart
+    lines = np.linalg.norm(np.linalg.inv(lattice.basis), axis=0)  # columns and rows per length across them
+    most = 8 + int(2.0 * math.dist(start, end) * lines.sum())
     distance, count = flat.crossings_of_line(lattice, start, end, most)
     return np.asarray(distance[:count])

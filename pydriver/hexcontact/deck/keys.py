@@ -7,6 +7,7 @@ the tables together (load history, size of the window, limits of this version).
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from itertools import pairwise
@@ -37,7 +38,7 @@ from .kinds import (
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
 from .table_base import Table, extended, kind_of, meaning, parts_of, problems_of
-from .units import LENGTH, NUMBER, PRESSURE, Dimension
+from .units import ANGLE, LENGTH, NUMBER, PRESSURE, Dimension
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
@@ -145,6 +146,12 @@ class Grid(Table):
     ) = meaning(None, "nodes of the window about `center`, [n_row, n_col], instead of `extent`")
     center: Point | None = meaning(None, "middle of the window; where the bodies touch first if absent")
     origin: Point = meaning((0.0, 0.0), "a point of the plane that is a node")
+    cell_ratio: Annotated[float, Quantity(NUMBER, at_least=0.25, at_most=4.0)] = meaning(
+        1.0, "distance of nodes along the second basis vector of the lattice over the spacing", "0.5"
+    )
+    cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] = meaning(
+        math.pi / 3, "angle of the second basis vector from x; 60 deg: the equilateral lattice", '"90 deg"'
+    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

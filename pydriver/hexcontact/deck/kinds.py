@@ -204,7 +204,7 @@ class Quantity(Kind):
 
     def _expected(self) -> str:
         limits = [
-            f"{word} {bound:g}"
+            f"{word} {bound:g} {self.dimension.unit if bound else ''}".strip()
             for word, bound in (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
             if bound is not None
         ]

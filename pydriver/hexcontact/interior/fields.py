@@ -151,7 +151,7 @@ def _covering(lattice: Lattice, box: Array) -> Lattice:
     if (abs(box - np.reshape(lattice.origin, (2, 1))) > _MOST_NODES * lattice.spacing).any():
         raise DeckError(f"box: expected places within {_MOST_NODES:,} spacings of the origin of the lattice")
     center, (length_x, length_y) = box.mean(axis=1), np.diff(box, axis=1)[:, 0]
-    return Lattice.covering(lattice.spacing, tuple(center), length_x, length_y, lattice.origin)
+    return Lattice.covering(lattice.spacing, tuple(center), length_x, length_y, *lattice.pattern)
 
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")

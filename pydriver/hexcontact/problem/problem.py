@@ -260,7 +260,7 @@ class Problem:
         """Return the number of holes of a height map within the bounds of an estimated contact."""
         if self.height_map is None:
             return 0
-        at = window.lattice_coordinates(*self.height_map.holes, self.deck.grid.origin)
+        at = window.pattern_of(self.deck.grid).coordinates(*self.height_map.holes)
         inside = [(low <= c) & (c <= high) for c, (low, high) in zip(at, contact.bounds, strict=True)]
         return int(np.count_nonzero(inside[0] & inside[1]))
 
@@ -274,12 +274,13 @@ class Problem:
         """Return the same problem on a lattice of another spacing (m) and origin (m), without refinement."""
         other = copy.copy(self)
         other.accuracy, other.trial, other.judged = None, True, {}
-        moved = np.array(window.lattice_coordinates(*self.lattice.origin, origin))
+        pattern = self.lattice.pattern._replace(origin=origin)
+        moved = np.array(pattern.coordinates(*self.lattice.origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]
-            other.lattice = window.enclosing(bounds[:, 0], bounds[:, 1], spacing, window.MARGIN, origin)
+            other.lattice = window.enclosing(bounds[:, 0], bounds[:, 1], spacing, window.MARGIN, pattern)
         else:
-            other.lattice = window.covering(self.lattice, spacing, origin)
+            other.lattice = window.covering(self.lattice, spacing, pattern)
         return other
 
     def method_for(self, lattice: Lattice) -> Method:
@@ -389,7 +390,7 @@ class Problem:
         if self.full_contact:
             assert grid.spacing is not None  # checked, as the window is
             assert grid.window is not None
-            lattice = window.centered(grid.spacing, center, grid.window, grid.origin)
+            lattice = window.centered(grid.spacing, center, grid.window, window.pattern_of(grid))
             self._check_interface(source, lattice)
             return lattice
         try:
@@ -423,7 +424,7 @@ class Problem:
 
     def estimated(self, **drive: Any) -> Estimate:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
-        place = self._center, self.deck.grid.origin
+        place = self._center, window.pattern_of(self.deck.grid)
         return window.estimate_contact(
             self.pair, self._gap.at, *place, self.interface, self._gap.heights, **drive
         )

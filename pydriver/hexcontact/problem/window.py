@@ -3,7 +3,7 @@
 The estimate solves the frictionless problem, for the largest load of the history, on a coarse lattice that is
 first enlarged until the contact lies inside and then refined until the contact is some sixteen nodes across
 where it is narrowest, for any shape. All bounds are in lattice coordinates (lengths along the two basis
-vectors), since the window is a rhombus.
+vectors), since the window is a parallelogram.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Array, Mask, reals
 from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
-from ..core.lattice import Lattice
+from ..core.lattice import Lattice, Pattern
 from ..deck.faults import MISSING, Mistake
 from ..deck.keys import Grid
 from ..deck.units import readable
@@ -75,45 +75,33 @@ class Estimate(NamedTuple):
 # --- lattice coordinates ------------------------------------------------------------------------------------
 
 
-def lattice_coordinates(
-    x: Array | float, y: Array | float, origin: tuple[float, float]
-) -> tuple[Array, Array]:
-    """Return the coordinates (m) of points along the two basis vectors of the lattice, from its origin."""
-    basis = Lattice(1.0, 0, 0, 1, 1).basis
-    inverse = np.linalg.inv(basis)
-    dx, dy = np.asarray(x, float) - origin[0], np.asarray(y, float) - origin[1]
-    return dx * inverse[0, 0] + dy * inverse[1, 0], dx * inverse[0, 1] + dy * inverse[1, 1]
-
-
 def centered(
-    spacing: float, center: tuple[float, float], shape: tuple[int, int], origin: tuple[float, float]
+    spacing: float, center: tuple[float, float], shape: tuple[int, int], pattern: Pattern
 ) -> Lattice:
     """Return the window of `shape` (n_row, n_col) about the node nearest to `center`.
 
     An odd count puts that node in the middle; of an even count, one node more lies on the negative side.
     """
-    along, across = lattice_coordinates(*center, origin)
+    along, across = pattern.coordinates(*center)
     col, row = round(float(along) / spacing), round(float(across) / spacing)
-    return Lattice(spacing, row - shape[0] // 2, col - shape[1] // 2, *shape, origin=origin)
+    return pattern.window(spacing, row - shape[0] // 2, col - shape[1] // 2, *shape)
 
 
-def enclosing(
-    lower: Array, upper: Array, spacing: float, margin: int, origin: tuple[float, float]
-) -> Lattice:
+def enclosing(lower: Array, upper: Array, spacing: float, margin: int, pattern: Pattern) -> Lattice:
     """Return the smallest window about all nodes between two lattice coordinates, and `margin` nodes more."""
     first = [math.floor(value / spacing) - margin for value in lower]
     last = [math.ceil(value / spacing) + margin for value in upper]
-    return Lattice(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1, origin=origin)
+    return pattern.window(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1)
 
 
-def covering(window: Lattice, spacing: float, origin: tuple[float, float]) -> Lattice:
+def covering(window: Lattice, spacing: float, pattern: Pattern) -> Lattice:
     """Return the smallest window of another lattice about all nodes of a window."""
-    moved = np.array(lattice_coordinates(*window.origin, origin))
+    moved = np.array(pattern.coordinates(*window.origin))
     first = np.array([window.col_first, window.row_first])
     last = first + np.array([window.n_col, window.n_row]) - 1
     slack = 1e-9 * spacing  # nodes that both have in common stay the rim, whatever the rounding
     lower, upper = (window.spacing * index + moved for index in (first, last))
-    return enclosing(lower + slack, upper - slack, spacing, 0, origin)
+    return enclosing(lower + slack, upper - slack, spacing, 0, pattern)
 
 
 def reaches_rim(contact: Mask) -> bool:
@@ -128,21 +116,21 @@ def estimate_contact(
     pair: ElasticPair,
     gap: GapFunction,
     center: tuple[float, float],
-    origin: tuple[float, float],
+    pattern: Pattern,
     interface: Interface = UNILATERAL,
     heights: Sequence[GapFunction] = (),
     **drive: float,
 ) -> Estimate:
     """Estimate the contact under a normal load (N) or at an approach (m)."""
     half = starting_half_size(pair, gap, center, **drive)
-    lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), origin)
+    lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), pattern)
     enclosed, enlargements = False, 0
     for _ in range(MOST_TRIALS):
         pressure = _solve(pair, gap, lattice, interface, **drive)
         contact = pressure > 0
         if not contact.any():
             # under load control there is always contact; at an approach it may lie between the nodes
-            lattice = centered(lattice.spacing / 4, center, lattice.shape, origin)
+            lattice = centered(lattice.spacing / 4, center, lattice.shape, pattern)
             continue
         if reaches_rim(contact):
             if enclosed:
@@ -150,7 +138,7 @@ def estimate_contact(
             elif (enlargements := enlargements + 1) > MOST_ENLARGEMENTS:
                 break
             else:
-                lattice = centered(2 * lattice.spacing, center, lattice.shape, origin)
+                lattice = centered(2 * lattice.spacing, center, lattice.shape, pattern)
             continue
         enclosed = True
         estimate = _measure(lattice, pressure, gap, heights)
@@ -158,7 +146,7 @@ def estimate_contact(
             return estimate
         factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
         cell = lattice.spacing
-        finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, origin)
+        finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, pattern)
         if finer.n_row * finer.n_col > MOST_COARSE_NODES:
             return estimate
         lattice = finer
@@ -296,45 +284,51 @@ def is_fixed(grid: Grid) -> bool:
     return grid.window is not None or grid.extent != "auto"
 
 
+def pattern_of(grid: Grid) -> Pattern:
+    """Return the lattice of a deck but for its spacing."""
+    return Pattern(grid.origin, grid.cell_ratio, grid.cell_angle)
+
+
 def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Lattice:
     """Return the window of a deck, given an estimate of the contact.
 
-    ``extent = "auto"`` is the smallest rhombus about the estimated contact (its bounds plus the coarse cell
-    with the edge) with a margin of two nodes.
+    ``extent = "auto"`` is the smallest parallelogram about the estimated contact (its bounds plus the coarse
+    cell with the edge) with a margin of two nodes.
     """
     lower, upper = estimate.bounds.T
+    pattern = pattern_of(grid)
     spacing = grid.spacing or (estimate.radius / grid.nodes_in_radius if grid.nodes_in_radius else None)
     if spacing is not None:
         if grid.window is not None:
-            return centered(spacing, center, grid.window, grid.origin)
+            return centered(spacing, center, grid.window, pattern)
         if isinstance(grid.extent, tuple):
-            return Lattice.covering(spacing, center, *grid.extent, origin=grid.origin)
-        return enclosing(lower, upper, spacing, MARGIN, grid.origin)
+            return Lattice.covering(spacing, center, grid.extent[0], grid.extent[1], *pattern)
+        return enclosing(lower, upper, spacing, MARGIN, pattern)
 
     nodes = grid.nodes_across or 0  # one of the three is always given
     shape = (nodes, nodes)
     if isinstance(grid.extent, tuple):
-        lower, upper = _corners(center, grid.extent, grid.origin)
+        lower, upper = _corners(center, grid.extent, pattern)
         margin = 0
     else:
         center_coordinates = (lower + upper) / 2
-        center = tuple(grid.origin + center_coordinates @ Lattice(1.0, 0, 0, 1, 1).basis)
+        center = tuple(grid.origin + center_coordinates @ pattern.window(1.0, 0, 0, 1, 1).basis)
         margin = MARGIN if nodes >= 11 else 1
     # half a spacing may be lost if the middle is no node; the first attempt is without
     for intervals in (nodes - 1 - 2 * margin, nodes - 2 - 2 * margin):
-        lattice = centered(float(np.max(upper - lower)) / intervals, center, shape, grid.origin)
+        lattice = centered(float(np.max(upper - lower)) / intervals, center, shape, pattern)
         if not _outside(lattice, lower, upper):
             break
     return lattice
 
 
 def _corners(
-    center: tuple[float, float], extent: tuple[float, float], origin: tuple[float, float]
+    center: tuple[float, float], extent: tuple[float, float], pattern: Pattern
 ) -> tuple[Array, Array]:
     """Return the bounds of a rectangle in lattice coordinates."""
     x = center[0] + extent[0] / 2 * np.array([-1, 1, -1, 1])
     y = center[1] + extent[1] / 2 * np.array([-1, -1, 1, 1])
-    coordinates = np.stack(lattice_coordinates(x, y, origin))
+    coordinates = np.stack(pattern.coordinates(x, y))
     return coordinates.min(axis=1), coordinates.max(axis=1)
 
 
@@ -369,7 +363,9 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
             needed = f'["{length_x}", "{length_y}"]'
         else:
-            needed_window = enclosing(estimate.lower, estimate.upper, lattice.spacing, MARGIN, grid.origin)
+            needed_window = enclosing(
+                estimate.lower, estimate.upper, lattice.spacing, MARGIN, lattice.pattern
+            )
             needed = f"[{needed_window.n_row}, {needed_window.n_col}] nodes"
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"

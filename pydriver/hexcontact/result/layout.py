@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..arrays import integer
-from ..core.lattice import Lattice
+from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
@@ -34,7 +34,7 @@ _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.item
 _STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
-    *("lattice_spacing", "lattice_basis", "lattice_origin"),
+    *("lattice_spacing", "lattice_basis", "lattice_origin", "lattice_cell_ratio", "lattice_cell_angle"),
     *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
 )
 
@@ -160,6 +160,8 @@ class Layout:
             "lattice_spacing": float(window.spacing),
             "lattice_basis": np.asarray(window.basis, dtype=float).ravel(),
             "lattice_origin": np.asarray(window.origin, dtype=float),
+            "lattice_cell_ratio": float(window.cell_ratio),
+            "lattice_cell_angle": float(window.cell_angle),
             **self.metadata.attributes(),
         }
 
@@ -217,8 +219,8 @@ class Layout:
 def _union(windows: Sequence[Lattice]) -> Lattice:
     """Return the smallest window about `windows` of one lattice."""
     first = windows[0]
-    if any((w.spacing, w.origin) != (first.spacing, first.origin) for w in windows):
-        raise ValueError("the steps of a result share one lattice: spacing and origin must not change")
+    if any((w.spacing, w.pattern) != (first.spacing, first.pattern) for w in windows):
+        raise ValueError("the steps of a result share one lattice: spacing, origin and cells must not change")
     row_first = min(w.row_first for w in windows)
     col_first = min(w.col_first for w in windows)
     return dataclasses.replace(
@@ -233,8 +235,10 @@ def _union(windows: Sequence[Lattice]) -> Lattice:
 def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
     """Return the lattice window of the attributes and index coordinates of a file."""
     x0, y0 = np.asarray(attributes.get("lattice_origin", (0.0, 0.0)), dtype=float).tolist()
+    cells = (f"lattice_{name}" for name in ("cell_ratio", "cell_angle"))  # older files have none
+    pattern = Pattern((x0, y0), *(float(attributes[name]) for name in cells if name in attributes))
     spacing = float(attributes["lattice_spacing"])
-    return Lattice(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols), (x0, y0))
+    return pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
 
 
 def lattice_of(dataset: xarray.Dataset) -> Lattice:

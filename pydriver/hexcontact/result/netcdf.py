@@ -102,6 +102,8 @@ _ATTRIBUTES: dict[str, Fits] = {
     "lattice_origin": _numbers(2),
 }
 _LATER = {
+    "lattice_cell_ratio": _is_positive,
+    "lattice_cell_angle": lambda value: _is_number(value) and 0 < value < math.pi,
     INTERFACE[0]: _is_positive,
     INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
     INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
@@ -234,7 +236,7 @@ def _fault_of_fields(dataset: xarray.Dataset) -> str:
         fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
         history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
         kept = number % every == 0 or number == numbers[-1]
-        fault = _fault_of_values(fields, history, lattice.spacing, kept)
+        fault = _fault_of_values(fields, history, lattice.cell_area, kept)
         if fault := fault or (_fault_of_loads(fields, history, lattice) if kept else ""):
             return f"{fault} in step {number}"
     return ""
@@ -255,7 +257,7 @@ def _fault_of_loads(fields: Mapping[str, NDArray[Any]], history: Mapping[str, An
 
 
 def _fault_of_values(
-    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], spacing: float, kept: bool = True
+    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], cell_area: float, kept: bool = True
 ) -> str:
     """Return a fault of nodal values, which have bounds and fit the history."""
     zone, pressure = fields.get("zone"), fields.get("pressure")
@@ -278,7 +280,7 @@ def _fault_of_values(
         if not math.isclose(peak, history["max_pressure"], rel_tol=_CLOSE):
             return "pressure does not fit to max_pressure"
     if zone is not None and kept and "contact_area" in history:
-        cells = history["contact_area"] / (spacing**2 * math.sqrt(0.75))
+        cells = history["contact_area"] / cell_area
         if abs(np.count_nonzero(zone > 0) - cells) > _CLOSE * (1 + cells):
             return "zone does not fit to contact_area"
     return ""
@@ -293,8 +295,8 @@ _TRIANGLES = 1 << 16  # triangles
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
     """Return the nodes at the corners of each triangle of a window, counterclockwise, shape (n, 3).
 
-    The short diagonal halves each cell into equilateral triangles, on which tractions are linear. Node (row
-    j, col i) has the number ``j*n_col + i``.
+    The diagonal from the second to the fourth corner halves each cell into triangles, on which tractions are
+    linear. Node (row j, col i) has the number ``j*n_col + i``.
     """
     first = np.arange(n_row * n_col, dtype=np.int32).reshape(n_row, n_col)[:-1, :-1].ravel()
     right, up, across = first + 1, first + n_col, first + n_col + 1

@@ -34,7 +34,7 @@ def window_type(case: Problem) -> type[Window[Any]]:
 
 def check_step(case: Problem, last: Step, found: str) -> None:
     """Refuse a finished step with another lattice or other surfaces than a case; `found` names it."""
-    if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
+    if (case.lattice.spacing, case.lattice.pattern) != (last.lattice.spacing, last.lattice.pattern):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
     gap, touching = case.initial_gap(last.lattice)
     then = last.fields["initial_gap"]

@@ -1,0 +1,141 @@
+"""Lattices with square, flat and oblique cells, to the accuracy of the equilateral one."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexcontact import Case, DeckError, analytic, open_result
+from hexcontact.analytic.friction import MindlinContact
+from hexcontact.core.contact import ElasticPair, FlexibilityOperator
+from hexcontact.core.interpolation import crossings
+from hexcontact.core.lattice import Lattice
+from hexcontact.interior import fields
+from hexcontact.interior.stress import _edges, nodal_tractions, tractions
+
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+RADIUS = 1e-3
+HERTZ = analytic.hertz_sphere(210e9 / (2 * (1 - 0.3**2)), 0.02, contact_radius=RADIUS)
+MU = 0.3
+CELLS = {"equilateral": (1.0, 60), "square": (1.0, 90), "flat": (0.5, 90), "oblique": (1.0, 50)}
+
+
+def sphere(cells: str, spacings: float, **arguments) -> Case:
+    """Hertz's contact on cells as large as equilateral ones with some spacings in the radius."""
+    ratio, angle = CELLS[cells]
+    spacing = RADIUS / spacings * math.sqrt(math.sqrt(0.75) / (ratio * math.sin(math.radians(angle))))
+    grid = {"spacing": spacing, "cell_ratio": ratio, "cell_angle": f"{angle} deg"}
+    body = {**STEEL, "surface": {"shape": "sphere", "radius": 0.02}}
+    return Case(body_1=body, body_2=STEEL, **grid, **({"normal_load": HERTZ.normal_load} | arguments))
+
+
+@pytest.mark.parametrize("cells", CELLS)
+def test_hertz_and_cattaneo(cells: str) -> None:
+    load = 0.8 * MU * HERTZ.normal_load
+    loads = [{"normal_load": HERTZ.normal_load}, {"tangential_load_x": load}]
+    case = sphere(cells, 32, friction_coefficient=MU, normal_load=None, loads=loads)
+    step = case.run().dataset.isel(step=-1)
+    exact = MindlinContact(MU, HERTZ.normal_load, RADIUS, 2 * (2 - 0.3) * 2.6 / 210e9)
+    assert float(step["max_pressure"]) == pytest.approx(HERTZ.max_pressure, rel=1e-4)
+    assert float(step["approach"]) == pytest.approx(HERTZ.approach, rel=1e-4)
+    assert float(step["shift_x"]) == pytest.approx(float(exact.shift(load)), rel=1e-3)
+    for name in ("contact_radius_fit", "contact_semi_major", "contact_semi_minor"):
+        assert float(step[name]) == pytest.approx(RADIUS, rel=1e-3)
+    assert float(step["stick_radius_fit"]) == pytest.approx(float(exact.stick_radius(load)), rel=2e-3)
+    assert float(step["contact_area"]) == pytest.approx((step["zone"] > 0).sum() * case.lattice.cell_area)
+    assert float(step["operator_applications"]) < 30
+
+
+@pytest.mark.parametrize("cells", CELLS)
+def test_compliant_interface(cells: str) -> None:
+    """The contact of c = 10, m = 2 in E* = R = a = 1 has the approach 1.16139 and the pressure 0.87771 p0."""
+    stiffness = 10.0 * HERTZ.effective_modulus * (RADIUS / 0.02) / (RADIUS**2 / 0.02) ** 2
+    step = sphere(cells, 40, interface={"coefficient": stiffness, "exponent": 2}).run().dataset.isel(step=-1)
+    assert float(step["approach"]) == pytest.approx(1.16139 * HERTZ.approach, rel=5e-4)
+    assert float(step["max_pressure"]) == pytest.approx(0.87771 * HERTZ.max_pressure, rel=5e-4)
+
+
+@pytest.mark.parametrize("cells", CELLS)
+def test_stress_beside_the_edge(cells: str) -> None:
+    """Against the pressure of Hertz and full sliding on a lattice eight times as fine."""
+    steps: list = []
+    sphere(cells, 20, tolerance=1e-11).run(on_step=steps.append)
+    step, p0, h = steps[-1], HERTZ.max_pressure, RADIUS / 20
+    fine = Lattice.covering(h / 8, (0.0, 0.0), 2.1 * RADIUS, 2.1 * RADIUS)
+    hertzian = p0 * np.sqrt(np.maximum(1.0 - (fine.x**2 + fine.y**2) / RADIUS**2, 0.0))
+    hats = tractions(step.lattice, [step.fields], step.bodies, 0.0, "edges")[0][0, 0]
+    [nodal] = nodal_tractions([step.fields])
+    edges = _edges(step.lattice, nodal, step.fields)
+    none, law = np.zeros(hats.shape, dtype=bool), np.full(hats.shape, MU)
+    for away, depth in ((-1.0, 0.0), (-0.3, 0.0), (0.3, 0.0), (1.0, 0.0), (0.0, 0.3), (0.2, 0.7)):
+        r = RADIUS - away * h
+        points = np.array([(r * np.cos(t), r * np.sin(t), depth * h) for t in np.linspace(0.0, np.pi, 7)])
+        loads = np.array([[hertzian, MU * hertzian, 0 * hertzian]])
+        _, [known] = fields.at_points(fine, loads, 1, 0.3, points)
+        loads = np.array([[hats, MU * hats, 0 * hats]])
+        _, [found] = fields.at_points(step.lattice, loads, 1, 0.3, points)
+        shear = np.array([MU * nodal[0], 0 * nodal[0]])
+        more, refused = edges.stress(shear, none, law, loads[0], 1, 0.3, points)
+        plane = [0, 1, 3] if depth == 0.0 else slice(None)
+        assert refused == 0.0
+        assert abs(found + more - known)[:, plane].max() < 6e-3 * p0
+
+
+def test_planes_below_are_sums_at_their_nodes() -> None:
+    result = sphere("flat", 8).run()
+    box = [[-3e-4, 3e-4], [-2e-4, 2e-4]]
+    plane = result.stress("von_mises_stress", depths=[2e-4], box=box)["von_mises_stress"]
+    points = np.stack([plane["x"].values, plane["y"].values, 2e-4 + 0 * plane["x"].values], axis=-1)
+    values = result.stress("von_mises_stress", points=points.reshape(-1, 3))["von_mises_stress"]
+    assert plane.values.ravel() == pytest.approx(values.values.ravel(), rel=1e-9)
+
+
+def test_the_file_and_the_deck_in_it_have_the_lattice(tmp_path: Path) -> None:
+    case = sphere("oblique", 6)
+    case.run(tmp_path / "oblique.nc")
+    result = open_result(tmp_path / "oblique.nc")
+    assert result.lattice == case.lattice
+    assert Case.from_text(result.dataset.attrs["deck"]).lattice == case.lattice
+    usual = case.changed(cell_angle="60 deg", cell_ratio=1.0)
+    assert usual.lattice.pattern == Lattice(1.0, 0, 0, 1, 1).pattern
+    lattice = Lattice(1e-4, -9, -9, 19, 19, (1e-5, 0.0), 0.7, 1.3)
+    given = Case(
+        body_1=STEEL, body_2=STEEL, gap=lambda x, y: 25 * (x**2 + y**2), lattice=lattice, approach=5e-6
+    )
+    assert given.lattice == lattice
+    assert given.deck.grid.cell_angle == 1.3
+
+
+def test_the_basis_is_that_of_the_equilateral_lattice_to_the_bit() -> None:
+    lattice = Lattice(3e-5, 0, 0, 1, 1, cell_angle=math.radians(60.0) * (1 + 1e-16))
+    assert (lattice.basis == 3e-5 * np.array([[1.0, 0.0], [0.5, 0.5 * math.sqrt(3.0)]])).all()
+    square = Lattice(3e-5, 0, 0, 1, 1, cell_ratio=0.5, cell_angle=math.pi / 2)
+    assert square.basis == pytest.approx(3e-5 * np.array([[1.0, 0.0], [0.0, 0.5]]), abs=1e-20)
+
+
+def test_the_operator_is_that_of_turned_cells() -> None:
+    """On a square lattice the response along y to a load along y is that along x to one along x."""
+    lattice = Lattice(1.0, -4, -4, 9, 9, cell_angle=math.pi / 2)
+    operator = FlexibilityOperator(lattice, ElasticPair(1.0, 0.3, 0.5))
+    load, none = np.zeros((9, 9)), np.zeros((9, 9))
+    load[4, 4] = 1.0
+    along_x = operator.apply(none, load, none)[1]
+    along_y = operator.apply(none, none, load)[2]
+    # the diagonals of the triangles run one way only, so that the turned cells are their mirror images
+    assert along_y == pytest.approx(along_x.T, rel=1e-12)
+
+
+def test_a_line_over_flat_cells_crosses_all_edges() -> None:
+    lattice = Lattice(1.0, -40, -10, 81, 21, cell_ratio=0.25, cell_angle=math.pi / 2)
+    at = crossings(lattice, (0.1, -9.0), (0.1, 9.0))
+    assert len(at) == 2 * 72 + 1
+    assert (np.diff(at) > 0).all()
+
+
+def test_cells_that_are_too_flat_are_one_sentence() -> None:
+    for key, value in (("cell_ratio", 9), ("cell_angle", "170 deg"), ("cell_angle", 1.2)):
+        with pytest.raises(DeckError, match=rf"grid\.{key} = .*: expected an? .* at least 0\.\S* .*at most"):
+            sphere("square", 6).changed({f"grid.{key}": value})
+    with pytest.raises(DeckError, match="cell_angle = 4: expected an angle in radians between 0 and pi"):
+        Lattice(1.0, 0, 0, 1, 1, cell_angle=4)

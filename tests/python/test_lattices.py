@@ -9,8 +9,7 @@ import pytest
 from hexcontact import Case, DeckError, analytic, open_result
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.core.contact import ElasticPair, FlexibilityOperator
-from hexcontact.core.interpolation import crossings
-from hexcontact.core.lattice import Lattice
+from hexcontact.core.lattice import Lattice, crossings
 from hexcontact.interior import fields
 from hexcontact.interior.stress import _edges, nodal_tractions, tractions
 

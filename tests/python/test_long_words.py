@@ -114,11 +114,10 @@ def test_patterns_are_found() -> None:
     for room in (
         "deck.units",
         "deck.kinds",
-        "deck.kinds",
         "deck.series",
         "deck.toml",
         "deck.faults",
-        "cli.options",
+        "cli.frame",
     ):
         assert f"hexcontact.{room}" in places
     assert len(patterns()) > 30

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/developer.md").read_text(encoding="utf-8")
-SOURCES = ("fortran", "pydriver", "tests", "docs", "cases")
+SOURCES = ("fortran", "pydriver", "tests", "docs", "cases", "packaging", "subprojects")
 BUILDS = ("build/editable", "build/release")
 COUNTS = {"One file": 1, "Two files": 2, "Three files": 3, "Five files": 5}
 MOST = {"a friction law": 5, "a nodal output field": 3}

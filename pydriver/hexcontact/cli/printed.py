@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..analytic.hertz_gap import against_hertz, half_axes
 from ..errors import DeckError
 from ..result.history_words import (
     contact_size,
@@ -111,6 +110,8 @@ class Summary(NamedTuple):
     @property
     def hertz(self) -> list[tuple[str, float, float, str]]:
         """The last step compared with Hertz, see `against_hertz`."""
+        from ..analytic.hertz_gap import against_hertz  # `check` needs no closed solution
+
         try:
             return against_hertz(self.deck, self.parameters, self.histories[-1])
         except DeckError:  # see `remarks`
@@ -235,6 +236,8 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
         columns["stick"] = column(stick_share, "stick_area")
     else:
         columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
+        from ..analytic.hertz_gap import half_axes
+
         if any(half_axes(history) for history in histories):
             columns["half-axes"] = lambda h: contact_size(h)[1]
         else:

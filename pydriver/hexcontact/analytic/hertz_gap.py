@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
+from ..core.measures import half_axes
 from ..deck.read import recorded
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import xarray
 
 
-ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
 
 
@@ -124,12 +124,6 @@ class QuadraticGap:
     def approach(self, load: float) -> float:
         """Return the approach (m) from the height zero of the surfaces under a load (N)."""
         return self.contact(load).approach + self.lowest
-
-
-def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
-    major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
-    return (major, minor) if minor < ROUND * major else None
 
 
 def against_hertz(

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..core.measures import half_axes
 from ..errors import DeckError
 from ..result.history_words import (
     contact_size,
@@ -236,8 +237,6 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
         columns["stick"] = column(stick_share, "stick_area")
     else:
         columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
-        from ..analytic.hertz_gap import half_axes
-
         if any(half_axes(history) for history in histories):
             columns["half-axes"] = lambda h: contact_size(h)[1]
         else:

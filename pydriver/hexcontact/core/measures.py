@@ -5,6 +5,8 @@ Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -25,7 +27,14 @@ from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
 
 NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
+ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 LATTICE_ERRORS: tuple[str, ...] = flat.LatticeErrors._fields
+
+
+def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
+    major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
+    return (major, minor) if minor < ROUND * major else None
 
 
 class Ellipse(NamedTuple):

@@ -15,10 +15,10 @@ from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
 from ..analytic.compare import PartialSlip
-from ..analytic.hertz_gap import ROUND
 from ..arrays import Array, Mask
 from ..core import measures
 from ..core.edges import ZoneMesh
+from ..core.measures import ROUND
 from ..errors import NotInResult
 from ..result.html import SLIP, STICK
 from ..result.netcdf import triangles

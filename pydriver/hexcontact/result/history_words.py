@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analytic.hertz_gap import half_axes
 from ..core.measures import cycles as cycles_of
-from ..core.measures import line_of, turning_points
+from ..core.measures import half_axes, line_of, turning_points
 from ..deck.below import Stage
 from ..text import Row, cycle_count, listed, percent, quantity
 from ..variables import (

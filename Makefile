@@ -186,6 +186,7 @@ package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build t
 
 # With pocketfft, so that nothing in it is under the GPL but what GCC's runtime exception covers.
 wheel: $(STAMPS)/build-tools $(STAMPS)/extra-wheel  ## a wheel that needs no compiler, BLAS or FFTW, in build/wheelhouse
+	@sh .ci/bootstrap.sh --cpp
 	@$(py) .ci/wheel.py $(WHEEL_BUILD)
 
 wheel-check: wheel $(STAMPS)/extra-test  ## Fortran unit tests on its build, and the tests of make check on the wheel itself

@@ -5,17 +5,20 @@
 #
 #   sh .ci/bootstrap.sh            check, install what is missing, create .venv
 #   sh .ci/bootstrap.sh --flang flang-22  the same, with that flang and its OpenMP
+#   sh .ci/bootstrap.sh --cpp      the same, with a C++ compiler (pocketfft)
 #   sh .ci/bootstrap.sh --venv-ok  say nothing; succeed if .venv is usable
 #
 # PYTHON=/path/to/python3.12  uses that interpreter
 # APT=no                      installs no system package, only names them
-# CC, FC, PKG_CONFIG          as usual
+# CC, CXX, FC, PKG_CONFIG     as usual
 set -u
 cd "$(dirname "$0")/.." || exit 1
 
 oldest_python='3.11'
 flang=''
 [ "${1:-}" != --flang ] || flang=$2
+cpp=''
+[ "${1:-}" != --cpp ] || cpp=yes
 venv="$PWD/.venv"
 # A new environment must not be made with the interpreter of the old one.
 PATH=$(printf '%s' "$PATH" | sed "s|$venv/bin:||g")
@@ -88,6 +91,14 @@ compiles_c() {
   return 1
 }
 
+compiles_cpp() {
+  printf '#include <cstdio>\nint main() { std::puts("c++"); }\n' >"$scratch/try.cpp"
+  for compiler in ${CXX:-c++ g++ clang++}; do
+    "$compiler" "$scratch/try.cpp" -o "$scratch/try_cpp" >/dev/null 2>&1 && return 0
+  done
+  return 1
+}
+
 # Links a Fortran program with the flags given.
 compiles_fortran() {
   printf 'program try\n  print *, sqrt(2.0)\nend program try\n' >"$scratch/try.f90"
@@ -124,6 +135,7 @@ look_around() {
   python=$(find_python) || python=''
   compiles_c || need 'a C compiler' 'gcc libc6-dev'
   compiles_fortran || need 'a Fortran compiler' 'gfortran'
+  [ -z "$cpp" ] || compiles_cpp || need 'a C++ compiler' 'g++'
   [ -z "$flang" ] || FC=$flang compiles_fortran -fopenmp || need "$flang with OpenMP" "$flang libomp-${flang##*-}-dev"
   pkgconfig --version >/dev/null || need 'pkg-config' 'pkg-config'
   links openblas || links lapack blas || need 'OpenBLAS (or LAPACK and BLAS)' 'libopenblas-dev'

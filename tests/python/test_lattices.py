@@ -12,6 +12,7 @@ from hexcontact.core.contact import ElasticPair, FlexibilityOperator
 from hexcontact.core.lattice import Lattice, crossings
 from hexcontact.interior import fields
 from hexcontact.interior.stress import _edges, nodal_tractions, tractions
+from hexcontact.problem.preview import case_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 RADIUS = 1e-3
@@ -96,7 +97,9 @@ def test_the_file_and_the_deck_in_it_have_the_lattice(tmp_path: Path) -> None:
     result = open_result(tmp_path / "oblique.nc")
     assert result.lattice == case.lattice
     assert Case.from_text(result.dataset.attrs["deck"]).lattice == case.lattice
+    assert "cells 1:" in dict(case_rows(case))["spacing"]
     usual = case.changed(cell_angle="60 deg", cell_ratio=1.0)
+    assert "cells" not in dict(case_rows(usual))["spacing"]
     assert usual.lattice.pattern == Lattice(1.0, 0, 0, 1, 1).pattern
     lattice = Lattice(1e-4, -9, -9, 19, 19, (1e-5, 0.0), 0.7, 1.3)
     given = Case(

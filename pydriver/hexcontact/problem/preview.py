@@ -117,6 +117,13 @@ def machine() -> str:
     )
 
 
+def _cells(lattice: Lattice) -> str:
+    """Return the cells of a lattice that is not equilateral."""
+    if lattice.pattern[1:] == Lattice(1.0, 0, 0, 1, 1).pattern[1:]:
+        return ""
+    return f", cells 1:{lattice.cell_ratio:g}, {math.degrees(lattice.cell_angle):g} deg"
+
+
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
     """Return the rows of an overview of a case."""
     lattice, pair, bulk = case.lattice, case.pair, case.deck.bulk
@@ -135,7 +142,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("friction", _friction(case)),
         ("contact", plausibility.row(case)),
         ("contact", "full, one unknown: p = P/A over all nodes" if case.full_contact else ""),
-        ("spacing", quantity(lattice.spacing, "m")),
+        ("spacing", quantity(lattice.spacing, "m") + _cells(lattice)),
         (
             "window",
             f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {size}, "

@@ -1,6 +1,7 @@
 """A build that lacks something names the package."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,9 @@ BLAS = ("OpenBLAS is missing", "libopenblas-dev", "openblas-devel", "module load
 def test_a_missing_library_is_named_for_package_managers(
     fft: str, words: tuple[str, ...], tmp_path: Path
 ) -> None:
-    meson = Path(sys.executable).parent / "meson"
+    beside = str(Path(sys.executable).parent)
+    meson = shutil.which("meson", path=os.pathsep.join([beside, os.environ["PATH"]]))
+    assert meson, "meson is a build tool: make install"
     nothing = {"PKG_CONFIG_LIBDIR": str(tmp_path), "CMAKE": str(tmp_path / "cmake")}
     done = subprocess.run(
         [meson, "setup", tmp_path / "build", f"-Dfft={fft}"],

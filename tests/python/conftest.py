@@ -9,8 +9,9 @@ from hypothesis import settings
 settings.register_profile("seeded", derandomize=True, database=None)
 settings.load_profile("seeded")
 
-# Processes of one session share the cores: threads of BLAS beside them would only wait for each other.
-if "PYTEST_XDIST_WORKER" in os.environ:
+# Processes of one session share the cores: more threads than those would only wait for each other.
+if int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) > 1:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A shell that runs tests in the background has them ignore Ctrl-C, and so what they start; some send it.

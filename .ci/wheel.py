@@ -48,7 +48,7 @@ def run(*words: str | Path, folder: Path = ROOT) -> str:
 
 
 def built(folder: str, scratch: Path) -> Path:
-    """Return the wheel that pip builds, with what the build folder has."""
+    """Return the wheel that pip builds from a build folder."""
     settings = [f"-Cbuild-dir={folder}"]
     settings += [f"-Csetup-args={word}" for word in ("-Dfft=pocketfft", "-Dopenmp=enabled", "-Dtests=true")]
     run(

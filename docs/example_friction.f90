@@ -27,7 +27,7 @@ program press_and_shear
   if (allocated(error)) error stop error%message
   call new_friction_state(state, lattice)
   call path%initialize(state, pi*(0.13e-3_wp)**2)       ! the contact will be about that large
-  path%tolerance = 0.05_wp                              ! what a load step may change
+  path%tolerance = 0.05_wp                              ! largest change by halving a load step
   do segment = 1, 2
     target%value(normal) = 15.0_wp                      ! first up to 15 N,
     if (segment == 2) target%value(along_x) = 3.0_wp    ! then up to 3 N along x

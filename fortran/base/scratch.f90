@@ -14,7 +14,7 @@ module hc_scratch
     real(wp), allocatable :: values(:)
     integer :: users = 0
   contains
-    !> Count one user more, who needs so many bytes
+    !> Add a user that needs a number of bytes
     procedure :: reserve
     !> Address of the memory, whose contents are those of the last user
     procedure :: place
@@ -22,7 +22,7 @@ module hc_scratch
 
 contains
 
-  !> Count one user more, who needs so many bytes; the content is lost.
+  !> Add a user that needs a number of bytes; the content is lost.
   subroutine reserve(self, bytes, stat)
     class(scratch_t), intent(inout) :: self
     integer(int64), intent(in) :: bytes

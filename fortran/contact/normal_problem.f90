@@ -49,7 +49,7 @@ module hc_normal_problem
 
 contains
 
-  !> Set up a problem from what is given.
+  !> Set up the normal part of a contact problem.
   subroutine new_normal_problem(problem, lattice, pair, initial_gap, candidate, error, law)
     !> Problem to be set up
     class(normal_problem_t), intent(inout) :: problem

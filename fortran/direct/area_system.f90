@@ -41,7 +41,7 @@ module hc_area_system
 
   !> The matrix of an area and its factors.
   type, extends(linear_system_t) :: area_system_t
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), pointer :: problem => null()
     !> Products over the window
     class(flexibility_t), pointer :: operator => null()
@@ -56,7 +56,7 @@ contains
 
   !> Solve for the unknowns of an area and the changes of the driven motions, from a start.
   subroutine solve_with_factors(problem, operator, factors, accuracy, area, solved, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in), target :: problem
     !> Products over the window
     class(flexibility_t), intent(inout), target :: operator

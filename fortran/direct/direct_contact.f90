@@ -29,7 +29,7 @@ module hc_direct_contact
   type, extends(contact_solver_t) :: direct_contact_t
     private
     type(dense_flexibility_t) :: flexibility
-    !> What is given
+    !> The contact problem
     type(normal_problem_t) :: problem
     !> Matrix of the contact area and its factor: as large as the largest area so far
     real(wp), allocatable :: matrix(:, :)

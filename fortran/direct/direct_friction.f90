@@ -58,7 +58,7 @@ contains
   subroutine new_direct_friction(self, problem, error)
     !> Solver to be set up
     type(direct_friction_t), intent(out) :: self
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error

@@ -49,7 +49,7 @@ contains
   subroutine new_direct_iterate(it, problem, start, step)
     !> Iterate
     type(direct_iterate_t), intent(out) :: it
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> State to start from: its motions
     type(contact_state_t), intent(in) :: start
@@ -69,7 +69,7 @@ contains
 
   !> Gap and slip that the motions alone would cause, without tractions (n, 3) [m].
   pure function unloaded(problem, it)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
     type(direct_iterate_t), intent(in) :: it
@@ -81,7 +81,7 @@ contains
 
   !> Stick or slip at every node in contact.
   pure subroutine classify(problem, share, it)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Share of the classification parameter to use
     real(wp), intent(in) :: share
@@ -102,7 +102,7 @@ contains
 
   !> State of a node that comes into contact: its traction, if any, will oppose its slip.
   pure subroutine enter(problem, it, node)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
@@ -121,7 +121,7 @@ contains
 
   !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?
   pure logical function is_unsupported(problem, it)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
     type(direct_iterate_t), intent(in) :: it
@@ -134,7 +134,7 @@ contains
 
   !> Find the nodes in contact, and the springs of a compliant law, that the present pressure and gap call for.
   subroutine linearize_law(problem, it)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
@@ -153,7 +153,7 @@ contains
 
   !> Gap and slip under the tractions and motions of an iterate.
   subroutine evaluate(problem, operator, it, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Products over the window
     class(flexibility_t), intent(inout) :: operator
@@ -174,7 +174,7 @@ contains
 
   !> The state that an iterate stands for: with its tractions projected on p >= 0 and on the cone.
   subroutine record(problem, operator, step, it, state, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Products over the window
     class(flexibility_t), intent(inout) :: operator

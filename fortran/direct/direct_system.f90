@@ -34,7 +34,7 @@ contains
   !> adds up the displacements by `weight(:, k)`: they differ by the mu e in q = mu p e + tau t. Kept factors serve where they are
   !> of use, those of the whole matrix else.
   subroutine solve_area(problem, flexibility, operator, factors, target, it, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility: coefficients, and products
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -89,7 +89,7 @@ contains
 
   !> Set the unknowns of an area: their nodes, the displacements that their rows add up, their tractions and springs.
   subroutine set_unknowns(problem, target, it, area, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
@@ -143,7 +143,7 @@ contains
 
   !> Set the right-hand sides of an area, at the present motions and of unit motions, and the loads of unit unknowns.
   subroutine set_sides(problem, flexibility, target, it, area)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -184,7 +184,7 @@ contains
 
   !> Factorize the area as it stands.
   subroutine factorize_area(problem, flexibility, area, it, factors, done, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -218,7 +218,7 @@ contains
 
   !> Solve (F7) with the factors of the whole matrix, for the present motions and for unit motions.
   subroutine solve_whole_area(problem, flexibility, area, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -255,7 +255,7 @@ contains
   !> Displacements by tractions that do not change with the unknowns, over the self-compliance of a node; not allocated if
   !> there are none.
   subroutine displace_fixed(problem, flexibility, contact, fixed, moved)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -306,7 +306,7 @@ contains
   !>
   !> Motions that the loads do not determine stay as they are (without a node in stick, say).
   subroutine satisfy_loads(problem, area, it, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Area, with unknowns at the present motions and of unit motions; on return the first are at the new motions
     type(area_t), intent(inout) :: area
@@ -337,7 +337,7 @@ contains
 
   !> Tell whether the unknowns carry the loads, but for rounding errors.
   pure logical function are_carried(problem, area)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Area with its unknowns
     type(area_t), intent(in) :: area
@@ -348,7 +348,7 @@ contains
 
   !> Add changes of the motions that loads drive.
   subroutine move_motions(problem, driven, change, it)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Tangential motions driven by their loads
     type(driven_motions_t), intent(in) :: driven
@@ -366,7 +366,7 @@ contains
 
   !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
   subroutine assemble(problem, flexibility, area, matrix)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility

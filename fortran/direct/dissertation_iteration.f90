@@ -46,7 +46,7 @@ contains
 
   !> Iterate from a state until the residuals are within the tolerance or nothing new comes.
   subroutine iterate_as_written(problem, flexibility, operator, factors, start, step, state, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility: coefficients, and products
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -104,7 +104,7 @@ contains
 
   !> Inner loop: the contact area under frozen zones.
   subroutine find_area(problem, flexibility, operator, factors, target, shrinks, it, error)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility: coefficients, and products
     type(dense_flexibility_t), intent(in) :: flexibility
@@ -149,7 +149,7 @@ contains
 
   !> Stick or slip at every node in contact, from the last tractions and the last slip.
   subroutine partition(problem, it, changed)
-    !> What is given
+    !> The contact problem
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, open_result, resume
 from hexcontact.cli.app import app
+from hexcontact.core.friction import FrictionLaw
 from hexcontact.deck.kinds import Formula
 from hexcontact.surfaces import Sphere
 
@@ -385,3 +386,8 @@ def test_result_holds_the_map(tmp_path):
         np.testing.assert_array_equal(resumed[name], whole[name])
         np.testing.assert_array_equal(again[name], whole[name])
     assert Case.from_text(case(grid).deck_text).run()["traction_x"].equals(case(grid).run()["traction_x"])
+
+
+def test_equal_coefficients_along_any_direction_are_one() -> None:
+    assert FrictionLaw(0.3, shear_limit=1e8, angle=0.5).limits == (0.3, 1e8)
+    assert FrictionLaw(0.3, ratio=2.0, angle=0.5).limits is None

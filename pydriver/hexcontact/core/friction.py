@@ -68,7 +68,8 @@ class FrictionLaw:
     @property
     def limits(self) -> tuple[float | Array, float] | None:
         """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
-        plain = all(getattr(self, field.name) == field.default for field in dataclasses.fields(self)[2:])
+        law = dataclasses.replace(self, angle=0.0) if self.ratio == 1.0 else self  # a circle has no direction
+        plain = all(getattr(law, field.name) == field.default for field in dataclasses.fields(law)[2:])
         finite = bool(np.isfinite(self.coefficient).all())
         return (self.coefficient, self.shear_limit) if plain and finite else None
 

@@ -79,9 +79,9 @@ module hc_options
   type :: newton_options_t
     !> Accuracy of a linear solution, relative to the residual at its start: loose while the active set changes
     real(wp) :: inner_accuracy = 0.1_wp
-    !> The same once residuals are small; where shear does not act on the pressure, Newton's method converges the faster for
-    !> it; and of the pressure, whose iterations are the cheaper ones
-    real(wp) :: late_accuracy = 0.03_wp, uncoupled_accuracy = 1.0e-3_wp, pressure_accuracy = 0.05_wp
+    !> The same of the shear traction once residuals are small; a tighter one where shear does not act on the pressure, since
+    !> Newton's method then converges faster
+    real(wp) :: late_accuracy = 0.03_wp, uncoupled_accuracy = 1.0e-3_wp
     !> The least of a coupled sweep, whose accuracy is that of the residuals before it, too
     real(wp) :: coupled_accuracy = 1.0e-4_wp
     !> Accuracy of the last linear solution, relative to the tolerance; of the last pressure, which the shear traction still moves
@@ -92,8 +92,10 @@ module hc_options
     !> Iterations of conjugate gradients and of GMRES, far more than the preconditioner needs; directions that GMRES stores, as many
     !> as it mostly takes
     integer :: max_iterations = 400, max_coupled_iterations = 40, max_directions = 7
-    !> Contact areas per staggered sweep: one where the shear traction moves the pressure, else until the area stands
-    integer :: max_areas = 1, max_areas_uncoupled = 60
+    !> Contact areas per staggered sweep where the shear traction does not move the pressure: until the area stands
+    integer :: max_areas_uncoupled = 60
+    !> Residual R_n of a compliant interface at which the area of a first pressure stands
+    real(wp) :: settled_residual = 1.0e-2_wp
     !> Round-off that is allowed in displacements that are carried along, relative to the largest; where more may be
     !> left, they are computed afresh
     real(wp) :: displacement_rounding = 1.0e-10_wp
@@ -104,24 +106,13 @@ module hc_options
     real(wp) :: soft_spring = 8.0_wp
     !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
     !> there the zones are far from those of the solution
-    real(wp) :: cautious_share = 0.2_wp
-    !> Sweeps after which the classification parameter is halved and a whole step taken again; how small its factor gets
-    integer :: sweeps_per_cut = 10
+    real(wp) :: cautious_share = 0.5_wp
+    !> Its least product where nodes are fixed again and again
     real(wp) :: least_share_of_r = 1.0e-3_wp
-    !> Sweeps that are never damped: active sets need some to settle
-    integer :: undamped_sweeps = 6
-    !> A residual R_t that does not fall below this share of the best one oscillates, unless it is below `settled_residual`
-    real(wp) :: stalled_share = 0.7_wp, settled_residual = 1.0e-2_wp
-    !> The share of a damped step, its factor from one to the next, and the least
-    real(wp) :: first_damping = 0.5_wp, damping_factor = 0.9_wp, least_damping = 0.1_wp
     !> Sweeps with fixed nodes after which the loads count as not carried
     integer :: max_fixed_sweeps = 12
     !> Staggered sweeps before coupled ones: with weak coupling, and with strong coupling
     integer :: staggered_sweeps = 12, staggered_sweeps_strong = 1
-    !> Coupled sweeps begin when residuals are below this, or this many sweeps later all the same: (F7) linearises far from
-    !> the solution worse than two blocks do
-    real(wp) :: coupled_residual = 0.6_wp
-    integer :: coupled_delay = 4
     !> Relaxation of the shear traction at a front (F12): nodes in contact from which on the products saved take longer than it
     !> does; rings of nodes on each side, and passes; residual R_t below which there is none, since zones stand then; changes that
     !> are left out, over R_t and the largest traction

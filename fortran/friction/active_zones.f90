@@ -33,11 +33,11 @@ contains
     call now%operators%normal%set_active(now%contact, now%pressure%compliance)
   end subroutine linearize_law
 
-  !> Compute r of (F8), smaller where the iteration goes badly, and where there is no shear traction yet [Pa/m].
+  !> Compute r of (F8), smaller under strong coupling, where nodes are fixed, and for the first shear traction [Pa/m].
   real(wp) function shear_parameter(now) result(r)
     type(friction_iterate_t), intent(in) :: now
 
-    r = now%globalization%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
+    r = now%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
     if (.not. now%first) return
     if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
   end function shear_parameter

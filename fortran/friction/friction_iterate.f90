@@ -14,7 +14,6 @@ module hc_friction_iterate
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
   use hc_operator_set, only: operators_t
-  use hc_globalization, only: globalization_t
   use hc_pressure_system, only: pressure_system_t
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_linear_system, only: solution_accurate
@@ -59,13 +58,11 @@ module hc_friction_iterate
     logical, allocatable :: reached(:)
     !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
     logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
-    !> Damping and cuts of the classification parameter
-    type(globalization_t) :: globalization
+    !> Factor of the classification parameter: smaller under strong coupling and where nodes are fixed in stick
+    real(wp) :: share_of_r = 1.0_wp
     !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
     !> each rigid motion, components along x and y: they correct tractions that do not carry the prescribed loads
     real(sp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
-    !> Shear tractions that were to be relaxed along fronts so far
-    integer :: relaxations = 0
     !> How the linear solutions of the last sweep ended, the worst of them
     integer :: outcome = solution_accurate
     !> The start had no contact

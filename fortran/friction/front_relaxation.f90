@@ -45,8 +45,7 @@ contains
     logical :: changed
 
     options = now%problem%options%newton
-    now%relaxations = now%relaxations + 1
-    if (now%relaxations > options%undamped_sweeps .or. now%residual_tangential < options%front_residual) return
+    if (now%residual_tangential < options%front_residual) return
     ! a pressure that moves with the shear traction moves the fronts again
     if (now%pressure_feels_shear .or. (now%without_start .and. now%first)) return
     if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return

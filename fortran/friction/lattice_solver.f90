@@ -58,7 +58,7 @@ contains
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
     associate (options => problem%options%newton)
-      if (problem%couples_strongly()) call now%globalization%cut(options%cautious_share, options)
+      if (problem%couples_strongly()) now%share_of_r = options%cautious_share
       do sweep = 1, step%max_sweeps
         call make_sweep(now, sweep, step%max_sweeps, error)
         if (allocated(error)) return
@@ -98,8 +98,7 @@ contains
       staggered = max_sweeps
       if (now%pressure_feels_shear) staggered = options%staggered_sweeps
       if (now%problem%couples_strongly()) staggered = options%staggered_sweeps_strong
-      if (sweep > staggered .and. (max(now%residual_normal, now%residual_tangential) < options%coupled_residual .or. &
-                                   sweep > staggered + options%coupled_delay)) then
+      if (sweep > staggered) then
         call coupled_sweep(now, failed, error)
         if (allocated(error)) return
       end if

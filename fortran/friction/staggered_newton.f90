@@ -16,8 +16,7 @@
 !>    multiplier, by conjugate gradients at constant load (Polonsky & Keer, Wear 231, 1999, with a preconditioner);
 !> 2. `solve_shear`: stick, slip, directions e and compliances D by (F5), (F6), with r of (F8);
 !> 3. and (F10), (E^T T_qq E + D) (q, tau) - E^T B motions = E^T (s^n - T_qp p - T_qq mu p e), with the prescribed loads, by the
-!>    same conjugate gradients; where nothing resists a load, nodes are fixed in stick; where the residual does not fall, the
-!>    step is damped (hc_globalization);
+!>    same conjugate gradients; where nothing resists a load, nodes are fixed in stick;
 !> 4. the closing of the gap by the shear traction, cut to the cone, and the residuals R_n and R_t, which take no product more.
 !>
 !> Linear problems are solved no more accurately than the sets deserve; the numbers are those of `newton_options_t`.
@@ -109,7 +108,7 @@ contains
     searching = now%without_start .and. now%first
     estimated = now%estimated
     now%estimated = .false.
-    do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
+    do area = 1, merge(1, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
       call judge_pressure(now, estimated, gap, accurate, error)
       if (allocated(error) .or. accurate) return
@@ -217,7 +216,7 @@ contains
     scale = now%problem%sprung_compliance(scale)*scale
     iteration%tolerance = options%final_pressure*now%tolerance
     if (changed .or. compliant .or. now%pressure_feels_shear) then
-      iteration%tolerance = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), iteration%tolerance)
+      iteration%tolerance = max(options%inner_accuracy*min(now%residual_normal, 1.0_wp), iteration%tolerance)
     end if
     iteration%tolerance = iteration%tolerance*scale
     iteration%most = options%max_iterations
@@ -287,7 +286,7 @@ contains
         deallocate (found%ax)
       end if
       fixing = .true.
-      call now%globalization%cut(options%cautious_share, options)
+      now%share_of_r = max(options%cautious_share*now%share_of_r, options%least_share_of_r)
       call restore_traction(now, loaded, before)
     end do
     deallocate (found%constraints%columns, found%constraints%mb)
@@ -295,7 +294,7 @@ contains
       call restore_traction(now, loaded, before)
       call now%refresh(error)
     else
-      call take_solution(now, found, loaded, before, judged, error)
+      call take_solution(now, found, judged, error)
     end if
   end subroutine solve_shear
 
@@ -416,47 +415,26 @@ contains
     now%outcome = max(now%outcome, iteration%outcome)
   end subroutine solve_in_frames
 
-  !> Take traction, displacement and motions of a solution, or a share of its step where the residual does not fall.
-  subroutine take_solution(now, found, loaded, before, judged, error)
+  !> Take traction, displacement and motions of a solution.
+  subroutine take_solution(now, found, judged, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
     !> The solution, which is used up
     type(shear_solution_t), intent(inout) :: found
-    !> Nodes with a shear traction before (of 2 n), and the traction there [Pa]
-    type(active_set_t), intent(in) :: loaded
-    real(wp), intent(in), contiguous :: before(:)
     !> R_t is that of the traction taken
     logical, intent(out) :: judged
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: motion(n_motion), share, rounding
+    real(wp) :: rounding
 
-    motion = now%motion
     call found%driven%set_motions(found%constraints%multiplier, now%motion)
     call leave_frames(now, found, rounding)
     call now%find_tangential_residual()
     judged = .true.
-    associate (options => now%problem%options%newton)
-      call now%globalization%step_share(now%residual_tangential, options, share)
-      if (share < 1.0_wp) then
-        judged = .false.
-        ! Newton's method oscillates: any iterate between carries the same loads
-        call move_alloc(now%q, found%x)
-        call restore_traction(now, loaded, before)
-        found%x = merge(now%q + share*(found%x - now%q), 0.0_wp, [now%contact, now%contact])
-        deallocate (now%q)
-        now%motion = motion + share*(now%motion - motion)
-        call now%shear%turn(found%x)
-        call move_alloc(now%u, found%ax)
-        call displace(now, found%x, found%ax, error)
-        if (allocated(error)) return
-        call leave_frames(now, found, rounding)
-      end if
-      if (rounding > options%displacement_rounding*found%scale) then
-        judged = .false.
-        call now%refresh(error)
-      end if
-    end associate
+    if (rounding > now%problem%options%newton%displacement_rounding*found%scale) then
+      judged = .false.
+      call now%refresh(error)
+    end if
   end subroutine take_solution
 
   !> Turn traction and displacement out of the frames.

@@ -1,4 +1,4 @@
-!> Laws of friction that the core does not know, how nodes are fixed and steps damped, and parts of the window.
+!> Laws of friction that the core does not know, how nodes are fixed, and parts of the window.
 module test_laws
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -11,7 +11,6 @@ module test_laws
   use hc_friction_law, only: friction_law_t
   use hc_coulomb, only: coulomb_t
   use hc_load_constraints, only: fix_in_stick
-  use hc_globalization, only: globalization_t
   use hc_subwindow, only: next_part
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: contact_solver_t
@@ -50,7 +49,6 @@ contains
       new_test('two_halves', test_two_halves), &
       new_test('any_solver', test_any_solver), &
       new_test('fixed_nodes', test_fixed_nodes), &
-      new_test('damping', test_damping), &
       new_test('next_part', test_next_part) &
     ]
   end subroutine collect_laws
@@ -175,30 +173,6 @@ contains
     if (allocated(error)) return
     call check_true(error, all(compliance([3, 6]) <= 0.0_wp) .and. compliance(7) > 2.9_wp, 'compliances')
   end subroutine test_fixed_nodes
-
-  !> Whole steps at first, then smaller and smaller ones while the residual stays; a whole one again with half of r.
-  subroutine test_damping(error)
-    type(error_t), allocatable, intent(out) :: error
-    type(globalization_t) :: globalization
-    type(options_t) :: options
-    real(wp) :: share(11), settled
-    integer :: i
-
-    do i = 1, size(share)
-      call globalization%step_share(1.0_wp, options%newton, share(i))
-    end do
-    call check(error, share, [(1.0_wp, i=1, 6), 0.5_wp, 0.45_wp, 0.405_wp, 1.0_wp, 0.5_wp], 1.0e-12_wp, 'shares')
-    if (allocated(error)) return
-    call check(error, globalization%share_of_r, 0.5_wp, 1.0e-12_wp, 'half of r')
-    if (allocated(error)) return
-    call globalization%step_share(0.9_wp*options%newton%settled_residual, options%newton, settled)
-    call check(error, settled, 1.0_wp, 0.0_wp, 'a settled residual')
-    if (allocated(error)) return
-    do i = 1, 20
-      call globalization%cut(options%newton%cautious_share, options%newton)
-    end do
-    call check(error, globalization%share_of_r, options%newton%least_share_of_r, 0.0_wp, 'the least share')
-  end subroutine test_damping
 
   !> Parts around the contact, then around overlapping nodes too, then none.
   subroutine test_next_part(error)

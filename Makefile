@@ -219,8 +219,9 @@ format: $(STAMPS)/system $(STAMPS)/extra-lint  ## let ruff mend what it can
 	ruff check --fix
 	ruff format
 
-docs: install $(STAMPS)/extra-docs  ## this documentation as pages in build/docs; warnings and dead links are errors
+docs: install $(STAMPS)/extra-docs $(STAMPS)/extra-test  ## this documentation as pages in build/docs; warnings, dead links and old pictures are errors
 	@$(py) docs/site/build.py
+	@$(py) $(pytest) --dist=load --quiet tests/pictures
 
 docs-links: install $(STAMPS)/extra-docs  ## the same, and check the addresses of other sites (needs a network)
 	@$(py) docs/site/build.py --external

@@ -106,8 +106,9 @@ module hc_options
     real(wp) :: soft_spring = 8.0_wp
     !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
     !> there the zones are far from those of the solution
-    real(wp) :: cautious_share = 0.5_wp
-    !> Its least product where nodes are fixed again and again
+    real(wp) :: cautious_share = 0.2_wp
+    !> Shear tractions solved for after which the parameter is halved: two sets of zones may alternate; its least factor
+    integer :: sweeps_per_cut = 10
     real(wp) :: least_share_of_r = 1.0e-3_wp
     !> Sweeps with fixed nodes after which the loads count as not carried
     integer :: max_fixed_sweeps = 12

@@ -60,6 +60,8 @@ module hc_friction_iterate
     logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
     !> Factor of the classification parameter: smaller under strong coupling and where nodes are fixed in stick
     real(wp) :: share_of_r = 1.0_wp
+    !> Shear tractions solved for
+    integer :: n_shear = 0
     !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
     !> each rigid motion, components along x and y: they correct tractions that do not carry the prescribed loads
     real(sp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
@@ -88,9 +90,20 @@ module hc_friction_iterate
     procedure :: find_residuals, find_tangential_residual
     !> Are tractions and motions finite?
     procedure :: is_finite
+    !> Cut the classification parameter
+    procedure :: cut_parameter
   end type friction_iterate_t
 
 contains
+
+  !> Cut the classification parameter (docs/theory/friction.md, "Globalisation").
+  pure subroutine cut_parameter(self, factor)
+    class(friction_iterate_t), intent(inout) :: self
+    !> Factor of the cut
+    real(wp), intent(in) :: factor
+
+    self%share_of_r = max(factor*self%share_of_r, self%problem%options%newton%least_share_of_r)
+  end subroutine cut_parameter
 
   !> Set tractions and motions from those of a state, and find what they displace.
   subroutine set_start(self, problem, operators, start, step, error, estimate)

@@ -58,7 +58,7 @@ contains
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
     associate (options => problem%options%newton)
-      if (problem%couples_strongly()) now%share_of_r = options%cautious_share
+      if (problem%couples_strongly()) call now%cut_parameter(options%cautious_share)
       do sweep = 1, step%max_sweeps
         call make_sweep(now, sweep, step%max_sweeps, error)
         if (allocated(error)) return

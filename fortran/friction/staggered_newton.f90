@@ -286,7 +286,7 @@ contains
         deallocate (found%ax)
       end if
       fixing = .true.
-      now%share_of_r = max(options%cautious_share*now%share_of_r, options%least_share_of_r)
+      call now%cut_parameter(options%cautious_share)
       call restore_traction(now, loaded, before)
     end do
     deallocate (found%constraints%columns, found%constraints%mb)
@@ -427,6 +427,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: rounding
 
+    now%n_shear = now%n_shear + 1
+    if (mod(now%n_shear, now%problem%options%newton%sweeps_per_cut) == 0) call now%cut_parameter(0.5_wp)
     call found%driven%set_motions(found%constraints%multiplier, now%motion)
     call leave_frames(now, found, rounding)
     call now%find_tangential_residual()

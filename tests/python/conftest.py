@@ -3,6 +3,7 @@
 import os
 import signal
 
+import pytest
 from hypothesis import settings
 
 # Examples are drawn from the test itself: the same ones at every run, and nothing is remembered on the disk.
@@ -17,3 +18,9 @@ if int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) > 1:
 # A shell that runs tests in the background has them ignore Ctrl-C, and so what they start; some send it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def placed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Place the axes of pictures once: repeating it takes half of their time, and is seen in the pictures of the pages."""
+    monkeypatch.setattr("hexcontact.plotting.registry.settle", lambda figure: None)

@@ -49,6 +49,11 @@ def test_contacts_of_a_few_nodes(seed: int) -> None:
     assert faults_of(seed, few=True) == []
 
 
+def test_alternating_zones() -> None:
+    # weak coupling: without cuts of the classification parameter staggered sweeps alternate between two sets
+    assert faults_of(2502) == []
+
+
 def test_a_sphere_beside_a_node_with_a_free_twist() -> None:
     # rigid, R = 10 mm, on E = 1 GPa with Poisson's ratio 0: beta = -1/2; first of ten steps of a cubic ramp
     spacing, half, pair = 5e-6, 45, ElasticPair(1 / (np.pi * 1e9), -0.5 / (np.pi * 1e9), 0.0)

@@ -23,6 +23,8 @@ from hexcontact.plotting.style import new_figure, set_title
 from hexcontact.result.view import StepView
 from hexcontact.text import scaled, worded
 
+pytestmark = pytest.mark.usefixtures("placed_once")
+
 HEIGHT = np.sqrt(0.75)
 
 

@@ -35,6 +35,8 @@ from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.step import Step
 from hexcontact.result.view import StepView
 
+pytestmark = pytest.mark.usefixtures("placed_once")
+
 MODULUS, GAMMA, MU, LOAD, RADIUS = 2.0, 0.4, 0.3, 0.8, 1.5
 HERTZ = analytic.hertz_sphere(MODULUS, RADIUS, normal_load=LOAD)
 MINDLIN = MindlinContact(MU, LOAD, HERTZ.contact_radius, 4.0 / MODULUS * (1.0 + GAMMA / 2.0))

@@ -50,7 +50,11 @@ def main() -> None:
 
 def _called() -> None:
     """Call the sub-command that the words of the command line name."""
-    _import_commands(next((word for word in sys.argv[1:] if not word.startswith("-")), ""))
+    command = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
+    if command != "study":
+        # xarray would import Dask, if it is installed, which takes as long as the rest of `info`.
+        sys.modules.setdefault("dask", None)  # type: ignore[arg-type]
+    _import_commands(command)
     frame.app()
 
 

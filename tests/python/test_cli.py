@@ -314,6 +314,7 @@ def test_info_tells_the_story(solved: Path) -> None:
         assert words in done.stdout
 
 
+@pytest.mark.usefixtures("placed_once")
 def test_plot_draws_what_is_asked(solved: Path) -> None:
     done = inside(solved, "plot", "sphere.nc", "--what", "all", "--step", "1")
     assert done.returncode == 0, done.stderr

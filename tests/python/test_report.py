@@ -268,7 +268,7 @@ def test_zone_map_ends_at_the_edges(folder: Path) -> None:
         x, y = plane.points
         for zone, nodes in enumerate((~view.contact, view.stick, view.contact & ~view.stick)):
             inside = nodes & (view.x > x0) & (view.x < x1) & (view.y > y0) & (view.y < y1)
-            for at in zip(view.x[inside], view.y[inside], strict=True):
+            for at in zip(view.x[inside][::5], view.y[inside][::5], strict=True):
                 away = np.hypot(x - at[0], y - at[1])
                 found = gray.ravel()[np.argpartition(away.ravel(), 4)[:4]]
                 assert zone in found  # an edge may run between the node and a pixel

@@ -22,5 +22,5 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 @pytest.fixture
 def placed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Place the axes of pictures once: repeating it takes half of their time, and is seen in the pictures of the pages."""
+    """Place the axes of pictures once: repetition takes half of their time, and pages show its effect."""
     monkeypatch.setattr("hexcontact.plotting.registry.settle", lambda figure: None)

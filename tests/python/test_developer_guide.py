@@ -74,7 +74,7 @@ def run(*words: str | Path, root: Path) -> str:
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the sources with all additions, built without optimization, which takes less than a rebuild with it."""
+    """A copy of the sources with all additions, built without optimization to save time."""
     root = tmp_path_factory.mktemp("guide")
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "flat.py")
     for name in SOURCES:

@@ -177,9 +177,7 @@ def test_what_cannot_be_drawn_is_one_sentence(
     assert re.search(sentence, line), line
 
 
-def test_all_draws_what_there_is(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_all_draws_what_there_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code, out, _ = plot(folder / "pressed.nc", "-w", "all", "-o", tmp_path / "p.pdf")
     assert code == 0
     written = {path.stem for path in tmp_path.iterdir()}

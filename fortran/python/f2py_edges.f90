@@ -127,7 +127,7 @@ contains
     corrected = traction
     space = space_over(lattice%extent)
     call require_memory(edge_tractions_memory(lattice%extent, count(zones(:, :, 1)), maxval(friction) > 0.0_wp, &
-                                              space%threads, abs(pair%lambda_2) > 0.0_wp), error, space%threads)
+                                              space%threads, pair%couples()), error, space%threads)
     if (allocated(error)) return
     call correct_at_edges(lattice, edges_of(lattice, fields, zones), pair, zones(:, :, 1), zones(:, :, 3), friction, corrected, &
                           space, error, kernel_cache)

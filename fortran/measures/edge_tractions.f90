@@ -23,6 +23,7 @@ module hc_edge_tractions
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
+  use hc_friction_law, only: friction_law_t
   use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
   use hc_edge_fit, only: fit_squares
@@ -84,8 +85,8 @@ contains
     class(elastic_medium_t), intent(in) :: medium
     !> Nodes in contact, and those of them that stick (n_col, n_row)
     logical, intent(in) :: contact(:, :), stick(:, :)
-    !> Coefficient of friction; shear tractions stay as they are unless it is positive and finite (n_col, n_row)
-    real(wp), intent(in) :: friction(:, :)
+    !> Law of friction; shear tractions stay as they are without friction, and without a bound
+    class(friction_law_t), intent(in) :: friction
     !> Pressure and shear traction (n_col, n_row, component) [Pa]
     real(wp), intent(inout) :: traction(:, :, :)
     !> Space of the fields
@@ -106,10 +107,9 @@ contains
     integer :: pass, k, n
 
     if (present(options)) tuning = options
-    n = 1
-    if (all(friction > 0.0_wp .and. friction <= huge(1.0_wp))) n = 3
+    n = merge(3, 1, friction%resists() .and. friction%is_bounded())
     if (n == 3) then
-      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, spread(friction, 3, 1), tuning)
+      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, friction, tuning)
     else
       call new_traction_field(edge_shape, lattice, edges, traction(:, :, 1:1), contact, stick, options=tuning)
     end if
@@ -131,7 +131,7 @@ contains
       call fit_squares(edge_shape%squares, merge(at_nodes(:, :, 1), 0.0_wp, contact), edges%contact_distances(), tuning)
       if (n == 3) then
         call fit_squares(edge_shape%stick_squares, &
-                         merge(friction*at_nodes(:, :, 1) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
+                         merge(friction%bounds_of(at_nodes(:, :, 1)) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
                          edges%stick_distances(stick, edge_shape%reserve), tuning)
       end if
       call edge_shape%renew()
@@ -191,16 +191,17 @@ contains
     real(wp), intent(out) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: by_pressure(:, :, :)
+    real(wp), allocatable :: by_pressure(:, :, :), slope(:, :)
     integer :: k
 
     change = hats
     system%component = [normal]
     call settle(system, contact, residue%displacements(medium, contact, system%component), change(:, :, 1:1), error)
     if (allocated(error) .or. size(hats, 3) == 1) return
+    slope = shape_of%friction%slopes_of(shape_of%nodal(:, :, 1))
     do k = 2, 3
       where (contact .and. .not. shape_of%stick)
-        change(:, :, k) = hats(:, :, k) + shape_of%friction*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
+        change(:, :, k) = hats(:, :, k) + slope*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
       end where
     end do
     if (.not. any(shape_of%stick)) return

@@ -122,7 +122,7 @@ contains
     if (.not. allocated(error)) call operator%convolution%store_spectra(cache, key)
   end subroutine new_fft_flexibility
 
-  !> Count the bytes that the operator takes, for a window of the given size.
+  !> Count the bytes that the operator takes, for a window of the given size; bodies without a trace have a spectrum more.
   pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)

@@ -366,15 +366,15 @@ module hc_options
 
 contains
 
-  !> Compute kappa/(2 pi lambda a) for a contact of an area pi a^2, (F8) [Pa/m].
-  pure real(wp) function classification_parameter(self, lambda, area) result(r)
+  !> Compute kappa/(2 pi lambda a) for a contact of radius a, (F8) [Pa/m].
+  pure real(wp) function classification_parameter(self, lambda, radius) result(r)
     class(contact_options_t), intent(in) :: self
-    !> Constant of the displacement, lambda_1 along the normal [1/Pa]
+    !> Displacement by a point load times the distance [1/Pa]
     real(wp), intent(in) :: lambda
-    !> Area of the contact [m^2]
-    real(wp), intent(in) :: area
+    !> Radius of the contact [m]
+    real(wp), intent(in) :: radius
 
-    r = self%classification_scale/(2.0_wp*pi*lambda*sqrt(area/pi))
+    r = self%classification_scale/(2.0_wp*pi*lambda*radius)
   end function classification_parameter
 
 end module hc_options

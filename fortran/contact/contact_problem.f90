@@ -14,7 +14,7 @@ module hc_contact_problem
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_hierarchy, only: level_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, separated, stick, &
     slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
@@ -69,13 +69,13 @@ module hc_contact_problem
 contains
 
   !> Set up a problem.
-  subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error, normal_law)
+  subroutine new_friction_problem(problem, lattice, medium, initial_gap, candidate, friction, goodman, error, normal_law)
     !> Problem to be set up
     type(friction_problem_t), intent(out) :: problem
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Initial gap (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
@@ -89,7 +89,7 @@ contains
     !> Law of contact along the normal; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: normal_law
 
-    call new_normal_problem(problem, lattice, pair, initial_gap, candidate, error, normal_law)
+    call new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, normal_law)
     if (allocated(error)) return
     call friction%check(lattice, error)
     if (allocated(error)) return
@@ -116,15 +116,15 @@ contains
   subroutine set_geometry(self)
     type(friction_problem_t), intent(inout) :: self
 
-    self%near_compliance = tangential_compliances(self%lattice, self%pair, near_reach)
+    self%near_compliance = tangential_compliances(self%lattice, self%medium, near_reach)
     self%tangential_compliance = largest_compliance(self%near_compliance(0, 0, :))
   end subroutine set_geometry
 
-  !> Return whether pressure and shear traction act strongly on each other, by |beta| min(mu, 1).
+  !> Return whether pressure and shear traction act strongly on each other, by their coupling times min(mu, 1).
   pure logical function couples_strongly(self)
     class(friction_problem_t), intent(in) :: self
 
-    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(0.0_wp), 1.0_wp) > &
+    couples_strongly = abs(self%medium%coupling())*min(self%friction%strength(0.0_wp), 1.0_wp) > &
                        self%options%contact%strong_coupling .and. .not. self%goodman
   end function couples_strongly
 
@@ -165,7 +165,7 @@ contains
     real(wp), pointer, contiguous :: alone(:, :, :)
     integer :: row
 
-    if (.not. abs(self%pair%lambda_2) > 0.0_wp) then
+    if (.not. self%medium%couples()) then
       ! pressure and shear traction do not move each other: no copy of both
       alone(1:size(pressure, 1), 1:size(pressure, 2), 1:1) => pressure
       call flexibility%apply([normal], alone, [normal], displacement(:, :, :1), error)
@@ -198,7 +198,7 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
     real(wp), pointer, contiguous :: acting(:, :, :), closing(:, :, :)
 
-    if (abs(self%pair%lambda_2) > 0.0_wp) then
+    if (self%medium%couples()) then
       allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
       call self%displacements(flexibility, state%pressure, state%traction, displacement, error)
       if (allocated(error)) return
@@ -276,15 +276,16 @@ contains
     load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
   end function resultants
 
-  !> Compute r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius, (F8) [Pa/m].
+  !> Compute r = kappa/(2 pi lambda a) for a contact of n nodes, a its radius, (F8) [Pa/m].
   pure real(wp) function classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
     integer, intent(in) :: n_contact
+    real(wp) :: radius
 
-    r = self%options%contact%classification_parameter(self%pair%lambda_1 + self%pair%lambda_5, &
-                                                      self%lattice%cell_area()*max(n_contact, 1))
-    r = r/(1.0_wp + r*self%pair%tangential_layer)
+    radius = sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi)
+    r = self%options%contact%classification_parameter(self%medium%shear_point(radius), radius)
+    r = r/(1.0_wp + r*self%medium%spring_compliance())
   end function classification_parameter
 
   !> Compute gap, slip, zones, loads and residuals of a state whose tractions, motions and displacements are known.

@@ -4,10 +4,9 @@
 module hc_contact_residuals
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
@@ -24,36 +23,36 @@ module hc_contact_residuals
 
 contains
 
-  !> Compute the closing of the gap at a node under its own pyramid of unit pressure, lambda_1 K1(0) [m/Pa].
-  pure real(wp) function normal_self_compliance(lattice, pair)
+  !> Compute the closing d_n of the gap at a node under its own pyramid of unit pressure [m/Pa].
+  real(wp) function normal_self_compliance(lattice, medium)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    type(pyramid_t) :: pyramid
-    real(wp) :: k(5)
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
+    class(influence_t), allocatable :: influence
+    real(wp) :: own(1)
 
-    call new_pyramid(pyramid, lattice%basis)
-    k = pyramid%kernels(0.0_wp, 0.0_wp)
-    normal_self_compliance = pair%lambda_1*k(k_1)
+    call medium%new_influence(lattice%basis, influence)
+    call influence%closing([0.0_wp], [0.0_wp], own)
+    normal_self_compliance = own(1)
   end function normal_self_compliance
 
   !> Compute the tangential displacement d_t of a node under its own pyramid of unit traction, with its spring [m/Pa].
-  pure real(wp) function tangential_self_compliance(lattice, pair)
+  real(wp) function tangential_self_compliance(lattice, medium)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     real(wp) :: own(1, 1, 3)
 
-    own = tangential_compliances(lattice, pair, 0)
+    own = tangential_compliances(lattice, medium, 0)
     tangential_self_compliance = largest_compliance(own(1, 1, :))
   end function tangential_self_compliance
 
   !> Return the largest eigenvalue of the tangential compliances of a node [m/Pa].
   !>
-  !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2 and all directions are alike but for
-  !> rounding errors.
+  !> On half-spaces (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2 and all directions are alike
+  !> but for rounding errors.
   pure real(wp) function largest_compliance(own)
     !> Along x, across, along y [m/Pa]
     real(wp), intent(in) :: own(3)
@@ -67,29 +66,28 @@ contains
 
   !> Compute the tangential displacements of the nodes around a pyramid of unit traction, with the spring of its node if there
   !> is one: along x under a traction along x, across, and along y under one along y [m/Pa].
-  pure function tangential_compliances(lattice, pair, reach) result(compliance)
+  function tangential_compliances(lattice, medium, reach) result(compliance)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Columns and rows on each side
     integer, intent(in) :: reach
     real(wp) :: compliance(-reach:reach, -reach:reach, 3)
-    type(pyramid_t) :: pyramid
-    real(wp) :: k(5), at(2)
+    class(influence_t), allocatable :: influence
+    real(wp) :: block(n_block, 1), at(2)
     integer :: i, j
 
-    call new_pyramid(pyramid, lattice%basis)
+    call medium%new_influence(lattice%basis, influence)
     do j = 0, reach
       do i = -reach, reach
         at = matmul(lattice%basis, real([i, j], wp))
-        k = pyramid%kernels(at(1), at(2))
-        compliance(i, j, :) = [pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx), pair%lambda_5*k(k_xy), &
-                               pair%lambda_1*k(k_1) + pair%lambda_5*(k(k_1) - k(k_xx))]
+        call influence%blocks(at(1:1), at(2:2), block)
+        compliance(i, j, :) = block([block_index(2, 2), block_index(2, 3), block_index(3, 3)], 1)
         compliance(-i, -j, :) = compliance(i, j, :)
       end do
     end do
-    compliance(0, 0, [1, 3]) = compliance(0, 0, [1, 3]) + pair%tangential_layer
+    compliance(0, 0, [1, 3]) = compliance(0, 0, [1, 3]) + medium%spring_compliance()
   end function tangential_compliances
 
   !> Compute R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes, or that of another law.

@@ -5,7 +5,7 @@ module hc_contact_state
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: check_operator, normal, along_x, along_y
   implicit none
   private
@@ -298,11 +298,11 @@ contains
   end function touches_rim
 
   !> Refuse a gap that does not fit the window, is not finite or has no candidate node.
-  pure subroutine check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
+  pure subroutine check_problem(lattice, medium, initial_gap, candidate, error, n_threads)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Initial gap (n_col, n_row) [m]; any value at all where nothing can touch
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
@@ -312,7 +312,7 @@ contains
     !> Threads to use; 0: the default of OpenMP
     integer, intent(in), optional :: n_threads
 
-    call check_operator(lattice, pair, error, n_threads)
+    call check_operator(lattice, medium, error, n_threads)
     if (allocated(error)) return
     if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
       call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')

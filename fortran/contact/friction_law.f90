@@ -48,6 +48,8 @@ module hc_friction_law
     procedure(law_linearize), deferred :: linearize
     !> Largest traction of all nodes under a largest pressure
     procedure :: largest_bound
+    !> Largest traction of each node of a window, and its derivative; that along a given traction
+    procedure :: bounds_of, slopes_of, bounds_along
     !> Return whether the admissible set is a disc, and the stretch that makes it of one
     procedure :: is_isotropic, stretch
     !> Lengths of tractions that are at most b(p), and points of the boundary by its normals
@@ -170,6 +172,48 @@ contains
     largest_bound = huge(1.0_wp)
     if (self%is_bounded()) largest_bound = self%strength(p_max)*max(p_max, 0.0_wp)
   end function largest_bound
+
+  !> Compute the largest traction of each node of a window [Pa].
+  pure function bounds_of(self, pressure) result(bound)
+    class(friction_law_t), intent(in) :: self
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    real(wp) :: bound(size(pressure, 1), size(pressure, 2))
+    integer :: row
+
+    do row = 1, size(bound, 2)
+      call self%find_bounds((row - 1)*size(bound, 1) + 1, pressure(:, row), bound(:, row))
+    end do
+  end function bounds_of
+
+  !> Differentiate the largest traction of each node of a window by the pressure.
+  pure function slopes_of(self, pressure) result(slope)
+    class(friction_law_t), intent(in) :: self
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    real(wp) :: slope(size(pressure, 1), size(pressure, 2))
+    integer :: row
+
+    do row = 1, size(slope, 2)
+      call self%find_slopes((row - 1)*size(slope, 1) + 1, pressure(:, row), slope(:, row))
+    end do
+  end function slopes_of
+
+  !> Compute the largest traction of each node of a window in the direction of a given one: b(p) |q|/|A^-1 q| [Pa].
+  pure function bounds_along(self, pressure, traction) result(bound)
+    class(friction_law_t), intent(in) :: self
+    !> Pressure (n_col, n_row), and traction (n_col, n_row, 2) [Pa]
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp) :: bound(size(pressure, 1), size(pressure, 2)), length(size(pressure, 1))
+    integer :: row
+
+    bound = self%bounds_of(pressure)
+    if (self%is_isotropic()) return
+    do row = 1, size(bound, 2)
+      call self%find_lengths(traction(:, row, 1), traction(:, row, 2), length)
+      where (length > 0.0_wp) bound(:, row) = bound(:, row)*(norm2(traction(:, row, :), dim=2)/length)
+    end do
+  end function bounds_along
 
   !> Return whether the admissible set is a disc; a law with another set overrides it.
   pure logical function is_isotropic(self)

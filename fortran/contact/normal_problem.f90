@@ -10,7 +10,7 @@ module hc_normal_problem
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_hierarchy, only: level_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_contact_state, only: contact_state_t, load_target_t, check_problem, touches_rim, separated, slip, normal, force_control, &
     within_tolerance, not_finite
   use hc_contact_residuals, only: normal_self_compliance, normal_residual, force_residual
@@ -22,8 +22,8 @@ module hc_normal_problem
 
   !> Two bodies that touch.
   type, extends(level_t) :: normal_problem_t
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t) :: pair
+    !> The two bodies
+    class(elastic_medium_t), allocatable :: medium
     !> Law of contact along the normal
     class(normal_law_t), allocatable :: normal_law
     !> Self-compliance d_n of a node [m/Pa]
@@ -50,13 +50,13 @@ module hc_normal_problem
 contains
 
   !> Set up the normal part of a contact problem.
-  subroutine new_normal_problem(problem, lattice, pair, initial_gap, candidate, error, law)
+  subroutine new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, law)
     !> Problem to be set up
     class(normal_problem_t), intent(inout) :: problem
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Initial gap (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
@@ -66,12 +66,12 @@ contains
     !> Law of contact along the normal; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: law
 
-    call check_problem(lattice, pair, initial_gap, candidate, error)
+    call check_problem(lattice, medium, initial_gap, candidate, error)
     if (allocated(error)) return
     if (present(law)) call law%check(error)
     if (allocated(error)) return
     problem%lattice = lattice
-    problem%pair = pair
+    allocate (problem%medium, source=medium)
     if (present(law)) then
       allocate (problem%normal_law, source=law)
     else
@@ -79,7 +79,7 @@ contains
     end if
     problem%initial_gap = initial_gap
     problem%candidate = candidate
-    problem%normal_compliance = normal_self_compliance(lattice, pair)
+    problem%normal_compliance = normal_self_compliance(lattice, medium)
   end subroutine new_normal_problem
 
   !> Take bodies, law and tuning numbers of the same problem from another lattice.
@@ -89,12 +89,13 @@ contains
 
     select type (from)
     class is (normal_problem_t)
-      self%pair = from%pair
+      if (allocated(self%medium)) deallocate (self%medium)
+      allocate (self%medium, source=from%medium)
       if (allocated(self%normal_law)) deallocate (self%normal_law)
       allocate (self%normal_law, source=from%normal_law)
       self%options = from%options
     end select
-    self%normal_compliance = normal_self_compliance(self%lattice, self%pair)
+    self%normal_compliance = normal_self_compliance(self%lattice, self%medium)
   end subroutine inherit
 
   !> Return whether the bodies will touch: under any load, by an approach beyond the smallest gap.
@@ -110,13 +111,16 @@ contains
     end if
   end function is_pressed
 
-  !> Compute r' = kappa/(2 pi lambda_1 a) [Pa/m].
+  !> Compute r' = kappa/(2 pi lambda a), lambda_1 on half-spaces [Pa/m].
   pure real(wp) function normal_classification_parameter(self, n_contact) result(r)
     class(normal_problem_t), intent(in) :: self
     !> Nodes in contact
     integer, intent(in) :: n_contact
 
-    r = self%options%contact%classification_parameter(self%pair%lambda_1, self%lattice%cell_area()*max(n_contact, 1))
+    real(wp) :: radius
+
+    radius = sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi)
+    r = self%options%contact%classification_parameter(self%medium%normal_point(radius), radius)
   end function normal_classification_parameter
 
   !> Compute the compliance beyond which a spring of a compliant law has no effect [m/Pa].
@@ -200,7 +204,7 @@ contains
   !> Return the nodes that the undeformed bodies would overlap on well: about 1.4 times the contact area of a sphere (n).
   !>
   !> Under a load the overlap is that at which a flat punch of the same area
-  !> would reach the rim of the overlap: mean initial gap + P/(2 E* a) = overlap.
+  !> would reach the rim of the overlap: mean initial gap + P/(2 E* a) = overlap, or that of other bodies.
   pure function first_guess(self, target) result(active)
     class(normal_problem_t), intent(in) :: self
     !> Loads or motions to be reached
@@ -224,7 +228,7 @@ contains
         overlap = 0.5_wp*(low + high)
         active = candidate .and. h <= overlap
         radius = sqrt(count(active)*self%lattice%cell_area()/pi)
-        if (sum(h, mask=active)/count(active) + target%value(normal)/(2.0_wp*self%pair%effective_modulus()*radius) > overlap) then
+        if (sum(h, mask=active)/count(active) + self%medium%punch_approach(target%value(normal), radius) > overlap) then
           low = overlap
         else
           high = overlap

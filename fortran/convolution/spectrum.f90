@@ -4,13 +4,13 @@ module hc_spectrum
   use hc_precision, only: wp, sp
   use hc_lock, only: lock, unlock, spectrum_users
   use hc_lattice, only: lattice_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t, n_word
   implicit none
   private
 
   public :: kernel_spectrum_t, kernel_key_t, new_kernel_key, new_depth_key, release
   public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, of_stress
-  public :: of_displacement, kind_name
+  public :: of_displacement, kind_name, key_length
 
   !> Transformed kernels: the kernel of the pressure, those of all blocks, that of the pressure in single
   !> precision, the inverses that precondition, and those of stress and displacement at a
@@ -20,11 +20,14 @@ module hc_spectrum
   character(len=*), parameter :: kind_name(7) = &
     [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse', 'stress', 'displacement']
 
+  !> Words of a key.
+  integer, parameter :: key_length = 8 + n_word
+
   !> Everything that the numbers of a spectrum depend on, to the bit.
   type :: kernel_key_t
-    !> Kind, columns and rows of the window, basis over its spacing, lambda_2 and lambda_5 over lambda_1;
-    !> of stress and displacement, instead of these, depth over spacing and Poisson's ratio
-    integer(int64) :: word(9) = 0
+    !> Kind, columns and rows of the window, basis over its spacing, words of the medium, compliance of springs over its unit;
+    !> of stress and displacement, instead of the last ones, depth over spacing and Poisson's ratio
+    integer(int64) :: word(key_length) = 0
   contains
     !> Return whether two keys are equal
     procedure :: is_same
@@ -52,22 +55,23 @@ module hc_spectrum
 contains
 
   !> Compute the key of the spectra of a kind, on a window.
-  pure type(kernel_key_t) function new_kernel_key(kind, lattice, pair) result(key)
+  type(kernel_key_t) function new_kernel_key(kind, lattice, medium) result(key)
     !> One of the kinds above
     integer, intent(in) :: kind
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants; of no matter to the pressure alone
-    type(elastic_pair_t), intent(in) :: pair
-    type(elastic_pair_t) :: ratios
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
+    class(elastic_medium_t), allocatable :: reduced
 
-    ratios = pair%scaled()
+    call medium%reduce(lattice%spacing(), reduced)
     key%word(1) = kind
     key%word(2:3) = lattice%extent
     key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
-    if (kind == of_all_tractions) key%word(8) = transfer(ratios%lambda_2, key%word(8))
-    if (kind == of_all_tractions .or. kind == inverse_of_shear) key%word(9) = transfer(ratios%lambda_5, key%word(9))
-    if (kind == inverse_of_shear) key%word(8) = transfer(pair%tangential_layer/(pair%lambda_1*lattice%spacing()), key%word(8))
+    key%word(8:7 + n_word) = reduced%key_words(normal=kind /= inverse_of_shear, &
+                                               tangential=kind == of_all_tractions .or. kind == inverse_of_shear)
+    if (kind == inverse_of_shear) key%word(key_length) = &
+      transfer(medium%spring_compliance()/medium%unit(lattice%spacing()), key%word(1))
   end function new_kernel_key
 
   !> Compute the key of the spectra of stress or displacement at a depth.

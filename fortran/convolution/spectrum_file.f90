@@ -8,7 +8,7 @@ module hc_spectrum_file
                                          c_null_ptr, c_loc, c_associated, c_f_pointer
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
-  use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, kind_name
+  use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, key_length, kind_name
   implicit none
   private
 
@@ -16,11 +16,11 @@ module hc_spectrum_file
 
   !> The first word of a file, and its layout: to be raised whenever that, or the order of the values, changes.
   character(len=24), parameter :: magic = 'hexcontact kernels'
-  integer(int64), parameter :: layout = 4
+  integer(int64), parameter :: layout = 5
   !> Length of the text for program and machine.
   integer, parameter :: maker_length = 256
   !> Words of the fixed part of a head, and of a whole head: bytes of a value, shape and hash follow.
-  integer, parameter :: n_known = 13 + maker_length/8, n_head = n_known + 5
+  integer, parameter :: n_known = 4 + maker_length/8 + key_length, n_head = n_known + 5
   !> Status of `open_file`.
   integer(c_int), parameter :: absent = 1, foreign = 3
 

@@ -13,7 +13,7 @@ module hc_direct_contact
   use hc_lapack, only: dposv
   use hc_lattice, only: lattice_t
   use hc_transfer, only: prolong_edge
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal, force_control, &
     sweeps_used_up, no_progress
@@ -56,13 +56,13 @@ module hc_direct_contact
 contains
 
   !> Flexibility of a problem.
-  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error, options, law)
+  subroutine new_direct_contact(self, lattice, medium, initial_gap, candidate, error, options, law)
     !> Problem to be set up
     type(direct_contact_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Initial gap (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
@@ -75,9 +75,9 @@ contains
     class(normal_law_t), intent(in), optional :: law
 
     if (present(options)) self%problem%options = options
-    call new_normal_problem(self%problem, lattice, pair, initial_gap, candidate, error, law)
+    call new_normal_problem(self%problem, lattice, medium, initial_gap, candidate, error, law)
     if (allocated(error)) return
-    call new_dense_flexibility(self%flexibility, lattice, pair, error)
+    call new_dense_flexibility(self%flexibility, lattice, medium, error)
   end subroutine new_direct_contact
 
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
@@ -234,7 +234,7 @@ contains
         allocate (coarser)
         call problem%coarsen(coarser%problem)
         if (.not. any(coarser%problem%candidate)) return
-        call new_dense_flexibility(coarser%flexibility, coarser%problem%lattice, problem%pair, error)
+        call new_dense_flexibility(coarser%flexibility, coarser%problem%lattice, problem%medium, error)
         if (allocated(error)) return
         call move_alloc(coarser, self%coarser)
       end if

@@ -64,9 +64,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     self%problem = problem
-    call new_dense_flexibility(self%flexibility, problem%lattice, problem%pair, error)
+    call new_dense_flexibility(self%flexibility, problem%lattice, problem%medium, error)
     if (allocated(error)) return
-    call new_fft_flexibility(self%operator, problem%lattice, problem%pair, error, space=problem%space)
+    call new_fft_flexibility(self%operator, problem%lattice, problem%medium, error, space=problem%space)
   end subroutine new_direct_friction
 
   subroutine displacements(self, pressure, traction, displacement, error)

@@ -56,7 +56,7 @@ contains
     area%stuck = pack(area%contact, it%zone(area%contact) == stick)
     area%sliding = pack(area%contact, it%zone(area%contact) == slip .and. it%compliance(area%contact) < infinite)
     solved = size(area%contact) > problem%options%direct%most_explicit .and. .not. problem%normal_law%is_compliant() &
-             .and. .not. problem%pair%tangential_layer > 0.0_wp
+             .and. .not. problem%medium%spring_compliance() > 0.0_wp
     if (solved) call factorize_area(problem, flexibility, area, it, factors, solved, error)
     if (allocated(error)) return
     call set_unknowns(problem, target, it, area, error)
@@ -209,8 +209,8 @@ contains
     do i = 1, size(area%sliding)
       side(:, i) = normal_to(it%direction(:, area%sliding(i)))
     end do
-    associate (pair => problem%pair, unit => problem%normal_compliance)
-      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, problem%options%direct, &
+    associate (unit => problem%normal_compliance)
+      call factors%factorize(flexibility, unit, problem%medium%shear_ratio(), problem%options%direct, &
                              factored_area_t(area%contact, area%stuck, .not. edge(area%stuck), area%sliding, side, &
                                              it%compliance(area%sliding)/unit), done, error)
     end associate

@@ -1,4 +1,4 @@
-!> Two elastic bodies reduced to the three constants that matter in contact.
+!> Two elastic half-spaces reduced to the three constants that matter in contact.
 !>
 !> For bodies with shear moduli G and Poisson's ratios nu (sums over both):
 !>
@@ -7,17 +7,26 @@
 !>     lambda_5 = sum nu/(2 pi G) = gamma lambda_1
 !>
 !> Three numbers describe any pair exactly: no averaged Poisson's ratio (Table
-!> 8.2) is needed. beta is Dundurs' second constant.
+!> 8.2) is needed. beta is Dundurs' second constant. By the kernels of a pyramid (hc_pyramid_influence) the closing w of the gap
+!> and the displacement s of body 1 over body 2 are (superposition of Table 8.1 over two bodies)
 !>
-!> Equations: docs/theory/elasticity.md, (E14) to (E16).
+!>     w   =  lambda_1 K1 * p   + lambda_2 (K_x * q_x + K_y * q_y)
+!>     s_x = -lambda_2 K_x * p  + (lambda_1 K1 + lambda_5 K_xx) * q_x + lambda_5 K_xy * q_y
+!>     s_y = -lambda_2 K_y * p  + lambda_5 K_xy * q_x + (lambda_1 K1 + lambda_5 K_yy) * q_y
+!>
+!> Equations: docs/theory/elasticity.md, (E14) to (E16); docs/theory/discretisation.md, (D4).
 module hc_elastic_pair
+  use, intrinsic :: iso_fortran_env, only: int64
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_word
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy, k_x, k_y
+  use hc_lattice_symbol, only: lattice_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
-  public :: material_t, elastic_pair_t, new_elastic_pair, check_pair, find_bulk_strain
+  public :: material_t, elastic_pair_t, new_elastic_pair, find_bulk_strain
 
   !> An isotropic elastic or a rigid material.
   type :: material_t
@@ -29,8 +38,11 @@ module hc_elastic_pair
     logical :: rigid = .false.
   end type material_t
 
+  !> Name of the medium in keys of spectra.
+  character(len=8), parameter :: name = 'halfspac'
+
   !> Compliance constants of a pair of bodies.
-  type :: elastic_pair_t
+  type, extends(elastic_medium_t) :: elastic_pair_t
     !> Normal compliance, 1/(pi E*) [1/Pa]
     real(wp) :: lambda_1 = 0.0_wp
     !> Coupling of normal and tangential displacements [1/Pa]
@@ -42,13 +54,27 @@ module hc_elastic_pair
   contains
     !> Effective modulus E* [Pa]
     procedure :: effective_modulus
-    !> Dundurs' constant beta
+    !> Dundurs' constant beta, and lambda_5/lambda_1
     procedure :: beta => dundurs_beta
-    !> lambda_5/lambda_1
     procedure :: gamma => tangential_gamma
-    !> The constants over lambda_1
-    procedure :: scaled
+    procedure :: check => check_pair
+    procedure :: unit => unit_of_pair
+    procedure :: reduce, new_influence, find_symbols, key_words
+    procedure :: coupling => dundurs_beta
+    procedure :: shear_ratio
+    procedure :: normal_point => normal_compliance
+    procedure :: shear_point => shear_compliance
+    procedure :: trace, spring_compliance
   end type elastic_pair_t
+
+  !> Displacements by a pyramid on two half-spaces.
+  type, extends(influence_t) :: pair_influence_t
+    private
+    type(elastic_pair_t) :: pair
+    type(pyramid_t) :: pyramid
+  contains
+    procedure :: blocks, closing, is_hexagonal
+  end type pair_influence_t
 
 contains
 
@@ -76,18 +102,16 @@ contains
   end subroutine new_elastic_pair
 
   !> Refuse constants that no two elastic bodies have, which new_elastic_pair never sets.
-  pure subroutine check_pair(pair, error)
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    !> Allocated on failure: the bodies would gain energy as they deform
+  pure subroutine check_pair(self, error)
+    class(elastic_pair_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
     logical :: sound
 
-    sound = all(ieee_is_finite([pair%lambda_1, pair%lambda_2, pair%lambda_5]))
-    if (sound) sound = pair%lambda_1 > 0.0_wp .and. abs(pair%lambda_2) < pair%lambda_1 .and. pair%lambda_5 > -pair%lambda_1
-    if (sound) sound = ieee_is_finite(pair%tangential_layer)
+    sound = all(ieee_is_finite([self%lambda_1, self%lambda_2, self%lambda_5]))
+    if (sound) sound = self%lambda_1 > 0.0_wp .and. abs(self%lambda_2) < self%lambda_1 .and. self%lambda_5 > -self%lambda_1
+    if (sound) sound = ieee_is_finite(self%tangential_layer)
     if (sound) then
-      if (pair%tangential_layer >= 0.0_wp) return
+      if (self%tangential_layer >= 0.0_wp) return
       call raise(error, status%invalid_input, 'tangential stiffness of the interface: a positive number expected')
       return
     end if
@@ -166,21 +190,145 @@ contains
   end function effective_modulus
 
   !> Return Dundurs' beta
-  elemental real(wp) function dundurs_beta(self)
+  pure real(wp) function dundurs_beta(self)
     class(elastic_pair_t), intent(in) :: self
     dundurs_beta = self%lambda_2/self%lambda_1
   end function dundurs_beta
 
   !> Return gamma = lambda_5/lambda_1
-  elemental real(wp) function tangential_gamma(self)
+  pure real(wp) function tangential_gamma(self)
     class(elastic_pair_t), intent(in) :: self
     tangential_gamma = self%lambda_5/self%lambda_1
   end function tangential_gamma
 
-  !> Return the pair over its lambda_1.
-  pure type(elastic_pair_t) function scaled(self)
+  !> Return 1 + gamma/2.
+  pure real(wp) function shear_ratio(self)
     class(elastic_pair_t), intent(in) :: self
-    scaled = elastic_pair_t(1.0_wp, self%beta(), self%gamma())
-  end function scaled
+    shear_ratio = 1.0_wp + 0.5_wp*self%gamma()
+  end function shear_ratio
+
+  !> Return 2 + gamma: K_yy = K1 - K_xx.
+  pure real(wp) function trace(self)
+    class(elastic_pair_t), intent(in) :: self
+    trace = 2.0_wp*self%shear_ratio()
+  end function trace
+
+  !> Return the compliance of the springs [m/Pa].
+  pure real(wp) function spring_compliance(self)
+    class(elastic_pair_t), intent(in) :: self
+    spring_compliance = self%tangential_layer
+  end function spring_compliance
+
+  !> Return lambda_1 times a length [m/Pa].
+  pure real(wp) function unit_of_pair(self, length)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: length
+    unit_of_pair = self%lambda_1*length
+  end function unit_of_pair
+
+  !> Return lambda_1: w = lambda_1 P/r [1/Pa].
+  pure real(wp) function normal_compliance(self, length)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: length
+    normal_compliance = self%lambda_1
+  end function normal_compliance
+
+  !> Return lambda_1 + lambda_5: s_x = (lambda_1 + lambda_5) Q/x on the x axis [1/Pa].
+  pure real(wp) function shear_compliance(self, length)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: length
+    shear_compliance = self%lambda_1 + self%lambda_5
+  end function shear_compliance
+
+  !> Return the pair over its lambda_1; half-spaces have no length of their own.
+  subroutine reduce(self, length, reduced)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: length
+    class(elastic_medium_t), allocatable, intent(out) :: reduced
+
+    allocate (reduced, source=elastic_pair_t(1.0_wp, self%beta(), self%gamma()))
+  end subroutine reduce
+
+  !> Return beta and gamma of the blocks that depend on them.
+  pure function key_words(self, normal, tangential) result(word)
+    class(elastic_pair_t), intent(in) :: self
+    logical, intent(in) :: normal, tangential
+    integer(int64) :: word(n_word)
+
+    word = 0
+    word(1) = transfer(name, word(1))
+    if (normal .and. tangential) word(2) = transfer(self%beta(), word(2))
+    if (tangential) word(3) = transfer(self%gamma(), word(3))
+  end function key_words
+
+  !> Set up the kernels of the pyramid.
+  subroutine new_influence(self, basis, influence)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: basis(2, 2)
+    class(influence_t), allocatable, intent(out) :: influence
+    type(pair_influence_t), allocatable :: made
+
+    allocate (made)
+    made%pair = self
+    call new_pyramid(made%pyramid, basis)
+    call move_alloc(made, influence)
+  end subroutine new_influence
+
+  !> Compute the six blocks of the operator from the five kernels.
+  pure subroutine blocks(self, x, y, block)
+    class(pair_influence_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: x(:), y(:)
+    real(wp), intent(out), contiguous :: block(:, :)
+    real(wp) :: k(5)
+    integer :: i
+
+    associate (lambda_1 => self%pair%lambda_1, lambda_2 => self%pair%lambda_2, lambda_5 => self%pair%lambda_5)
+      do i = 1, size(x)
+        k = self%pyramid%kernels(x(i), y(i))
+        block(:, i) = [lambda_1*k(k_1), lambda_1*k(k_1) + lambda_5*k(k_xx), lambda_5*k(k_xy), &
+                       (lambda_1 + lambda_5)*k(k_1) - lambda_5*k(k_xx), lambda_2*k(k_x), lambda_2*k(k_y)]
+      end do
+    end associate
+  end subroutine blocks
+
+  !> Compute lambda_1 K1.
+  pure subroutine closing(self, x, y, displacement)
+    class(pair_influence_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: x(:), y(:)
+    real(wp), intent(out), contiguous :: displacement(:)
+    integer :: i
+
+    do i = 1, size(x)
+      displacement(i) = self%pair%lambda_1*self%pyramid%normal_kernel(x(i), y(i))
+    end do
+  end subroutine closing
+
+  !> Return whether the lattice is equilateral.
+  pure logical function is_hexagonal(self)
+    class(pair_influence_t), intent(in) :: self
+    is_hexagonal = self%pyramid%is_equilateral()
+  end function is_hexagonal
+
+  !> Compute the transform of the block of the pressure, or of those of shear tractions; K_yy = K1 - K_xx.
+  pure subroutine find_symbols(self, basis, length, frequency, symbol)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: basis(2, 2)
+    integer, intent(in) :: length(2)
+    integer, intent(in) :: frequency(:, :)
+    real(wp), intent(out), contiguous :: symbol(:, :)
+    real(wp) :: k(3)
+    integer :: i
+
+    call lattice_symbols(basis, length, frequency, symbol)
+    if (size(symbol, 2) == 1) then
+      symbol = self%lambda_1*symbol
+      return
+    end if
+    do i = 1, size(symbol, 1)
+      k = symbol(i, :)
+      symbol(i, :) = [self%lambda_1*k(symbol_1) + self%lambda_5*k(symbol_xx), self%lambda_5*k(symbol_xy), &
+                      self%lambda_1*k(symbol_1) + self%lambda_5*(k(symbol_1) - k(symbol_xx))]
+    end do
+  end subroutine find_symbols
 
 end module hc_elastic_pair

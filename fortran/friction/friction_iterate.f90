@@ -182,7 +182,7 @@ contains
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
     if (.not. problem%friction%is_isotropic()) allocate (self%shear%rest(n), source=0.0_wp)
-    self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
+    self%shear_feels_pressure = problem%medium%couples()
     self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
     self%h(1:n) => problem%initial_gap
     self%origin(1:2*n) => step%reference

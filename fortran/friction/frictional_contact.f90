@@ -58,7 +58,7 @@ contains
     type(scratch_t), pointer :: scratch
     integer :: l, n_level
 
-    call check_operator(problem%lattice, problem%pair, error, n_threads)
+    call check_operator(problem%lattice, problem%medium, error, n_threads)
     if (allocated(error)) return
     self%problem = problem
     n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
@@ -83,7 +83,7 @@ contains
 
       level%space = space_over(level%lattice%extent, n_threads)
       level%space%scratch => scratch
-      call new_operators(operators, level%lattice, level%pair, level%space, error, cache, level%options%preconditioner)
+      call new_operators(operators, level%lattice, level%medium, level%space, error, cache, level%options%preconditioner)
     end subroutine prepare
 
   end subroutine new_frictional_contact

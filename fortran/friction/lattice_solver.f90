@@ -223,7 +223,7 @@ contains
   real(wp) function cut_off(now, state)
     type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(in) :: state
-    real(wp) :: largest, total, less, compliance, displaced
+    real(wp) :: largest, total, less, displaced
     integer :: n, row, col, i
 
     n = size(now%p)
@@ -241,13 +241,11 @@ contains
       end do
     end do
     !$omp end parallel do
-    associate (pair => now%problem%pair)
-      compliance = 2.0_wp*(abs(pair%lambda_1)*(1.0_wp + max(pair%gamma(), 0.0_wp)) + abs(pair%lambda_2))
-    end associate
-    displaced = compliance*sqrt(pi*now%problem%lattice%cell_area()*total*largest)
+    displaced = 2.0_wp*now%problem%medium%largest_point(now%problem%lattice%spacing()) &
+                *sqrt(pi*now%problem%lattice%cell_area()*total*largest)
     cut_off = displaced/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
     if (.not. now%problem%friction%resists()) return
-    displaced = displaced + now%problem%pair%tangential_layer*largest
+    displaced = displaced + now%problem%medium%spring_compliance()*largest
     cut_off = max(cut_off, displaced/(now%problem%tangential_compliance*now%traction_scale()))
   end function cut_off
 

@@ -38,7 +38,7 @@ module hc_shear_system
     real(wp), allocatable :: compliance(:)
     !> Where a law has a direction: traction along t of the spring at rest [Pa]
     real(wp), allocatable :: rest(:)
-    !> Elastic compliance 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa]
+    !> Elastic compliance of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
     !> Nodes in contact
     type(active_set_t), private :: nodes
@@ -78,7 +78,7 @@ contains
 
     self%operators => operators
     self%space = operators%space
-    self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
+    self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%medium)
     call self%reset_frames()
   end subroutine new_shear_system
 

@@ -12,7 +12,7 @@ module hc_normal_contact
   use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count, build_levels
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_fftw, only: good_size
   use hc_fft_layout_single, only: convolution_memory
   use hc_flexibility, only: check_operator
@@ -63,13 +63,13 @@ module hc_normal_contact
 contains
 
   !> Set up the operators of a problem on all its lattices.
-  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache, options, law)
+  subroutine new_normal_contact(self, lattice, medium, initial_gap, candidate, error, n_threads, cache, options, law)
     !> Problem to be set up
     type(normal_contact_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Initial gap (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
@@ -90,12 +90,12 @@ contains
     if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     if (present(options)) self%options = options
-    call check_operator(lattice, pair, error, n_threads)
+    call check_operator(lattice, medium, error, n_threads)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
     allocate (self%scratch)
     self%level(1)%options = self%options
-    call new_normal_problem(self%level(1), lattice, pair, initial_gap, candidate, error, law)
+    call new_normal_problem(self%level(1), lattice, medium, initial_gap, candidate, error, law)
     if (allocated(error)) return
     call build_levels(self%level(1), self%level(2:))
     do l = 1, size(self%level)

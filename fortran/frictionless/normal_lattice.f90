@@ -76,14 +76,14 @@ contains
 
     self%space = space
     if (exact .and. .not. self%exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, self%pair, error, normal_only=.true., space=space, &
+      call new_fft_flexibility(self%flexibility, self%lattice, self%medium, error, normal_only=.true., space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.
     end if
     if (self%iterating .or. .not. iterating) return
     allocate (preconditioner)
-    call new_symbol_preconditioner(preconditioner, self%lattice, self%pair, space, self%options%preconditioner, error, cache)
+    call new_symbol_preconditioner(preconditioner, self%lattice, self%medium, space, self%options%preconditioner, error, cache)
     if (allocated(error)) return
     call move_alloc(preconditioner, self%preconditioner)
     call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, space, error)
@@ -98,11 +98,11 @@ contains
       end do
       !$omp end parallel do
     else
-      key = new_kernel_key(of_pressure_rounded, self%lattice, self%pair)
+      key = new_kernel_key(of_pressure_rounded, self%lattice, self%medium)
       call self%single%find_spectra(found, error, cache, key)
       if (allocated(error)) return
       if (.not. found) then
-        call kernel%cover(self%lattice, space)
+        call kernel%cover(self%lattice, self%medium, space)
         rounded%kernel => kernel
         call self%single%transform_kernels(rounded, error)
         if (allocated(error)) return

@@ -133,7 +133,7 @@ contains
         layer(col, row) = problem%normal_law%compliance_under(before(col, row))
       end do
     end do
-    call new_normal_problem(level, problem%lattice, problem%pair, merge(now%gap, 0.0_wp, now%candidate), now%candidate, &
+    call new_normal_problem(level, problem%lattice, problem%medium, merge(now%gap, 0.0_wp, now%candidate), now%candidate, &
                             error, nodal_springs_t(reshape(spring + layer, [size(spring)])))
     if (allocated(error)) return
     call level%prepare(kernel, .true., .true., problem%space, error, cache)

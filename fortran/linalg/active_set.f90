@@ -46,8 +46,6 @@ module hc_active_set
     procedure :: pair
     !> The nodes that are not active
     procedure :: complement
-    !> The same nodes of several components
-    procedure :: repeated
     !> Is it a given set?
     procedure :: is_set
   end type active_set_t
@@ -280,24 +278,6 @@ contains
     end do
     call number_nodes(part)
   end function slice
-
-  !> Return the same nodes of several components, one component after the other.
-  pure type(active_set_t) function repeated(self, n, times) result(all_of_them)
-    class(active_set_t), intent(in) :: self
-    !> Nodes of a component, and number of components
-    integer, intent(in) :: n, times
-    integer :: m
-
-    all_of_them%space%threads = self%space%threads
-    associate (n_run => size(self%first))
-      allocate (all_of_them%first(times*n_run), all_of_them%last(times*n_run))
-      do m = 0, times - 1
-        all_of_them%first(m*n_run + 1:(m + 1)*n_run) = self%first + m*n
-        all_of_them%last(m*n_run + 1:(m + 1)*n_run) = self%last + m*n
-      end do
-    end associate
-    call number_nodes(all_of_them)
-  end function repeated
 
   !> Pair the runs of two components; the nodes of the second one are a part of those of the first.
   subroutine pair(self, n)

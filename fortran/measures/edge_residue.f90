@@ -10,9 +10,7 @@ module hc_edge_residue
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
-  use hc_elastic_pair, only: elastic_pair_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: blocks, block_index
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
   use hc_field_space, only: field_space_t
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate
@@ -268,10 +266,10 @@ contains
   end subroutine take_off
 
   !> Relative displacements of nodes by the values, as of hats of the fine lattice in the cells nearby.
-  pure function displacements(self, pair, wanted, onto) result(moved)
+  function displacements(self, medium, wanted, onto) result(moved)
     class(edge_residue_t), intent(in) :: self
-    !> Elastic constants
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Nodes whose displacement is wanted (n_col, n_row)
     logical, intent(in) :: wanted(:, :)
     !> Components that are wanted; those of the values are 1 and the next ones
@@ -279,22 +277,22 @@ contains
     !> Displacements (n_col, n_row, component) [m]
     real(wp) :: moved(size(wanted, 1), size(wanted, 2), size(onto))
     real(wp), allocatable :: table(:, :, :, :, :) ! (point, from, onto, away)
-    real(wp) :: at(2), block(6), total(size(onto))
-    type(pyramid_t) :: pyramid
+    real(wp) :: at(2), block(n_block, 1), total(size(onto))
+    class(influence_t), allocatable :: influence
     integer :: i, j, k, col, row, from, to, first(2), last(2)
 
-    associate (m => self%samples, basis => self%lattice%unit_basis(), n => size(self%values, 2))
-      call new_pyramid(pyramid, basis)
+    associate (m => self%samples, basis => self%lattice%basis, n => size(self%values, 2))
+      call medium%new_influence(basis/m, influence)
       allocate (table(m**2, n, size(onto), -reach:reach, -reach:reach))
       do j = -reach, reach
         do i = -reach, reach
           do k = 1, m**2
-            at = m*matmul(basis, [i, j] - self%point(k))
-            block = blocks(pair, self%lattice%spacing()/m*pyramid%kernels(at(1), at(2)))
+            at = matmul(basis, [i, j] - self%point(k))
+            call influence%blocks(at(1:1), at(2:2), block)
             do to = 1, size(onto)
               do from = 1, n
                 associate (b => block_index(onto(to), from))
-                  table(k, from, to, i, j) = sign(1.0_wp, real(b, wp))*block(abs(b))
+                  table(k, from, to, i, j) = sign(1.0_wp, real(b, wp))*block(abs(b), 1)
                 end associate
               end do
             end do

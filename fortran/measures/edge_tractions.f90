@@ -15,7 +15,7 @@ module hc_edge_tractions
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
@@ -23,6 +23,7 @@ module hc_edge_tractions
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
+  use hc_friction_law, only: friction_law_t
   use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
   use hc_edge_fit, only: fit_squares
@@ -75,17 +76,17 @@ contains
   end function edge_tractions_memory
 
   !> Correct pressure and shear traction at the edges.
-  subroutine correct_at_edges(lattice, edges, pair, contact, stick, friction, traction, space, error, cache, options)
+  subroutine correct_at_edges(lattice, edges, medium, contact, stick, friction, traction, space, error, cache, options)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Edges of the contact
     type(contact_edges_t), intent(in) :: edges
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Nodes in contact, and those of them that stick (n_col, n_row)
     logical, intent(in) :: contact(:, :), stick(:, :)
-    !> Coefficient of friction; shear tractions stay as they are unless it is positive and finite (n_col, n_row)
-    real(wp), intent(in) :: friction(:, :)
+    !> Law of friction; shear tractions stay as they are without friction, and without a bound
+    class(friction_law_t), intent(in) :: friction
     !> Pressure and shear traction (n_col, n_row, component) [Pa]
     real(wp), intent(inout) :: traction(:, :, :)
     !> Space of the fields
@@ -106,14 +107,13 @@ contains
     integer :: pass, k, n
 
     if (present(options)) tuning = options
-    n = 1
-    if (all(friction > 0.0_wp .and. friction <= huge(1.0_wp))) n = 3
+    n = merge(3, 1, friction%resists() .and. friction%is_bounded())
     if (n == 3) then
-      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, spread(friction, 3, 1), tuning)
+      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, friction, tuning)
     else
       call new_traction_field(edge_shape, lattice, edges, traction(:, :, 1:1), contact, stick, options=tuning)
     end if
-    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=n == 1, space=space, cache=cache)
+    call new_fft_flexibility(flexibility, lattice, medium, error, normal_only=n == 1, space=space, cache=cache)
     if (allocated(error)) return
     system%flexibility => flexibility
     system%space = space
@@ -124,14 +124,14 @@ contains
       call residue%hats(space, hats, error)
       if (allocated(error)) return
       call residue%take_off(hats)
-      call solve_again(system, pair, residue, contact, edge_shape, hats, change, error)
+      call solve_again(system, medium, residue, contact, edge_shape, hats, change, error)
       if (allocated(error)) return
       if (pass == tuning%passes) exit
       at_nodes = traction(:, :, :n) + change + at_nodes - hats
       call fit_squares(edge_shape%squares, merge(at_nodes(:, :, 1), 0.0_wp, contact), edges%contact_distances(), tuning)
       if (n == 3) then
         call fit_squares(edge_shape%stick_squares, &
-                         merge(friction*at_nodes(:, :, 1) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
+                         merge(friction%bounds_of(at_nodes(:, :, 1)) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
                          edges%stick_distances(stick, edge_shape%reserve), tuning)
       end if
       call edge_shape%renew()
@@ -174,11 +174,11 @@ contains
   end subroutine sample
 
   !> Compute the change of the nodal tractions that leaves the displacements of the nodes in contact as they are, (I18).
-  subroutine solve_again(system, pair, residue, contact, shape_of, hats, change, error)
+  subroutine solve_again(system, medium, residue, contact, shape_of, hats, change, error)
     !> Elastic operator
     type(elastic_part_t), intent(inout) :: system
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> What is between the nodes, less the hats
     type(edge_residue_t), intent(in) :: residue
     !> Nodes in contact (n_col, n_row)
@@ -191,26 +191,27 @@ contains
     real(wp), intent(out) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: by_pressure(:, :, :)
+    real(wp), allocatable :: by_pressure(:, :, :), slope(:, :)
     integer :: k
 
     change = hats
     system%component = [normal]
-    call settle(system, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
+    call settle(system, contact, residue%displacements(medium, contact, system%component), change(:, :, 1:1), error)
     if (allocated(error) .or. size(hats, 3) == 1) return
+    slope = shape_of%friction%slopes_of(shape_of%nodal(:, :, 1))
     do k = 2, 3
       where (contact .and. .not. shape_of%stick)
-        change(:, :, k) = hats(:, :, k) + shape_of%friction*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
+        change(:, :, k) = hats(:, :, k) + slope*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
       end where
     end do
     if (.not. any(shape_of%stick)) return
     system%component = [along_x, along_y]
     allocate (by_pressure(size(contact, 1), size(contact, 2), 2), source=0.0_wp)
-    if (abs(pair%lambda_2) > 0.0_wp) then
+    if (medium%couples()) then
       call system%flexibility%apply([normal], change(:, :, 1:1), system%component, by_pressure, error)
       if (allocated(error)) return
     end if
-    call settle(system, shape_of%stick, residue%displacements(pair, shape_of%stick, system%component) + by_pressure, &
+    call settle(system, shape_of%stick, residue%displacements(medium, shape_of%stick, system%component) + by_pressure, &
                 change(:, :, 2:3), error)
   end subroutine solve_again
 

@@ -6,7 +6,7 @@ module hc_state_measures
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_contact_state, only: contact_state_t, separated, stick, normal, remote_displacement
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_zone_edge, only: zone_edge_t
@@ -46,11 +46,11 @@ contains
 
   !> Measure how far pressure and gap of a node are from the law of contact, over p_max: R_n is the largest value.
   !> 0 where the gap is not finite.
-  function nodal_normal_residual(lattice, pair, law, state, space) result(residual)
+  function nodal_normal_residual(lattice, medium, law, state, space) result(residual)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Law of contact
     class(normal_law_t), intent(in) :: law
     !> State with pressure somewhere; its pressure and gap count
@@ -61,7 +61,7 @@ contains
     real(wp) :: compliance
     integer :: col, row
 
-    compliance = normal_self_compliance(lattice, pair)
+    compliance = normal_self_compliance(lattice, medium)
     residual = 0.0_wp
     do row = 1, size(residual, 2)
       do col = 1, size(residual, 1)
@@ -76,11 +76,11 @@ contains
   end function nodal_normal_residual
 
   !> Measure |q - P(q - ds/d_t)|/tau at the nodes in contact, P the projection on the cone: R_t is the largest value.
-  function nodal_tangential_residual(lattice, pair, friction, state, space) result(residual)
+  function nodal_tangential_residual(lattice, medium, friction, state, space) result(residual)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Law of friction
     class(friction_law_t), intent(in) :: friction
     !> State with pressure somewhere; its pressure, traction and slip increment count
@@ -94,7 +94,7 @@ contains
     residual = 0.0_wp
     if (.not. friction%resists()) return
     p_max = space%max(state%pressure)
-    stiffness = 1.0_wp/tangential_self_compliance(lattice, pair)
+    stiffness = 1.0_wp/tangential_self_compliance(lattice, medium)
     largest = 0.0_wp
     do row = 1, size(residual, 2)
       do col = 1, size(residual, 1)

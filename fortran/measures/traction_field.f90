@@ -13,15 +13,14 @@ module hc_traction_field
   use hc_lattice, only: lattice_t, neighbors
   use hc_interpolation, only: place_t, place_of, root_at
   use hc_contact_edges, only: contact_edges_t
+  use hc_friction_law, only: friction_law_t
   implicit none
   private
 
   public :: traction_field_t, new_traction_field, field_of_arrays
 
   !> Number of fields that make a traction field as plain arrays.
-  integer, parameter, public :: n_part = 13
-  !> Bound of the shear traction where there is none [Pa]; sums of it do not overflow.
-  real(wp), parameter :: no_bound = 1.0e-3_wp*huge(1.0_wp)
+  integer, parameter, public :: n_part = 11
 
   !> Tractions of a contact over the plane.
   type :: traction_field_t
@@ -30,10 +29,8 @@ module hc_traction_field
     real(wp), allocatable :: nodal(:, :, :)
     !> Pressure at the nodes, and its squares near the edge, NaN elsewhere (n_col, n_row) [Pa], [Pa^2]
     real(wp), allocatable :: pressure(:, :), squares(:, :)
-    !> The limit of friction is known, min(mu p, bound): everything that follows is there
-    logical :: limited = .false.
-    !> Coefficient of friction, and bound of the shear traction if there is one (n_col, n_row) [1], [Pa]
-    real(wp), allocatable :: friction(:, :), bound(:, :)
+    !> Law of friction; without one the shear traction is that of the nodes, and nothing follows
+    class(friction_law_t), allocatable :: friction
     !> Shear traction over its limit; nodes next to the contact have the mean of their neighbors (n_col, n_row, direction)
     real(wp), allocatable :: direction(:, :, :)
     !> Nodes that stick (n_col, n_row)
@@ -58,7 +55,7 @@ module hc_traction_field
 contains
 
   !> Set up the tractions of a contact.
-  pure subroutine new_traction_field(field, lattice, edges, traction, contact, stick, limits, options)
+  subroutine new_traction_field(field, lattice, edges, traction, contact, stick, friction, options)
     !> Field to be set up
     type(traction_field_t), intent(out) :: field
     !> Lattice and window
@@ -69,9 +66,9 @@ contains
     real(wp), intent(in) :: traction(:, :, :)
     !> Nodes in contact, and those of them that stick (n_col, n_row)
     logical, intent(in) :: contact(:, :), stick(:, :)
-    !> Coefficient of friction, at least 0, and the bound of the shear traction [Pa] if there is one (n_col, n_row, 1 or 2);
-    !> absent: the shear traction is that of the nodes, joined linearly
-    real(wp), intent(in), optional :: limits(:, :, :)
+    !> Law of friction that bounds the traction in all directions alike; absent: the shear traction is that of the nodes, joined
+    !> linearly
+    class(friction_law_t), intent(in), optional :: friction
     !> Tuning numbers; absent: the usual ones
     type(edge_options_t), intent(in), optional :: options
     type(edge_options_t) :: tuning
@@ -81,13 +78,10 @@ contains
     field%lattice = lattice
     field%nodal = traction
     field%squares = edges%squares()
-    field%limited = size(traction, 3) == 3 .and. present(limits)
-    if (field%limited) then
-      field%friction = limits(:, :, 1)
-      if (any(limits(:, :, 2:) < no_bound)) field%bound = min(limits(:, :, 2), no_bound)
+    if (size(traction, 3) == 3 .and. present(friction)) then
+      allocate (field%friction, source=friction)
       field%stick = stick
-      limit = field%friction*traction(:, :, 1)
-      if (allocated(field%bound)) limit = min(limit, field%bound)
+      limit = friction%bounds_of(traction(:, :, 1))
       field%reserve = merge(max(limit - norm2(traction(:, :, 2:3), dim=3), 0.0_wp), 0.0_wp, stick)
       field%direction = directions(lattice, traction(:, :, 2:3), limit, contact)
       field%stick_squares = edges%stick_squares(stick, field%reserve)
@@ -99,32 +93,30 @@ contains
   end subroutine new_traction_field
 
   !> Set up a field from plain arrays, see `arrays`.
-  pure subroutine field_of_arrays(field, lattice, parts, limited)
+  subroutine field_of_arrays(field, lattice, parts, friction)
     !> Field to be set up
     type(traction_field_t), intent(out) :: field
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Its arrays (n_col, n_row, part), the first five unless the limit is known
+    !> Its arrays (n_col, n_row, part), the first five without a law of friction
     real(wp), intent(in) :: parts(:, :, :)
-    !> The limit of friction is known
-    logical, intent(in) :: limited
+    !> Law of friction
+    class(friction_law_t), intent(in) :: friction
 
     field%lattice = lattice
     field%nodal = parts(:, :, 1:3)
     field%pressure = parts(:, :, 4)
     field%squares = parts(:, :, 5)
-    field%limited = limited
-    if (.not. limited) return
-    field%friction = parts(:, :, 6)
-    if (any(parts(:, :, 7) < no_bound)) field%bound = parts(:, :, 7)
-    field%direction = parts(:, :, 8:9)
-    field%stick = parts(:, :, 10) > 0.5_wp
-    field%reserve = parts(:, :, 11)
-    field%stick_squares = parts(:, :, 12)
-    field%taken = parts(:, :, 13)
+    if (size(parts, 3) < n_part) return
+    allocate (field%friction, source=friction)
+    field%direction = parts(:, :, 6:7)
+    field%stick = parts(:, :, 8) > 0.5_wp
+    field%reserve = parts(:, :, 9)
+    field%stick_squares = parts(:, :, 10)
+    field%taken = parts(:, :, 11)
   end subroutine field_of_arrays
 
-  !> Return the field as plain arrays, the first of them unless the limit of friction is known.
+  !> Return the field as plain arrays, the first of them without a law of friction.
   pure subroutine arrays(self, parts)
     class(traction_field_t), intent(in) :: self
     !> The arrays (n_col, n_row, part)
@@ -134,15 +126,12 @@ contains
     parts(:, :, :size(self%nodal, 3)) = self%nodal
     parts(:, :, 4) = self%pressure
     parts(:, :, 5) = self%squares
-    if (.not. self%limited) return
-    parts(:, :, 6) = self%friction
-    parts(:, :, 7) = no_bound
-    if (allocated(self%bound)) parts(:, :, 7) = self%bound
-    parts(:, :, 8:9) = self%direction
-    parts(:, :, 10) = merge(1.0_wp, 0.0_wp, self%stick)
-    parts(:, :, 11) = self%reserve
-    parts(:, :, 12) = self%stick_squares
-    parts(:, :, 13) = self%taken
+    if (.not. allocated(self%friction)) return
+    parts(:, :, 6:7) = self%direction
+    parts(:, :, 8) = merge(1.0_wp, 0.0_wp, self%stick)
+    parts(:, :, 9) = self%reserve
+    parts(:, :, 10) = self%stick_squares
+    parts(:, :, 11) = self%taken
   end subroutine arrays
 
   !> Renew the values at the nodes after a change of the squares.
@@ -152,13 +141,13 @@ contains
     integer :: col, row
 
     self%pressure = self%nodal(:, :, 1)
-    if (self%limited .and. .not. allocated(self%taken)) allocate (self%taken, mold=self%pressure)
+    if (allocated(self%friction) .and. .not. allocated(self%taken)) allocate (self%taken, mold=self%pressure)
     do row = 1, size(self%pressure, 2)
       do col = 1, size(self%pressure, 1)
         associate (square => self%squares(col, row))
           if (.not. ieee_is_nan(square)) self%pressure(col, row) = sqrt(max(square, 0.0_wp))
         end associate
-        if (.not. self%limited) cycle
+        if (.not. allocated(self%friction)) cycle
         self%taken(col, row) = 0.0_wp
         associate (square => self%stick_squares(col, row))
           if (ieee_is_nan(square) .or. .not. self%stick(col, row)) cycle
@@ -190,7 +179,7 @@ contains
     do row = 1, size(traction, 2)
       do col = 1, size(traction, 1)
         if (ieee_is_nan(self%squares(col, row))) then
-          if (.not. self%limited) cycle
+          if (.not. allocated(self%friction)) cycle
           if (ieee_is_nan(self%stick_squares(col, row))) cycle
         end if
         traction(col, row, :) = self%at_place(place_at(col, row))
@@ -228,7 +217,7 @@ contains
     end do
     part = [root_at(place, self%pressure, self%squares), traction(1)]
     traction(1) = part(1)
-    if (.not. self%limited) return
+    if (.not. allocated(self%friction)) return
     limit = self%limits(place, part)
     along = [(place%mean(self%direction(:, :, k), 0.0_wp), k=1, 2)]
     share = norm2(along)
@@ -248,17 +237,28 @@ contains
     if (length > limit(1) .or. (length > 0.0_wp .and. .not. sticks)) traction(2:3) = limit(1)/length*traction(2:3)
   end function at_place
 
-  !> Compute the largest shear tractions that friction allows under pressures at a place [Pa].
+  !> Compute the largest shear tractions that friction allows under pressures at a place, the mean of its nodes [Pa].
   pure function limits(self, place, pressure) result(limit)
     class(traction_field_t), intent(in) :: self
     !> The place
     type(place_t), intent(in) :: place
     !> Pressures [Pa]
     real(wp), intent(in) :: pressure(2)
-    real(wp) :: limit(2)
+    real(wp) :: limit(2), bound(1)
+    integer :: i, k, first
 
-    limit = place%mean(self%friction, 0.0_wp)*pressure
-    if (allocated(self%bound)) limit = min(limit, place%mean(self%bound, no_bound))
+    limit = 0.0_wp
+    if (.not. place%near) return
+    do k = 1, size(place%weight)
+      associate (node => place%node(:, k), n => shape(self%pressure))
+        if (.not. place%weight(k) > 0.0_wp .or. any(node < 1 .or. node > n)) cycle
+        first = (node(2) - 1)*n(1) + node(1)
+      end associate
+      do i = 1, size(pressure)
+        call self%friction%find_bounds(first, pressure(i:i), bound)
+        limit(i) = limit(i) + place%weight(k)*bound(1)
+      end do
+    end do
   end function limits
 
   !> Return the place of a node.

@@ -1,12 +1,7 @@
 !> The flexibility operator: tractions on the lattice -> relative surface displacements.
 !>
-!> With * the sum over all pyramids (a convolution, since the lattice is the
-!> same everywhere) and w the closing of the gap, (s_x, s_y) the tangential
-!> displacement of body 1 over body 2 (superposition of Table 8.1 over two bodies):
-!>
-!>     w   =  lambda_1 K1 * p   + lambda_2 (K_x * q_x + K_y * q_y)
-!>     s_x = -lambda_2 K_x * p  + (lambda_1 K1 + lambda_5 K_xx) * q_x + lambda_5 K_xy * q_y
-!>     s_y = -lambda_2 K_y * p  + lambda_5 K_xy * q_x + (lambda_1 K1 + lambda_5 K_yy) * q_y
+!> The sum over all pyramids is a convolution, since the lattice is the same everywhere. w is the closing of the gap, (s_x, s_y)
+!> the tangential displacement of body 1 over body 2; the bodies (hc_elastic_medium) know the blocks.
 !>
 !> The complete operator is symmetric (Betti) and positive definite.
 !>
@@ -16,29 +11,21 @@ module hc_flexibility
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: most_threads
-  use hc_elastic_pair, only: elastic_pair_t, check_pair
-  use hc_pyramid_influence, only: k_1, k_xx, k_xy, k_x, k_y
+  use hc_elastic_medium, only: elastic_medium_t
   implicit none
   private
 
   public :: flexibility_t, check_operator, normal, along_x, along_y
-  public :: n_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
-
-  !> The operator has six different blocks: normal, xx, xy, yy, which are even in the
-  !> distance of two nodes, and normal-x, normal-y, which are odd.
-  integer, parameter :: n_block = 6
-  !> Block that stands at (onto, from), negative where its sign is reversed.
-  integer, parameter :: block_index(3, 3) = reshape([1, -5, -6, 5, 2, 3, 6, 3, 4], [3, 3])
 
   !> A flexibility operator over the nodes of a window.
   type, abstract :: flexibility_t
     !> Lattice and window
     type(lattice_t) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t) :: pair
+    !> The two bodies
+    class(elastic_medium_t), allocatable :: medium
     !> Products so far, in full 3x3 applications: every component that acts or is wanted counts 1/6
     real(wp) :: applications = 0.0_wp
   contains
@@ -71,11 +58,11 @@ module hc_flexibility
 contains
 
   !> Refuse a lattice, elastic constants and a number of threads that no operator can be made with.
-  pure subroutine check_operator(lattice, pair, error, n_threads)
+  pure subroutine check_operator(lattice, medium, error, n_threads)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; 0: the default of OpenMP
@@ -83,29 +70,12 @@ contains
 
     call check_lattice(lattice, error)
     if (allocated(error)) return
-    call check_pair(pair, error)
+    call medium%check(error)
     if (allocated(error) .or. .not. present(n_threads)) return
     if (n_threads < 0 .or. n_threads > most_threads) then
       call raise(error, status%invalid_input, 'the number of threads: 0 (as many as OpenMP would take) to 1024 expected')
     end if
   end subroutine check_operator
-
-  !> Compute the six blocks of the operator at one distance of nodes.
-  pure function blocks(pair, kernel) result(block)
-    !> Elastic constants
-    type(elastic_pair_t), intent(in) :: pair
-    !> The five pyramid kernels [m]
-    real(wp), intent(in) :: kernel(5)
-    !> Displacement per traction [m/Pa]
-    real(wp) :: block(n_block)
-
-    block = [pair%lambda_1*kernel(k_1), &
-             pair%lambda_1*kernel(k_1) + pair%lambda_5*kernel(k_xx), &
-             pair%lambda_5*kernel(k_xy), &
-             (pair%lambda_1 + pair%lambda_5)*kernel(k_1) - pair%lambda_5*kernel(k_xx), &
-             pair%lambda_2*kernel(k_x), &
-             pair%lambda_2*kernel(k_y)]
-  end function blocks
 
   !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)

@@ -9,10 +9,9 @@ module hc_flexibility_dense
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: prepare_lapack
   use hc_lattice, only: lattice_t
-  use hc_elastic_pair, only: elastic_pair_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
   use hc_flexibility_fft, only: fft_memory
-  use hc_flexibility, only: flexibility_t, check_operator, normal, along_x, along_y, n_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, normal, along_x, along_y
   implicit none
   private
 
@@ -36,22 +35,22 @@ module hc_flexibility_dense
 contains
 
   !> Compute the coefficients of the operator over a window.
-  subroutine new_dense_flexibility(operator, lattice, pair, error)
+  subroutine new_dense_flexibility(operator, lattice, medium, error)
     !> Operator to be set up
     type(dense_flexibility_t), intent(out) :: operator
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
     integer, parameter :: long = selected_int_kind(18)
-    type(pyramid_t) :: pyramid
-    real(wp) :: offset(2)
+    class(influence_t), allocatable :: influence
+    real(wp), allocatable :: x(:), y(:), block(:, :)
     integer :: n(2), col, row, stride, largest, stat
 
-    call check_operator(lattice, pair, error)
+    call check_operator(lattice, medium, error)
     if (allocated(error)) return
     if (product(2*int(lattice%extent, long) - 1) > huge(1)) then
       call raise(error, status%resources, 'the window is too large for a matrix: use method "fft"')
@@ -60,7 +59,7 @@ contains
     call prepare_lapack(error)
     if (allocated(error)) return
     operator%lattice = lattice
-    operator%pair = pair
+    allocate (operator%medium, source=medium)
     n = lattice%extent
     stride = 2*n(1) - 1
     largest = n(1) - 1 + (n(2) - 1)*stride
@@ -70,17 +69,19 @@ contains
       return
     end if
     operator%position = [((col + row*stride, col=0, n(1) - 1), row=0, n(2) - 1)]
-    call new_pyramid(pyramid, lattice%basis)
-    !$omp parallel do private(col, offset) if (lattice%size() > 1000)
+    call medium%new_influence(lattice%basis, influence)
+    !$omp parallel do private(col, x, y, block) if (lattice%size() > 1000)
     do row = 1 - n(2), n(2) - 1
-      do col = 1 - n(1), n(1) - 1
-        offset = col*lattice%basis(:, 1) + row*lattice%basis(:, 2)
-        operator%influence(col + row*stride, :) = blocks(pair, pyramid%kernels(offset(1), offset(2)))
-      end do
+      x = [(col*lattice%basis(1, 1) + row*lattice%basis(1, 2), col=1 - n(1), n(1) - 1)]
+      y = [(col*lattice%basis(2, 1) + row*lattice%basis(2, 2), col=1 - n(1), n(1) - 1)]
+      allocate (block(n_block, stride))
+      call influence%blocks(x, y, block)
+      operator%influence(1 - n(1) + row*stride:n(1) - 1 + row*stride, :) = transpose(block)
+      deallocate (block)
     end do
     !$omp end parallel do
     associate (xx => abs(block_index(along_x, along_x)), yy => abs(block_index(along_y, along_y)))
-      operator%influence(0, [xx, yy]) = operator%influence(0, [xx, yy]) + pair%tangential_layer
+      operator%influence(0, [xx, yy]) = operator%influence(0, [xx, yy]) + medium%spring_compliance()
     end associate
   end subroutine new_dense_flexibility
 

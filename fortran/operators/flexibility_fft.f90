@@ -6,9 +6,8 @@ module hc_flexibility_fft
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
-  use hc_elastic_pair, only: elastic_pair_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, check_operator, normal, n_block, blocks
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, normal
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
   use hc_fft_passes, only: complement
@@ -21,26 +20,31 @@ module hc_flexibility_fft
 
   public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
 
-  !> Blocks that have spectra, the odd ones last; that of yy is a multiple of the normal one less that of xx.
-  integer, parameter :: transformed(5) = [1, 2, 3, 5, 6], n_spectrum = size(transformed), first_odd = 4
-  !> Spectrum that stands at (onto, from), negative where its sign is reversed
+  !> Blocks that have spectra, the odd ones last, where that of yy is a multiple of the normal one less that of xx.
+  integer, parameter :: with_trace(5) = [1, 2, 3, 5, 6], n_spectrum = size(with_trace)
+  !> Even blocks of all
+  integer, parameter :: n_even = 4
+  !> With a trace: spectrum that stands at (onto, from), negative where its sign is reversed
   integer, parameter :: spectrum_index(3, 3) = reshape([1, -4, -5, 4, 2, 3, 5, 3, complement], [3, 3])
 
   !> Convolution operator over a window.
   type, extends(flexibility_t) :: fft_flexibility_t
-    !> Spectra of the blocks over lambda_1 and the spacing, that of the pressure and the gap alone or all of them
+    !> Spectra of the blocks over the unit of the bodies, that of the pressure and the gap alone or all of them
     type(convolution_t) :: convolution
-    !> Components that the operator was set up for
-    integer, private :: n_component = 0
+    !> Spectrum that stands at (onto, from), negative where its sign is reversed
+    integer, private :: index(3, 3) = 0
+    !> Components that the operator was set up for, and those that are multiplied together
+    integer, private :: n_component = 0, at_once = 1
   contains
     procedure :: apply => fft_apply
   end type fft_flexibility_t
 
-  !> The blocks of the operator at lattice offsets, over lambda_1 and the spacing.
+  !> The blocks of the operator at lattice offsets, over the unit of the bodies.
   type, extends(kernel_source_t) :: lattice_blocks_t
-    type(pyramid_t) :: pyramid
-    type(elastic_pair_t) :: pair
+    class(influence_t), allocatable :: influence
     real(wp) :: basis(2, 2) = 0.0_wp
+    !> Those that have spectra
+    integer, allocatable :: transformed(:)
   contains
     procedure :: row => lattice_block_row
   end type lattice_blocks_t
@@ -48,13 +52,13 @@ module hc_flexibility_fft
 contains
 
   !> Make plans and spectra of the operator over a window.
-  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, space, kernel, cache)
+  subroutine new_fft_flexibility(operator, lattice, medium, error, normal_only, space, kernel, cache)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> The operator is applied to the pressure alone, for the gap alone
@@ -68,47 +72,57 @@ contains
 
     type(lattice_blocks_t) :: source
     type(normal_kernel_t) :: made
+    class(elastic_medium_t), allocatable :: reduced
     type(kernel_key_t) :: key
     type(field_space_t) :: shared
-    integer :: n_kernel
+    integer :: first_odd, n_kernel, i
     logical :: only_normal, found
 
-    call check_operator(lattice, pair, error)
+    call check_operator(lattice, medium, error)
     if (allocated(error)) return
     shared = space_over(lattice%extent)
     if (present(space)) shared = space
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
     operator%lattice = lattice
-    operator%pair = pair
+    allocate (operator%medium, source=medium)
     operator%n_component = merge(1, 3, only_normal)
-    n_kernel = merge(1, n_spectrum, only_normal)
+    operator%index = block_index
+    source%transformed = [(i, i=1, n_block)]
+    first_odd = n_even + 1
+    if (medium%trace() > 0.0_wp) then
+      operator%index = spectrum_index
+      source%transformed = with_trace
+      first_odd = n_even
+    end if
+    n_kernel = merge(1, size(source%transformed), only_normal)
     ! the odd blocks of like materials vanish
-    if (.not. abs(pair%lambda_2) > 0.0_wp) n_kernel = min(n_kernel, first_odd - 1)
+    if (.not. medium%couples()) n_kernel = min(n_kernel, first_odd - 1)
+    operator%at_once = components_at_once(n_kernel, first_odd)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), n_kernel, &
-                         components_at_once(n_kernel), shared, error, first_odd=first_odd)
+                         operator%at_once, shared, error, first_odd=first_odd)
     if (allocated(error)) return
-    operator%convolution%factor = pair%lambda_1*lattice%spacing()
-    operator%convolution%whole = 2.0_wp + pair%gamma()
-    key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
+    operator%convolution%factor = medium%unit(lattice%spacing())
+    operator%convolution%whole = medium%trace()
+    key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, medium)
     call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
     if (only_normal .and. present(kernel)) then
-      call kernel%cover(lattice, shared)
+      call kernel%cover(lattice, medium, shared)
       call operator%convolution%transform_kernels(kernel, error)
     else if (only_normal) then
-      call made%cover(lattice, shared)
+      call made%cover(lattice, medium, shared)
       call operator%convolution%transform_kernels(made, error)
     else
       source%basis = lattice%unit_basis()
-      call new_pyramid(source%pyramid, source%basis)
-      source%pair = pair%scaled()
+      call medium%reduce(lattice%spacing(), reduced)
+      call reduced%new_influence(source%basis, source%influence)
       call operator%convolution%transform_kernels(source, error)
     end if
     if (.not. allocated(error)) call operator%convolution%store_spectra(cache, key)
   end subroutine new_fft_flexibility
 
-  !> Count the bytes that the operator takes, for a window of the given size.
+  !> Count the bytes that the operator takes, for a window of the given size; bodies without a trace have a spectrum more.
   pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -123,16 +137,16 @@ contains
     integer :: n_kernel, n_component
 
     n_kernel = merge(1, n_spectrum, normal_only)
-    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd - 1), unlike)
-    n_component = components_at_once(n_kernel)
+    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, n_even - 1), unlike)
+    n_component = components_at_once(n_kernel, n_even)
     if (present(shared)) n_component = merge(0, n_component, shared)
     fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, n_component, threads)
   end function fft_memory
 
   !> Return the components that are multiplied together: without odd blocks, pressure and shear traction are apart.
-  pure integer function components_at_once(n_kernel)
-    !> Number of blocks
-    integer, intent(in) :: n_kernel
+  pure integer function components_at_once(n_kernel, first_odd)
+    !> Number of spectra, and first one that is odd
+    integer, intent(in) :: n_kernel, first_odd
 
     components_at_once = 1
     if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel >= first_odd)
@@ -151,15 +165,14 @@ contains
     class(lattice_blocks_t), intent(in) :: self
     integer, intent(in) :: j
     real(wp), intent(out) :: k(:, :)
-    real(wp) :: block(n_block), position(2)
+    real(wp) :: block(n_block, size(k, 2)), x(size(k, 2)), y(size(k, 2))
     integer :: i, n
 
     n = size(k, 2)/2
-    do i = -n, n
-      position = i*self%basis(:, 1) + j*self%basis(:, 2)
-      block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
-      k(:, n + 1 + i) = block(transformed(:size(k, 1)))
-    end do
+    x = [(i*self%basis(1, 1) + j*self%basis(1, 2), i=-n, n)]
+    y = [(i*self%basis(2, 1) + j*self%basis(2, 2), i=-n, n)]
+    call self%influence%blocks(x, y, block)
+    k = block(self%transformed(:size(k, 1)), :)
   end subroutine lattice_block_row
 
   !> Multiply by the convolution, and add the stretch of tangential springs.
@@ -170,6 +183,7 @@ contains
     integer, intent(in) :: onto(:)
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
+    real(wp) :: spring
     integer :: i, o
 
     call self%check(from, traction, onto, displacement, error)
@@ -178,19 +192,20 @@ contains
       call raise(error, status%invalid_input, 'the operator was set up for normal contact only')
       return
     end if
-    if (max(size(from), size(onto)) <= components_at_once(size(self%convolution%spectrum, 3))) then
-      call self%convolution%convolve(spectrum_index(onto, from), traction, displacement)
+    if (max(size(from), size(onto)) <= self%at_once) then
+      call self%convolution%convolve(self%index(onto, from), traction, displacement)
     else if (any(from(2:) == normal) .or. any(onto(2:) == normal)) then
       call raise(error, status%invalid_input, 'of several components the pressure is the first')
       return
     else
       call apply_apart(self, from, traction, onto, displacement)
     end if
-    if (self%pair%tangential_layer > 0.0_wp) then
+    spring = self%medium%spring_compliance()
+    if (spring > 0.0_wp) then
       do i = 1, size(from)
         do o = 1, size(onto)
           if (from(i) == normal .or. onto(o) /= from(i)) cycle
-          displacement(:, :, o) = displacement(:, :, o) + self%pair%tangential_layer*traction(:, :, i)
+          displacement(:, :, o) = displacement(:, :, o) + spring*traction(:, :, i)
         end do
       end do
     end if
@@ -209,9 +224,9 @@ contains
     i = merge(1, 0, from(1) == normal)
     o = merge(1, 0, onto(1) == normal)
     if (i == 0 .or. i == size(from)) displacement = 0.0_wp
-    if (i*o > 0) call self%convolution%convolve(spectrum_index(onto(:o), from(:i)), traction(:, :, :i), displacement(:, :, :o))
+    if (i*o > 0) call self%convolution%convolve(self%index(onto(:o), from(:i)), traction(:, :, :i), displacement(:, :, :o))
     if (i == size(from) .or. o == size(onto)) return
-    call self%convolution%convolve(spectrum_index(onto(o + 1:), from(i + 1:)), traction(:, :, i + 1:), displacement(:, :, o + 1:))
+    call self%convolution%convolve(self%index(onto(o + 1:), from(i + 1:)), traction(:, :, i + 1:), displacement(:, :, o + 1:))
   end subroutine apply_apart
 
 end module hc_flexibility_fft

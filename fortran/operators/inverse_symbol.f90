@@ -11,15 +11,13 @@ module hc_inverse_symbol
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_elastic_medium, only: elastic_medium_t, influence_t
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution
   use hc_fft_layout_single, only: convolution_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_edge_continuation, only: edge_extension_t
-  use hc_lattice_symbol, only: lattice_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
@@ -67,13 +65,13 @@ module hc_inverse_symbol
 contains
 
   !> Make plans and inverse symbol over a window.
-  subroutine new_inverse_symbol(self, lattice, pair, space, error, tangential, cache)
+  subroutine new_inverse_symbol(self, lattice, medium, space, error, tangential, cache)
     !> Preconditioner to be set up
     type(inverse_symbol_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
@@ -86,9 +84,10 @@ contains
     type(kernel_key_t) :: key
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
-    real(wp) :: scale, matrix(3), layer, basis(2, 2), gamma
+    real(wp) :: scale, layer, own(1)
     real(wp), allocatable :: symbol(:, :)
-    type(pyramid_t) :: pyramid
+    class(elastic_medium_t), allocatable :: reduced
+    class(influence_t), allocatable :: influence
     logical :: found
 
     if (present(tangential)) self%tangential = tangential
@@ -98,36 +97,31 @@ contains
     call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
                          space, error)
     if (allocated(error)) return
-    self%unit = pair%lambda_1*lattice%spacing()
-    call new_pyramid(pyramid, lattice%basis)
-    ! K1(0) to three decimals: a preconditioner needs no more
-    self%self_compliance = self%unit*(anint(1.0e3_wp*pyramid%normal_kernel(0.0_wp, 0.0_wp)/lattice%spacing())/1.0e3_wp)
+    self%unit = medium%unit(lattice%spacing())
+    call medium%reduce(lattice%spacing(), reduced)
+    call reduced%new_influence(lattice%unit_basis(), influence)
+    call influence%closing([0.0_wp], [0.0_wp], own)
+    ! to three decimals: a preconditioner needs no more
+    self%self_compliance = self%unit*(anint(1.0e3_wp*own(1))/1.0e3_wp)
     self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
-    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
+    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, medium)
     call self%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
-    ! all in units of lambda_1 and the spacing
-    basis = lattice%unit_basis()
-    gamma = pair%gamma()
-    layer = pair%tangential_layer/self%unit
+    layer = medium%spring_compliance()/self%unit
     scale = 1.0_wp/product(real(length, wp))
-    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, matrix, symbol)
+    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, symbol)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
       ! beyond length/2 there is mere filling
       where (f(1, :) > length(1)/2) f(1, :) = min(1, length(1) - 1)
-      allocate (symbol(size(f, 2), merge(3, 1, self%tangential)))
-      call lattice_symbols(basis, length, f, symbol)
+      allocate (symbol(size(f, 2), size(self%convolution%spectrum, 3)))
+      call reduced%find_symbols(lattice%unit_basis(), length, f, symbol)
       if (.not. self%tangential) then
         self%convolution%spectrum(:, b, 1) = real(scale/symbol(:, 1), sp)
       else
+        symbol(:, [1, 3]) = symbol(:, [1, 3]) + layer
         do i = 1, size(f, 2)
-          associate (k_1 => symbol(i, symbol_1), k_xx => symbol(i, symbol_xx), k_xy => symbol(i, symbol_xy))
-            ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
-            matrix = [k_1 + gamma*k_xx, gamma*k_xy, k_1 + gamma*(k_1 - k_xx)]
-          end associate
-          matrix([1, 3]) = matrix([1, 3]) + layer
-          self%convolution%spectrum(i, b, :) = real(scale*inverse(matrix), sp)
+          self%convolution%spectrum(i, b, :) = real(scale*inverse(symbol(i, :)), sp)
         end do
       end if
       deallocate (symbol)
@@ -288,14 +282,16 @@ contains
     traction = self%share*traction + passed
   end subroutine apply_on_springs
 
-  !> Compute the elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].
-  pure real(wp) function node_compliance(lattice, pair)
+  !> Compute the compliance t_h of a node in the plane, with its spring: 2 lambda_1 (1 + gamma/2) l_e on half-spaces [m/Pa].
+  pure real(wp) function node_compliance(lattice, medium)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
 
-    node_compliance = (2.0_wp + pair%gamma())*pair%lambda_1*lattice%spacing() + pair%tangential_layer
+    associate (spacing => lattice%spacing())
+      node_compliance = 2.0_wp*medium%shear_ratio()*medium%normal_point(spacing)*spacing + medium%spring_compliance()
+    end associate
   end function node_compliance
 
 end module hc_inverse_symbol

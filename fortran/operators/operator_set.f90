@@ -9,7 +9,7 @@ module hc_operator_set
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_inverse_symbol, only: preconditioner_memory
@@ -45,13 +45,13 @@ module hc_operator_set
 contains
 
   !> Set up the operator by FFT and preconditioners by the inverse symbol, over a window.
-  subroutine new_operators(self, lattice, pair, space, error, cache, options)
+  subroutine new_operators(self, lattice, medium, space, error, cache, options)
     !> Operators to be set up
     type(operators_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
@@ -68,11 +68,11 @@ contains
     if (present(options)) tuning = options
     self%space = space
     allocate (flexibility, normal, tangential)
-    call new_fft_flexibility(flexibility, lattice, pair, error, space=space, cache=cache)
+    call new_fft_flexibility(flexibility, lattice, medium, error, space=space, cache=cache)
     if (allocated(error)) return
-    call new_symbol_preconditioner(normal, lattice, pair, space, tuning, error, cache)
+    call new_symbol_preconditioner(normal, lattice, medium, space, tuning, error, cache)
     if (allocated(error)) return
-    call new_shear_preconditioner(tangential, lattice, pair, space, tuning, error, cache)
+    call new_shear_preconditioner(tangential, lattice, medium, space, tuning, error, cache)
     if (allocated(error)) return
     call move_alloc(flexibility, self%flexibility)
     call move_alloc(normal, self%normal)

@@ -1,26 +1,29 @@
-!> The kernel of the pressure at all lattice offsets of a window, over the spacing.
+!> The kernel of the pressure at all lattice offsets of a window, over the unit of the bodies.
 !>
 !> On the equilateral lattice it has twelve symmetries: only offsets with
-!> 0 <= j <= i are evaluated. Over the spacing the kernel is the same at the same
+!> 0 <= j <= i are evaluated. Bodies without a length of their own have the same kernel at the same
 !> indices of any lattice, so that one table serves a whole hierarchy of lattices.
 !>
 !> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pressure_kernel
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_word
   use hc_convolution, only: kernel_source_t
   implicit none
   private
 
   public :: normal_kernel_t
 
-  !> Closing of the gap by a pyramid of unit pressure, over lambda_1 and the spacing.
+  !> Closing of the gap by a pyramid of unit pressure, over the unit of the bodies.
   type, extends(kernel_source_t) :: normal_kernel_t
     private
     logical :: equilateral = .false.
-    !> K1 at offsets (i, j) with i j >= 0, and at (i, -j), over the spacing
+    !> The bodies
+    integer(int64) :: medium(n_word) = 0
+    !> Closing at offsets (i, j) with i j >= 0, and at (i, -j)
     real(wp), allocatable :: same(:, :), opposite(:, :)
   contains
     !> Tabulate the kernel, unless the table covers the window
@@ -32,35 +35,42 @@ module hc_pressure_kernel
 
 contains
 
-  !> Tabulate the kernel for a window; a table that exists is of the same lattice, or of a coarser or finer one.
-  subroutine cover(self, lattice, space)
+  !> Tabulate the kernel for a window; one that exists is of the same basis.
+  subroutine cover(self, lattice, medium, space)
     class(normal_kernel_t), intent(inout) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    type(pyramid_t) :: pyramid
-    integer :: i, j, n(2)
+    class(elastic_medium_t), allocatable :: reduced
+    class(influence_t), allocatable :: influence
+    integer :: i, j, n(2), first
 
     n = lattice%extent - 1
-    if (allocated(self%same)) then
-      if (all(n <= ubound(self%same))) return
-      deallocate (self%same)
-      if (allocated(self%opposite)) deallocate (self%opposite)
-    end if
-    call new_pyramid(pyramid, lattice%unit_basis())
-    self%equilateral = pyramid%is_equilateral()
-    if (self%equilateral) n = maxval(n)
-    allocate (self%same(0:n(1), 0:n(2)))
-    if (.not. self%equilateral) allocate (self%opposite(0:n(1), 0:n(2)))
+    call medium%reduce(lattice%spacing(), reduced)
+    associate (word => reduced%key_words(normal=.true., tangential=.false.))
+      if (allocated(self%same)) then
+        if (all(n <= ubound(self%same)) .and. all(self%medium == word)) return
+        call self%clear()
+      end if
+      self%medium = word
+    end associate
     associate (basis => lattice%unit_basis())
-      !$omp parallel do schedule(dynamic, 8) private(i) num_threads(space%threads)
+      call reduced%new_influence(basis, influence)
+      self%equilateral = influence%is_hexagonal()
+      if (self%equilateral) n = maxval(n)
+      allocate (self%same(0:n(1), 0:n(2)))
+      if (.not. self%equilateral) allocate (self%opposite(0:n(1), 0:n(2)))
+      !$omp parallel do schedule(dynamic, 8) private(i, first) num_threads(space%threads)
       do j = 0, n(2)
-        do i = merge(j, 0, self%equilateral), n(1)
-          self%same(i, j) = pyramid%normal_kernel(i*basis(1, 1) + j*basis(1, 2), i*basis(2, 1) + j*basis(2, 2))
-          if (self%equilateral) cycle
-          self%opposite(i, j) = pyramid%normal_kernel(i*basis(1, 1) - j*basis(1, 2), i*basis(2, 1) - j*basis(2, 2))
-        end do
+        first = merge(j, 0, self%equilateral)
+        call influence%closing([(i*basis(1, 1) + j*basis(1, 2), i=first, n(1))], &
+                               [(i*basis(2, 1) + j*basis(2, 2), i=first, n(1))], self%same(first:, j))
+        if (self%equilateral) cycle
+        call influence%closing([(i*basis(1, 1) - j*basis(1, 2), i=0, n(1))], &
+                               [(i*basis(2, 1) - j*basis(2, 2), i=0, n(1))], self%opposite(:, j))
       end do
       !$omp end parallel do
     end associate

@@ -22,7 +22,7 @@ module hc_shear_preconditioner
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t, neighbor_steps
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
   use hc_plane_fields, only: to_plane, add_in_frames, keep_along, copy_nodes, add_nodes, set_to_zero
@@ -61,13 +61,13 @@ module hc_shear_preconditioner
 contains
 
   !> Set up a preconditioner over a window.
-  subroutine new_shear_preconditioner(self, lattice, pair, space, options, error, cache)
+  subroutine new_shear_preconditioner(self, lattice, medium, space, options, error, cache)
     !> Preconditioner to be set up
     type(shear_preconditioner_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
@@ -77,8 +77,8 @@ contains
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_symbol_preconditioner(self, lattice, pair, space, options, error, cache, tangential=.true.)
-    self%elastic_compliance = node_compliance(lattice, pair)
+    call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential=.true.)
+    self%elastic_compliance = node_compliance(lattice, medium)
   end subroutine new_shear_preconditioner
 
   !> Set the nodes in contact, and the springs of those that slip.

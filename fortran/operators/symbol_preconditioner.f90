@@ -11,7 +11,7 @@ module hc_symbol_preconditioner
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol
@@ -55,13 +55,13 @@ module hc_symbol_preconditioner
 contains
 
   !> Set up a preconditioner over a window.
-  subroutine new_symbol_preconditioner(self, lattice, pair, space, options, error, cache, tangential)
+  subroutine new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential)
     !> Preconditioner to be set up
     class(symbol_preconditioner_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
@@ -73,7 +73,7 @@ contains
     !> Of the shear traction; absent: of the pressure
     logical, intent(in), optional :: tangential
 
-    call new_inverse_symbol(self%inverse, lattice, pair, space, error, tangential, cache)
+    call new_inverse_symbol(self%inverse, lattice, medium, space, error, tangential, cache)
     self%unit = self%inverse%unit
     self%extent = lattice%extent
     self%space = space

@@ -69,7 +69,7 @@ contains
       end if
 
       if (friction%is_bounded()) then
-        carried = space%sum(bounds(friction, halves))
+        carried = space%sum(friction%bounds_of(halves%pressure))
       else
         carried = max(space%sum(shear(halves)), least_traction*space%sum(halves%pressure))
       end if
@@ -140,7 +140,7 @@ contains
       do row = 1, size(reserve, 2)
         call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), reserve(:, row))
       end do
-      reserve = bounds(friction, state) - reserve
+      reserve = friction%bounds_of(state%pressure) - reserve
     end if
     edge = edges%stick_edge(state%zone == stick, reserve)
   end function stick_edge_of
@@ -158,20 +158,6 @@ contains
     edge = stick_edge_of(edges, problem%friction, state)
     stick_area = edge%area
   end function stick_area
-
-  !> Compute the largest traction that friction allows at each node [Pa].
-  pure function bounds(friction, state) result(bound)
-    !> Friction law
-    class(friction_law_t), intent(in) :: friction
-    !> State
-    type(contact_state_t), intent(in) :: state
-    real(wp) :: bound(size(state%pressure, 1), size(state%pressure, 2))
-    integer :: row
-
-    do row = 1, size(bound, 2)
-      call friction%find_bounds((row - 1)*size(bound, 1) + 1, state%pressure(:, row), bound(:, row))
-    end do
-  end function bounds
 
   !> Compute the slip during a step; 0 where nodes do not slip at its end [m].
   pure function slipped(before, after)

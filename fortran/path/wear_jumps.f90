@@ -7,13 +7,13 @@
 !>
 !>     call energy_ahead(cycle, ..., cycles, ..., energy)
 !>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
-!>     call jump_change(lattice, pair, law, two_jumps_t(energy, that of the second jump, that of one jump of both, cycles), ...)
+!>     call jump_change(lattice, medium, law, two_jumps_t(energy, that of the second jump, that of one jump of both, cycles), ...)
 !>
 !> Equations: docs/theory/wear.md, (V1) to (V6), (V9).
 module hc_wear_jumps
   use hc_precision, only: wp, sp
   use hc_options, only: step_options_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_lattice, only: lattice_t
   use hc_contact_residuals, only: normal_self_compliance
   use hc_step_error, only: step_change_t
@@ -106,11 +106,11 @@ contains
 
   !> Compute what two jumps change in comparison with one of both, (V6): the depth, and its root mean square over what the
   !> largest pressure indents one node, as tractions that the step adds.
-  pure subroutine jump_change(lattice, pair, law, jumps, p_max, slower, change)
+  subroutine jump_change(lattice, medium, law, jumps, p_max, slower, change)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> How the surfaces wear
     type(wear_law_t), intent(in) :: law
     !> The jumps
@@ -127,7 +127,7 @@ contains
       slower = jumps%cycles*archard_depth((first - both) + (second - both), law%coefficient, law%friction)
       associate (n_wearing => count(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp))
         if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(slower**2)/n_wearing) &
-                                                                /(normal_self_compliance(lattice, pair)*p_max)
+                                                                /(normal_self_compliance(lattice, medium)*p_max)
       end associate
     end associate
   end subroutine jump_change
@@ -135,11 +135,11 @@ contains
   !> Correct the energy by which the second of two equal jumps wears, (V5).
   !>
   !> Never more than what the pressure that is left indents a node, and never less than nothing.
-  pure subroutine energy_of_second_jump(lattice, pair, law, jumps, path, corrected)
+  subroutine energy_of_second_jump(lattice, medium, law, jumps, path, corrected)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Elastic constants
-    type(elastic_pair_t), intent(in) :: pair
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
     !> How the surfaces wear
     type(wear_law_t), intent(in) :: law
     !> The jumps
@@ -151,7 +151,7 @@ contains
     real(wp) :: node, most
     integer :: col, row
 
-    node = normal_self_compliance(lattice, pair)
+    node = normal_self_compliance(lattice, medium)
     associate (first => jumps%first, second => jumps%second, both => jumps%both)
       do row = 1, size(corrected, 2)
         do col = 1, size(corrected, 1)

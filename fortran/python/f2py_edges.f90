@@ -10,9 +10,10 @@ module hc_f2py_edges
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t
+  use hc_friction_law, only: friction_law_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_edge_tractions, only: correct_at_edges, edge_tractions_memory
-  use hc_traction_field, only: traction_field_t, new_traction_field
+  use hc_traction_field, only: traction_field_t, new_traction_field, n_part
   use hc_stress_at_edges, only: edge_traction_t, correct_stress_at_edges
   use hc_edge_roots_of_contact, only: new_edge_of_contact, new_edge_of_stick
   use hc_zone_edge, only: zone_edge_t, zone_mesh_t
@@ -92,20 +93,22 @@ contains
     end if
   end function distances_of
 
-  !> Set up the tractions between the nodes as arrays: 5, or 13 with known limits of friction.
-  subroutine field_of(lattice, fields, zones, traction, limits, parts)
+  !> Set up the tractions between the nodes as arrays: 5, or as many as a field with a law of friction has.
+  subroutine field_of(lattice, fields, zones, traction, friction, parts)
     type(lattice_t), intent(in) :: lattice
     real(wp), intent(in) :: fields(:, :, :)
     logical, intent(in) :: zones(:, :, :)
-    !> Pressure and shear traction [Pa]; coefficient of friction and bound of the shear traction [Pa]
-    real(wp), intent(in) :: traction(:, :, :), limits(:, :, :)
+    !> Pressure and shear traction [Pa]
+    real(wp), intent(in) :: traction(:, :, :)
+    !> Law of friction, if it is known
+    class(friction_law_t), intent(in) :: friction
     real(wp), intent(out) :: parts(:, :, :)
     type(contact_edges_t) :: edges
     type(traction_field_t) :: field
 
     edges = edges_of(lattice, fields, zones)
-    if (size(parts, 3) > 5) then
-      call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3), limits)
+    if (size(parts, 3) == n_part) then
+      call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3), friction)
     else
       call new_traction_field(field, lattice, edges, traction, zones(:, :, 1), zones(:, :, 3))
     end if
@@ -118,16 +121,18 @@ contains
     type(elastic_pair_t), intent(in) :: pair
     real(wp), intent(in) :: fields(:, :, :)
     logical, intent(in) :: zones(:, :, :)
-    !> Coefficient of friction; pressure and shear traction [Pa], and the corrected ones
-    real(wp), intent(in) :: friction(:, :), traction(:, :, :)
+    class(friction_law_t), intent(in) :: friction
+    !> Pressure and shear traction [Pa], and the corrected ones
+    real(wp), intent(in) :: traction(:, :, :)
     real(wp), intent(inout) :: corrected(:, :, :)
     type(error_t), allocatable, intent(out) :: error
     type(field_space_t) :: space
 
     corrected = traction
     space = space_over(lattice%extent)
-    call require_memory(edge_tractions_memory(lattice%extent, count(zones(:, :, 1)), maxval(friction) > 0.0_wp, &
-                                              space%threads, abs(pair%lambda_2) > 0.0_wp), error, space%threads)
+    call require_memory(edge_tractions_memory(lattice%extent, count(zones(:, :, 1)), &
+                                              friction%resists() .and. friction%is_bounded(), space%threads, pair%couples()), &
+                        error, space%threads)
     if (allocated(error)) return
     call correct_at_edges(lattice, edges_of(lattice, fields, zones), pair, zones(:, :, 1), zones(:, :, 3), friction, corrected, &
                           space, error, kernel_cache)
@@ -139,8 +144,10 @@ contains
     type(lattice_t), intent(in) :: lattice
     real(wp), intent(in) :: fields(:, :, :)
     logical, intent(in) :: zones(:, :, :)
-    !> Coefficient of friction, 0 if shear tractions do not follow the pressure; tractions as solved and corrected [Pa]
-    real(wp), intent(in) :: friction(:, :), traction(:, :, :), corrected(:, :, :)
+    !> One without friction if shear tractions do not follow the pressure
+    class(friction_law_t), intent(in) :: friction
+    !> Tractions as solved and corrected [Pa]
+    real(wp), intent(in) :: traction(:, :, :), corrected(:, :, :)
     !> Number of the body and its Poisson's ratio
     integer, intent(in) :: body
     real(wp), intent(in) :: poisson_ratio
@@ -158,7 +165,7 @@ contains
     edges = edges_of(lattice, fields, zones)
     call new_edge_of_contact(near, lattice, edges, zones, friction, traction, corrected)
     call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, refused)
-    if (any(friction > 0.0_wp) .and. any(zones(:, :, 3))) then
+    if (friction%resists() .and. any(zones(:, :, 3))) then
       call new_edge_of_stick(near, lattice, edges, zones, friction, traction, corrected)
       call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, of_stick)
     end if

@@ -152,7 +152,7 @@ contains
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
-                                                              space%threads, abs(pair%lambda_2) > 0.0_wp)
+                                                              space%threads, pair%couples())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, pair, gap, candidate, friction, goodman, &
                                                           error, law)

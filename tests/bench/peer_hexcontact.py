@@ -25,7 +25,7 @@ from bench.square_window import (
 from hexcontact.core import kernel_cache
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.edges import ContactEdges
-from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.friction import ContactState, FrictionalContact, FrictionLaw
 from hexcontact.core.lattice import Lattice
 
 
@@ -51,8 +51,8 @@ def to_edges(
     everywhere = np.ones(lattice.shape, dtype=bool)
     zones = solution.zone > 0, everywhere
     edges = ContactEdges(solution.pressure, solution.gap, *zones, lattice.basis, lattice.start)
-    limits = (mu, np.inf) if shear else None
-    return edges.field(np.stack(shear) if shear else None, solution.zone == 1, limits).at_nodes()
+    law = FrictionLaw(mu) if shear else None
+    return edges.field(np.stack(shear) if shear else None, solution.zone == 1, law).at_nodes()
 
 
 def hertz(

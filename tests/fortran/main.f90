@@ -11,6 +11,7 @@ program tester
   use test_interior, only: collect_interior
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
+  use test_medium, only: collect_medium
   use test_spectrum_file, only: collect_spectrum_file
   use test_vectors, only: collect_vectors
   use test_arguments, only: collect_arguments
@@ -43,6 +44,7 @@ program tester
     new_suite('interior', collect_interior), &
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
+    new_suite('medium', collect_medium), &
     new_suite('spectrum_file', collect_spectrum_file), &
     new_suite('vectors', collect_vectors), &
     new_suite('arguments', collect_arguments), &

@@ -470,7 +470,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, f], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call new_direct_contact(smooth, problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return
@@ -500,7 +500,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, d], [load, 0.1_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call new_direct_contact(smooth, problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return

@@ -12,6 +12,8 @@ module test_edges
   use hc_edge_fit, only: fit_squares
   use hc_edge_band, only: edge_band_t, new_edge_band
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_coulomb, only: coulomb_t
+  use hc_nodal_coulomb, only: nodal_coulomb_t
   use hc_traction_field, only: new_traction_field, traction_field_t
   use hc_zone_edge, only: cut_triangles, zone_edge_t, zone_mesh_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -433,7 +435,8 @@ contains
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
     type(traction_field_t) :: field
-    real(wp), allocatable :: x(:, :), y(:, :), r(:, :), traction(:, :, :), mu(:, :), reserve(:, :)
+    real(wp), allocatable :: x(:, :), y(:, :), r(:, :), traction(:, :, :), reserve(:, :)
+    type(nodal_coulomb_t) :: law
     real(wp), parameter :: radius = 31.3_wp, stick = 17.6_wp, bound = 0.4_wp, coefficient = 0.5_wp
     real(wp) :: at(2), found(3)
     integer :: k
@@ -444,9 +447,10 @@ contains
     allocate (traction(size(x, 1), size(x, 2), 3), source=0.0_wp)
     traction(:, :, 1) = pressure(r)
     traction(:, :, 2) = shear(r)
-    mu = 0.0_wp*x + coefficient
+    allocate (law%coefficient(size(x)), source=coefficient)
+    law%shear_limit = bound
     call new_contact_edges(edges, lattice, traction(:, :, 1), max(r - radius, 0.0_wp)**1.5_wp, r < radius, x < huge(1.0_wp))
-    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, spread(mu, 3, 1))
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, coulomb_t(coefficient))
     reserve = merge(coefficient*pressure(r) - shear(r), 0.0_wp, r < stick)
     call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve of the nodes that stick')
     if (allocated(error)) return
@@ -460,8 +464,7 @@ contains
     end do
     ! a bound below mu p in the middle
     traction(:, :, 2) = min(traction(:, :, 2), bound - 0.1_wp)
-    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, &
-                            reshape([mu, mu/coefficient*bound], [shape(mu), 2]))
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, law)
     reserve = merge(min(coefficient*pressure(r), bound) - traction(:, :, 2), 0.0_wp, r < stick)
     call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve below a bound')
 

@@ -49,7 +49,7 @@ contains
     call new_sphere(contact, n, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
     call contact%problem%coarsen(coarse(1))
-    call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, field_space_t(), error)
+    call new_operators(operators(1), coarse(1)%lattice, coarse(1)%medium, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call go(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
@@ -126,7 +126,7 @@ contains
 
     call set_up(24, contact, state, coarse, operators, error)
     if (allocated(error)) return
-    call new_operators(fine, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(fine, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     allocate (exact(contact%problem%lattice%extent(1), contact%problem%lattice%extent(2), 3))
     allocate (old, mold=exact)
@@ -198,7 +198,7 @@ contains
     target = load_target_t([f, f, f, d], [load, 0.7_wp*mu*load, 0.0_wp, 0.0_wp])
     call contact%solve_step(state, state%relative_displacement, target, unreachable, 1, next, error)
     if (allocated(error)) return
-    call new_operators(operators(1), contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators(1), contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call solve_on_lattice(contact%problem, operators(1), state, &
                           load_step_t(target, state%relative_displacement, unreachable, 1), alone, error)
@@ -227,7 +227,7 @@ contains
     target = load_target_t([f, f, f, d], [load, 0.4_wp*mu*load, 0.2_wp*mu*load, 0.0_wp])
     call contact%solve_step(virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, cold, error)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call solve_on_lattice(contact%problem, operators, virgin, &
                           load_step_t(target, virgin%relative_displacement, 1.0e-9_wp, 60), alone, error)

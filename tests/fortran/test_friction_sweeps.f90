@@ -61,7 +61,7 @@ contains
 
     call new_sphere(contact, 10, 0.0_wp, 0.5_wp, coulomb_t(1.0_wp), error, n_threads=1)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call now%set_start(contact%problem, operators, state, &
@@ -104,7 +104,7 @@ contains
 
     call new_sphere(contact, 10, 0.4_wp, 0.2_wp, coulomb_t(1.0_wp), error, n_threads=1)
     if (allocated(error)) return
-    pair = contact%problem%pair
+    pair = elastic_pair_t(1.0_wp, 0.4_wp, 0.2_wp)
     pair%tangential_layer = 0.02_wp
     near = tangential_compliances(contact%problem%lattice, pair, near_reach)
     call new_operators(operators, contact%problem%lattice, pair, field_space_t(), error)
@@ -142,7 +142,7 @@ contains
 
     call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call now%set_start(contact%problem, operators, state, &
@@ -171,7 +171,7 @@ contains
 
     call new_sphere(contact, 10, 0.0_wp, 0.5_wp, coulomb_t(1.0_wp), error, n_threads=1)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call now%set_start(contact%problem, operators, state, &
@@ -208,7 +208,7 @@ contains
       call contact%solve_step(start, start%relative_displacement, target, 1.0e-8_wp, 60, solution, error)
       if (allocated(error)) return
     end do
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     call now%set_start(contact%problem, operators, start, load_step_t(target, start%relative_displacement, 1.0e-8_wp), error)
     if (allocated(error)) return
@@ -254,7 +254,7 @@ contains
     call new_sphere(contact, 6, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
     if (allocated(error)) return
     contact%problem%options%newton%front_nodes = 0
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    call new_operators(operators, contact%problem%lattice, contact%problem%medium, field_space_t(), error)
     if (allocated(error)) return
     ! contact all over the window of 13 by 13 nodes; one node next to its rim slips, the others stick
     do k = 1, 4

@@ -14,6 +14,7 @@ module test_interior
   use hc_interior_planes, only: interior_planes_t, new_interior_planes
   use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_coulomb, only: coulomb_t
   use hc_edge_tractions, only: correct_at_edges
   use hc_edge_root, only: edge_root_t, fit_edge_root, hat_moments
   use hc_stress_invariants, only: principal_stresses, von_mises
@@ -327,7 +328,7 @@ contains
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
     type(edge_options_t) :: options
-    real(wp), allocatable :: x(:, :), y(:, :), square(:, :), nodal(:, :, :), corrected(:, :, :), frictionless(:, :)
+    real(wp), allocatable :: x(:, :), y(:, :), square(:, :), nodal(:, :, :), corrected(:, :, :)
     logical, allocatable :: contact(:, :), stick(:, :)
     integer, parameter :: n = 50
 
@@ -339,12 +340,11 @@ contains
     allocate (contact, source=square > 0.0_wp)
     allocate (stick, source=contact .and. .false.)
     allocate (nodal(2*n + 1, 2*n + 1, 3), source=0.0_wp)
-    allocate (frictionless(2*n + 1, 2*n + 1), source=0.0_wp)
     nodal(:, :, 1) = sqrt(max(square, 0.0_wp))
     call new_contact_edges(edges, lattice, nodal(:, :, 1), max(-square, 0.0_wp)**1.5_wp, contact, square < huge(1.0_wp))
     associate (pair => elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), space => field_space_t(1))
       corrected = nodal
-      call correct_at_edges(lattice, edges, pair, contact, stick, frictionless, corrected, space, error)
+      call correct_at_edges(lattice, edges, pair, contact, stick, coulomb_t(0.0_wp), corrected, space, error)
       if (allocated(error)) return
       call check(error, sum(corrected(:, :, 1)), sum(nodal(:, :, 1)), 1.0e-9_wp*sum(nodal), 'load of the corrected pressure')
       if (allocated(error)) return
@@ -353,13 +353,13 @@ contains
 
       options%max_iterations = 1
       corrected = nodal
-      call correct_at_edges(lattice, edges, pair, contact, stick, frictionless, corrected, space, failure, options=options)
+      call correct_at_edges(lattice, edges, pair, contact, stick, coulomb_t(0.0_wp), corrected, space, failure, options=options)
       call check_raised(error, failure, status%no_convergence, 'an iteration is too few')
       if (allocated(error)) return
 
       corrected = 0.0_wp*nodal
       call new_contact_edges(edges, lattice, corrected(:, :, 1), 1.0_wp + 0.0_wp*x, stick, square < huge(1.0_wp))
-      call correct_at_edges(lattice, edges, pair, stick, stick, frictionless, corrected, space, error)
+      call correct_at_edges(lattice, edges, pair, stick, stick, coulomb_t(0.0_wp), corrected, space, error)
       if (allocated(error)) return
       call check_true(error, all(abs(corrected) <= 0.0_wp), 'no contact, no correction')
     end associate

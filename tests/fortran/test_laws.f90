@@ -133,9 +133,9 @@ contains
     call new_sphere(sphere, 8, 0.0_wp, 0.0_wp, coulomb_t(0.0_wp), error)
     if (allocated(error)) return
     associate (problem => sphere%problem)
-      call new_normal_contact(fft, problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+      call new_normal_contact(fft, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
       if (allocated(error)) return
-      call new_direct_contact(dense, problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+      call new_direct_contact(dense, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
     end associate
     if (allocated(error)) return
     call check_solver(fft)

@@ -132,7 +132,7 @@ contains
       call new_lattice(lattice, basis, [0, 0], [12, 9], error)
       if (allocated(error)) return
       kernel = normal_kernel_t()
-      call kernel%cover(lattice, field_space_t())
+      call kernel%cover(lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t())
       basis = lattice%unit_basis()
       call new_pyramid(pyramid, basis)
       worst = 0.0_wp

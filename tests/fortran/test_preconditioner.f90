@@ -280,10 +280,10 @@ contains
     call new_sphere(contact, 10, 0.2_wp, beta, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
     associate (problem => contact%problem)
-      call new_operators(usual, problem%lattice, problem%pair, field_space_t(), error)
+      call new_operators(usual, problem%lattice, problem%medium, field_space_t(), error)
       if (allocated(error)) return
       allocate (dense)
-      call new_dense_flexibility(dense, problem%lattice, problem%pair, error)
+      call new_dense_flexibility(dense, problem%lattice, problem%medium, error)
       if (allocated(error)) return
       call move_alloc(dense, other%flexibility)
       allocate (diagonal)
@@ -328,7 +328,7 @@ contains
     if (allocated(error)) return
     do k = 1, 2
       associate (problem => contact%problem)
-        call new_normal_problem(level(k), problem%lattice, problem%pair, problem%initial_gap, problem%candidate, error)
+        call new_normal_problem(level(k), problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
       end associate
       if (allocated(error)) return
       call level(k)%prepare(kernel, .true., .true., field_space_t(), error)

@@ -352,7 +352,7 @@ contains
       if (allocated(error)) return
       associate (p => contact%problem)
         call check(error, path%state%residual_tangential, &
-                   largest(nodal_tangential_residual(p%lattice, p%pair, p%friction, path%state, field_space_t())), 1.0e-12_wp, &
+                   largest(nodal_tangential_residual(p%lattice, p%medium, p%friction, path%state, field_space_t())), 1.0e-12_wp, &
                    'residual of the step as it is recorded')
       end associate
       if (allocated(error)) return
@@ -494,7 +494,7 @@ contains
     real(wp) :: x(lattice%extent(1), lattice%extent(2)), y(lattice%extent(1), lattice%extent(2))
 
     call lattice%coordinates(x, y)
-    call new_friction_problem(same, lattice, problem%pair, 0.5_wp*(x**2 + y**2), x < 100.0_wp, problem%friction, .false., error)
+    call new_friction_problem(same, lattice, problem%medium, 0.5_wp*(x**2 + y**2), x < 100.0_wp, problem%friction, .false., error)
     if (.not. allocated(error)) call new_frictional_contact(contact, same, error)
   end subroutine on_window
 
@@ -515,9 +515,9 @@ contains
       call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), &
                    step_settings_t(1.0e-5_wp, 60, 0, static=.true.), state, error)
       if (allocated(error)) return
-      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, &
+      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%medium, &
                                                            contact%problem%normal_law, state, field_space_t()))
-      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, friction, state, &
+      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%medium, friction, state, &
                                                              field_space_t()))
       call check(error, [maxval(along_normal), maxval(tangential)], [state%residual_normal, state%residual_tangential], &
                  1.0e-12_wp, 'largest residuals')
@@ -526,7 +526,7 @@ contains
       if (allocated(error)) return
       deallocate (along_normal, tangential)
     end do
-    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, coulomb_t(), state, &
+    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%medium, coulomb_t(), state, &
                                                         field_space_t())), &
                0.0_wp, 0.0_wp, 'nothing to satisfy without friction')
   end subroutine test_nodal_residuals

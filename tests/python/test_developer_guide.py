@@ -115,6 +115,13 @@ def test_additions_have_as_many_files_as_the_page_says() -> None:
     assert {heading: counted[heading] for heading in MOST} == MOST
 
 
+def test_a_medium_of_the_tests_has_three_files() -> None:
+    files = [path for folder in ("fortran", "tests/fortran") for path in (ROOT / folder).rglob("*.*")]
+    words = re.compile(r"scaled_medium|collect_medium|'medium'")
+    naming = {path.name for path in files if words.search(path.read_text())}
+    assert naming == {"test_medium.f90", "main.f90", "meson.build"}
+
+
 def test_rules_of_the_house_hold_with_all_additions(copy: Path) -> None:
     files = [f"tests/python/test_{name}.py" for name in ("rooms", "house", "flat_procedures")]
     keys = ("deck.py::test_the_deck_reference_is_up_to_date", "schema.py::test_schema_is_one")

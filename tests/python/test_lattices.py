@@ -9,6 +9,7 @@ import pytest
 from hexcontact import Case, DeckError, analytic, open_result
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.core.contact import ElasticPair, FlexibilityOperator
+from hexcontact.core.friction import FrictionLaw
 from hexcontact.core.lattice import Lattice, crossings
 from hexcontact.interior import fields
 from hexcontact.interior.stress import _edges, nodal_tractions, tractions
@@ -67,7 +68,7 @@ def test_stress_beside_the_edge(cells: str) -> None:
     hats = tractions(step.lattice, [step.fields], step.bodies, 0.0, "edges")[0][0, 0]
     [nodal] = nodal_tractions([step.fields])
     edges = _edges(step.lattice, nodal, step.fields)
-    none, law = np.zeros(hats.shape, dtype=bool), np.full(hats.shape, MU)
+    none, law = np.zeros(hats.shape, dtype=bool), FrictionLaw(MU)
     for away, depth in ((-1.0, 0.0), (-0.3, 0.0), (0.3, 0.0), (1.0, 0.0), (0.0, 0.3), (0.2, 0.7)):
         r = RADIUS - away * h
         points = np.array([(r * np.cos(t), r * np.sin(t), depth * h) for t in np.linspace(0.0, np.pi, 7)])

@@ -26,6 +26,7 @@ from hexcontact import (
     plotting,
     resume,
 )
+from hexcontact.core.friction import FrictionLaw
 from hexcontact.core.lattice import Lattice
 from hexcontact.interior import fields
 from hexcontact.interior.stress import _edges, nodal_tractions, tractions
@@ -182,7 +183,7 @@ def test_the_peak_at_the_trailing_edge_follows_from_the_root() -> None:
         _, [[stress]] = fields.at_points(step.lattice, loads[None], 1, nu, turned)
         [nodal] = nodal_tractions([step.fields])
         shear = np.array([mu * along[0] * nodal[0], mu * along[1] * nodal[0]])
-        none, law = np.zeros(hats.shape, dtype=bool), np.full(hats.shape, mu)
+        none, law = np.zeros(hats.shape, dtype=bool), FrictionLaw(mu)
         edges = _edges(step.lattice, nodal, step.fields)
         [more], refused = edges.stress(shear, none, law, loads, 1, nu, turned)
         radial = [*(along**2), 0, 2 * along[0] * along[1], 0, 0] @ np.stack([stress, stress + more], axis=1)

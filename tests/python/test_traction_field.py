@@ -12,7 +12,7 @@ from bench.peer_hexcontact import cattaneo_mindlin, hertz
 from hexcontact import Case, Result, open_result
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.edges import ContactEdges, TractionField
-from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.friction import ContactState, FrictionalContact, FrictionLaw
 from hexcontact.core.lattice import Lattice
 from hexcontact.errors import DeckError
 
@@ -60,7 +60,9 @@ def field_of(
 ) -> TractionField:
     everywhere = np.ones(lattice.shape, dtype=bool)
     edges = ContactEdges(state.pressure, state.gap, state.zone > 0, everywhere, lattice.basis, lattice.start)
-    return edges.field(np.stack([state.traction_x, state.traction_y]), state.zone == 1, (mu, bound))
+    return edges.field(
+        np.stack([state.traction_x, state.traction_y]), state.zone == 1, FrictionLaw(mu, bound)
+    )
 
 
 @pytest.mark.parametrize("law", ["constant", "varying", "bounded"])

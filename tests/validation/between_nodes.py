@@ -14,7 +14,7 @@ from hexcontact import analytic
 from hexcontact.arrays import Array
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.edges import ContactEdges, TractionField
-from hexcontact.core.friction import FrictionalContact
+from hexcontact.core.friction import FrictionalContact, FrictionLaw
 from hexcontact.core.lattice import Lattice
 
 RADIUS, MU = 50.0, 0.3
@@ -42,7 +42,7 @@ def errors(spacings: int, ratio: float, rng: np.random.Generator) -> list[float]
     edges = ContactEdges(
         state.pressure, state.gap, state.zone > 0, np.ones(lattice.shape, dtype=bool), *where
     )
-    field = edges.field(solved[1:], state.zone == 1, (MU, np.inf))
+    field = edges.field(solved[1:], state.zone == 1, FrictionLaw(MU))
 
     def exact(x: Array, y: Array) -> Array:
         r = np.hypot(x, y)

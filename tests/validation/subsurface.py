@@ -12,6 +12,7 @@ import numpy as np
 
 from hexcontact import Case, analytic, influence
 from hexcontact.arrays import Array
+from hexcontact.core.friction import FrictionLaw
 from hexcontact.interior import fields
 from hexcontact.interior.stress import SOURCES, _edges, nodal_tractions, tractions
 from hexcontact.surfaces import Sphere
@@ -66,7 +67,7 @@ def roots(step: Any, hats: Array, scale: float, points: Array, body: int = 1) ->
     edges = _edges(step.lattice, nodal, step.fields)
     both, pressed = (
         edges.stress(
-            *(np.array([mu * nodal[0], zero]), none, zero + mu),
+            *(np.array([mu * nodal[0], zero]), none, FrictionLaw(mu)),
             *(np.array([hats, mu * hats, zero]), body, 0.3, points),
         )[0]
         for mu in (1.0, 0.0)

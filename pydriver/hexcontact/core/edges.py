@@ -14,17 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, Mask
 from . import flat, memory
 from .contact import ElasticPair
+from .friction import FrictionLaw
 from .lattice import Nodes
 from .measures import Ellipse
 
-_UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
+_UNLIMITED, _LIMITED = 5, 11  # arrays of a traction field
 _GIVEN = 12  # arrays that it is made from, with copies and zones
 _LARGE = 250_000  # nodes from which their memory is checked
 _MARGIN = 6  # nodes about a contact from which its edge follows, at most, and one more
 
 _Part = tuple[slice, slice]
 Source = Literal["edges", "nodes"]
-Limits = tuple[Array | float, Array | float]
+_FRICTIONLESS = FrictionLaw(0.0)
 _Zone = tuple[Array, Mask, bool]  # fields and zones of the core; whether it is the stick area
 
 
@@ -71,10 +72,12 @@ class TractionField:
 
     Parameters
     ----------
-    parts : ndarray, shape (5 or 13, n_row, n_col)
+    parts : ndarray, shape (5 or 11, n_row, n_col)
         The field as the core holds it.
     nodes : Nodes
         Its nodes.
+    friction : FrictionLaw
+        Law of friction at them.
     source : str
         See below.
     whole : tuple, optional
@@ -92,26 +95,27 @@ class TractionField:
         self,
         parts: Array,
         nodes: Nodes,
+        friction: FrictionLaw = _FRICTIONLESS,
         source: Source = "edges",
         whole: tuple[tuple[int, ...], _Part] | None = None,
     ) -> None:
-        self._parts, self._nodes, self._whole = parts, nodes, whole
+        self._parts, self._nodes, self._friction, self._whole = parts, nodes, friction, whole
         self.source, self.sheared = source, len(parts) == _LIMITED
 
     @classmethod
     def of_nodes(cls, tractions: Array, basis: Array, start: tuple[float, float]) -> Self:
         """Return the field of p, q_x and q_y at the nodes, joined linearly; see `ContactEdges`."""
         parts = np.stack([*tractions, tractions[0], np.full_like(tractions[0], np.nan)])
-        return cls(parts, Nodes(basis, start, parts.shape[1:]), "nodes")
+        return cls(parts, Nodes(basis, start, parts.shape[1:]), source="nodes")
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside the window."""
-        found = flat.tractions_at_points(self._nodes, self._parts, x, y)
+        found = flat.tractions_at_points(self._nodes, self._parts, self._friction, x, y)
         return np.ascontiguousarray(np.moveaxis(found, -1, 0)) + 0.0  # no sign on zero
 
     def at_nodes(self) -> Array:
         """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""
-        found = np.asarray(flat.tractions_at_nodes(self._parts))
+        found = np.asarray(flat.tractions_at_nodes(self._parts, self._friction))
         if self._whole is None:
             return found
         shape, part = self._whole
@@ -165,15 +169,15 @@ class ContactEdges:
         return np.asarray(flat.distances_of_zone(self._nodes, *self._zone(stick, reserve, True)))
 
     def field(
-        self, shear: Array | None = None, stick: Mask | None = None, limits: Limits | None = None
+        self, shear: Array | None = None, stick: Mask | None = None, friction: FrictionLaw | None = None
     ) -> TractionField:
         """Return pressure and shear traction between the nodes, to the edges.
 
-        The limits are a finite coefficient of friction, and a bound of the shear traction (Pa). Without them,
-        or without nodes that stick, the shear traction is linear between the nodes.
+        Without a law of friction whose bound is the same in all directions, or without nodes that stick, the
+        shear traction is linear between the nodes.
         """
         part = self._around_contact()
-        limited = not (shear is None or stick is None or limits is None)
+        limited = not (shear is None or stick is None or friction is None)
         count = _LIMITED if limited else _UNLIMITED
         none = np.zeros(self._zones[0][part].shape)
         if none.size > _LARGE:
@@ -182,14 +186,12 @@ class ContactEdges:
         pressure, gap, touching, candidate = (given[part] for given in (*self._fields, *self._zones))
         along = (none, none) if shear is None else (component[part] for component in shear)
         zones = np.stack([touching, candidate, none != 0 if stick is None else stick[part]])
-        known = [
-            none + (np.asarray(limit)[part] if np.ndim(limit) else limit) for limit in limits or (0.0, 0.0)
-        ]
+        law = (friction or _FRICTIONLESS).on(part)
         x, y = self._nodes.start + self._nodes.basis.T @ [part[1].start, part[0].start]
         nodes = Nodes(self._nodes.basis, (float(x), float(y)), none.shape)
-        given = np.stack([pressure, *along]), np.minimum(known, np.finfo(float).max), count
-        parts = flat.field_of_tractions(nodes, np.stack([pressure, gap]), zones, *given)
-        return TractionField(parts, nodes, whole=(self._nodes.shape, part))
+        given = np.stack([pressure, gap]), zones, np.stack([pressure, *along])
+        parts = flat.field_of_tractions(nodes, *given, law, count)
+        return TractionField(parts, nodes, law, whole=(self._nodes.shape, part))
 
     def _around_contact(self) -> _Part:
         """Return rows and columns of the contact and of the nodes about it, beyond which there is nothing."""
@@ -199,10 +201,10 @@ class ContactEdges:
         rows, cols = (slice(max(k[0] - _MARGIN, 0), k[-1] + 1 + _MARGIN) for k in places)
         return rows, cols
 
-    def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
+    def tractions(self, shear: Array, stick: Mask, friction: FrictionLaw, pair: ElasticPair) -> Array:
         """Return tractions (Pa) corrected at the edges of the contact and of the stick area.
 
-        Unless the coefficient of friction is positive and finite, the shear traction does not change. Loads
+        Without friction, or with an infinite coefficient, the shear traction does not change. Loads
         are those of the nodal tractions; nodes next to the edge but outside carry small values.
         """
         zones, given = np.stack([*self._zones, stick]), np.stack([self._fields[0], *shear])
@@ -214,7 +216,7 @@ class ContactEdges:
         self,
         shear: Array,
         stick: Mask,
-        friction: Array,
+        friction: FrictionLaw,
         corrected: Array,
         body: int,
         poisson_ratio: float,

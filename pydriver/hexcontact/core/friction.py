@@ -65,6 +65,11 @@ class FrictionLaw:
         numbers = [min(getattr(self, field.name), most) for field in dataclasses.fields(self)[1:]]
         return np.minimum(np.ravel(self.coefficient), most), numbers
 
+    def on(self, part: tuple[slice, slice]) -> FrictionLaw:
+        """Return the law at a part of the nodes."""
+        mu = self.coefficient
+        return dataclasses.replace(self, coefficient=mu[part]) if isinstance(mu, np.ndarray) else self
+
     @property
     def limits(self) -> tuple[float | Array, float] | None:
         """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
@@ -73,12 +78,10 @@ class FrictionLaw:
         finite = bool(np.isfinite(self.coefficient).all())
         return (self.coefficient, self.shear_limit) if plain and finite else None
 
-    def bound_at(self, row: int, col: int, pressure: float, traction: tuple[float, float]) -> float:
-        """Return the largest traction of a node in the direction of a given one (Pa)."""
-        mu = self.coefficient[row, col] if isinstance(self.coefficient, np.ndarray) else self.coefficient
-        turned = math.atan2(traction[1], traction[0]) - self.angle
-        length = math.hypot(math.cos(turned) / self.ratio**0.5, math.sin(turned) * self.ratio**0.5)
-        return min(float(mu) * pressure**self.power, self.shear_limit) / length
+    def bounds(self, pressure: Array, traction_x: Array, traction_y: Array) -> Array:
+        """Return the largest tractions of the nodes in the directions of given ones (Pa)."""
+        bounds = np.asarray(flat.bounds_of_friction(pressure, np.stack([traction_x, traction_y]), self))
+        return np.where(bounds < np.finfo(float).max, bounds, math.inf)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -7,6 +7,7 @@ the result, of which z points into body 1. Stress is positive in tension.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from ..arrays import Array, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
 from ..core.edges import ContactEdges, TractionField, tractions_memory
+from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import limits_of_error
 from ..deck.below import SOURCES
@@ -210,7 +212,7 @@ def tractions(
         raise NotInResult(
             f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
         )
-    law = _friction_of(at_nodes[0, 0], friction)
+    law = _law_of(friction)
     constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
     pair = ElasticPair.from_materials(*constants[0], *constants[1])
     corrected = [
@@ -220,9 +222,9 @@ def tractions(
     return np.array(corrected), "edges"
 
 
-def _friction_of(field: Array, friction: float) -> Array:
-    """Return the coefficient at the nodes, 0 where shear tractions do not follow the pressure."""
-    return np.full_like(field, friction if np.isfinite(friction) else 0.0)
+def _law_of(friction: float) -> FrictionLaw:
+    """Return the law, without friction where shear tractions do not follow the pressure."""
+    return FrictionLaw(friction if math.isfinite(friction) else 0.0)
 
 
 def source_of(steps: Sequence[Fields]) -> str:
@@ -304,7 +306,7 @@ class NearSurface:
 
     def __init__(self, loaded: Loaded, loads: Array) -> None:
         self._of, self._loads, self._poisson_ratio = loaded, loads, loaded.material[0]
-        self._law = _friction_of(loads[0, 0], loaded.friction)
+        self._law = _law_of(loaded.friction)
         self.refused = 0.0  # largest share of an edge without a root
 
     def correct(self, stress: Array, points: Array) -> None:

@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..analytic.hertz_gap import friction_of, is_compliant
 from ..arrays import Array, Mask
-from ..core.edges import ContactEdges, Limits, TractionField
+from ..core.edges import ContactEdges, TractionField
+from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
 from ..deck.below import SOURCES
 from ..errors import DeckError, NotInResult
@@ -76,14 +77,15 @@ class NodalStep:
         return self.index + 1
 
     @property
-    def limits(self) -> Limits | None:
-        """Coefficient of friction and bound of the shear traction (Pa); None with another law, or none."""
+    def law(self) -> FrictionLaw | None:
+        """Law of friction with a coefficient and a bound of the traction; None with another, or none."""
         if not math.isnan(self.friction):
-            return (self.friction, self.shear_limit) if 0.0 < self.friction < math.inf else None
+            known = 0.0 < self.friction < math.inf
+            return FrictionLaw(self.friction, self.shear_limit) if known else None
         if NODAL_FRICTION not in self.fields:  # of another law
             return None
         # a coefficient that varies, or has a bound; NaN where no step had a node
-        return np.nan_to_num(np.asarray(self.fields[NODAL_FRICTION])), self.shear_limit
+        return FrictionLaw(np.nan_to_num(np.asarray(self.fields[NODAL_FRICTION])), self.shear_limit)
 
     def traction_field(self, source: str | None = None) -> TractionField:
         """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
@@ -108,9 +110,9 @@ class NodalStep:
         zone, gap = kept.get("zone"), kept["gap"]
         contact = tractions[0] > 0.0 if zone is None else zone > 0
         edges = ContactEdges(tractions[0], gap, contact, np.isfinite(gap), *at)
-        if zone is None or not kept.keys() >= {*TRACTIONS} or not (limits := self.limits):
+        if zone is None or not kept.keys() >= {*TRACTIONS} or not (law := self.law):
             return edges.field(tractions[1:])
-        return edges.field(tractions[1:], np.asarray(zone == _STICK), limits)
+        return edges.field(tractions[1:], np.asarray(zone == _STICK), law)
 
     def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
         """Return a field at points of the plane; see `hexcontact.Result.at`."""

@@ -234,10 +234,10 @@ def _normal_fault(law: FrictionLaw, solution: NormalSolution, row: int, col: int
 
 
 def _tangential_fault(law: FrictionLaw, solution: Any, row: int, col: int) -> str:
-    along = float(solution.traction_x[row, col]), float(solution.traction_y[row, col])
-    traction = math.hypot(*along)
+    along = solution.traction_x, solution.traction_y
+    traction = math.hypot(*(component[row, col] for component in along))
     slip = math.hypot(solution.slip_increment_x[row, col], solution.slip_increment_y[row, col])
-    bound = law.bound_at(row, col, float(solution.pressure[row, col]), along)
+    bound = float(law.bounds(solution.pressure, *along)[row, col])
     if math.isinf(bound):
         return f"the surfaces slip by {quantity(slip, 'm')}, which friction.coefficient = inf forbids"
     held = f"a shear traction of {quantity(traction, 'Pa')} where friction holds {quantity(bound, 'Pa')}"

@@ -89,7 +89,7 @@ class CyclesOfWear(Handle):
         return flat.fields_of_wear(self, lattice.n_col, lattice.n_row)
 
     def ends(self, count: int, lattice: Lattice) -> Iterator[tuple[float, Array, Array]]:
-        """Yield the last solution of each load step: cycles at that time, negative: none; as `restore_end`."""
+        """Yield the last solution of each load step as of `restore_end`; negative cycles: none."""
         for place in range(1, count + 1):
             cycles, motions, tractions = flat.wear_end(self, place, lattice.size)
             yield cycles, motions, np.asarray(tractions).reshape(2, 3, *lattice.shape)

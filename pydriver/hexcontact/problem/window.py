@@ -192,9 +192,7 @@ def starting_half_size(
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def _solve(
-    pair: ElasticPair, height: Array, lattice: Lattice, interface: Interface, **drive: Any
-) -> Array:
+def _solve(pair: ElasticPair, height: Array, lattice: Lattice, interface: Interface, **drive: Any) -> Array:
     """Return the pressure of a rough frictionless solution; 0 where no node can touch."""
     candidate = np.isfinite(height)
     if not candidate.any():

@@ -97,13 +97,14 @@ class WearPath(GivenPath):
         if last is not None:
             depth, change, energy, amplitude = (np.array(last.fields[name]) for name in WORN)
             ahead = [np.array(last.companion["ahead"])] if "ahead" in last.companion else []
-            numbers = last.history["wear_cycles"], last.control["until"], last.history["cycle_dissipated_energy"]
-            cycles.restore(state, [depth, change, energy, 4.0 * amplitude, *ahead], *map(float, numbers))
+            done, spent = (float(last.history[name]) for name in ("wear_cycles", "cycle_dissipated_energy"))
+            fields = [depth, change, energy, 4.0 * amplitude, *ahead]
+            cycles.restore(state, fields, done, float(last.control["until"]), spent)
             for name, tractions in last.companion.items():
                 if name.startswith(_END):
                     place = int(name.removeprefix(_END))
-                    found = (np.array(last.control[f"end_{kind}"][place]) for kind in ("cycles", "numbers"))
-                    cycles.restore_end(place + 1, *found, np.array(tractions))
+                    solved, motions = (last.control[f"end_{kind}"][place] for kind in ("cycles", "numbers"))
+                    cycles.restore_end(place + 1, solved, np.array(motions), np.array(tractions))
         return cycles
 
     def _solved(self, cycles: CyclesOfWear) -> WearProgress:

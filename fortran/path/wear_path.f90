@@ -228,7 +228,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
-    real(wp), allocatable :: energy(:, :)
+    real(wp), allocatable :: energy(:, :), both(:, :)
     real(wp) :: until, half, left
 
     if (allocated(self%next)) deallocate (self%next)
@@ -258,9 +258,12 @@ contains
       end if
       half = 0.5_wp*(until - self%cycle%cycles)
       self%next%until = until
-      call self%energy_of_jump(solver%problem, self%cycle, half, self%first, error, cache)
-      if (.not. allocated(error)) call self%energy_of_jump(solver%problem, self%cycle, 2.0_wp*half, self%both, error, cache)
-      if (.not. allocated(error)) call self%begin_jump(solver, self%cycle%cycles + half, self%first)
+      call self%energy_of_jump(solver%problem, self%cycle, half, energy, error, cache)
+      if (.not. allocated(error)) call self%energy_of_jump(solver%problem, self%cycle, 2.0_wp*half, both, error, cache)
+      if (allocated(error)) return
+      call self%begin_jump(solver, self%cycle%cycles + half, energy)
+      call move_alloc(energy, self%first)
+      call move_alloc(both, self%both)
     end if
   end subroutine begin_cycle
 

@@ -218,16 +218,15 @@ class FrictionWindow(Window[ContactState]):
         state: ContactState | None,
         target: LoadStep,
         values: tuple[float, ...],
-        **how: Any,
     ) -> ContactState:
-        """Advance a state to new loads and motions; `how` goes to the solver."""
+        """Advance a state to new loads and motions."""
         return self.contact.advance(
             self.contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
-            **self._how | how,
+            **self._how,
         )
 
     def attempt(

@@ -2,7 +2,7 @@ program press_and_shear
   use hexcontact, only: wp, pi, error_t, material_t, elastic_pair_t, new_elastic_pair, lattice_t, new_lattice, &
     equilateral_basis, coulomb_t, friction_problem_t, new_friction_problem, frictional_contact_t, &
     new_frictional_contact, contact_state_t, new_friction_state, load_target_t, adaptive_path_t, step_settings_t, &
-    contact_edges_t, new_contact_edges, zone_edge_t, stick, normal, along_x
+    contact_edges_t, new_contact_edges, zone_edge_t, stick, normal, along_x, wear_path_t, cycle_step_t, pending, failed
   implicit none
   type(elastic_pair_t) :: pair
   type(lattice_t) :: lattice
@@ -11,6 +11,8 @@ program press_and_shear
   type(contact_state_t) :: state
   type(load_target_t) :: target
   type(adaptive_path_t) :: path
+  type(wear_path_t) :: wear
+  type(cycle_step_t) :: cycle_steps(3)
   type(contact_edges_t) :: edges
   type(zone_edge_t) :: contact_area, stick_area
   type(error_t), allocatable :: error
@@ -48,4 +50,22 @@ program press_and_shear
   end do
   print '(a, f6.4, a)', 'shift  ', state%motion(along_x)/1.0e-6_wp, ' um'
   print '(a, f6.2, a)', 'energy ', state%dissipated_energy/1.0e-9_wp, ' nJ dissipated'
+
+  cycle_steps%target = load_target_t(value=[15.0_wp, 3.0_wp])
+  cycle_steps(2)%target%value(along_x) = -3.0_wp        ! a cycle: to -3 N and back
+  wear%coefficient = 1.0e-15_wp                         ! depth over pressure and slip [m^2/N]
+  wear%cycles = 300000
+  wear%tolerance = 0.1_wp                               ! of the jumps between the cycles that are solved
+  call wear%initialize(state, cycle_steps)
+  steps = 0
+  do
+    call wear%advance(contact, error)                   ! a load step of a cycle
+    if (allocated(error)) error stop error%message
+    if (wear%verdict == failed) error stop 'no convergence'
+    if (wear%verdict == pending) cycle
+    steps = steps + 1
+    if (wear%cycle%cycles >= wear%cycles) exit
+  end do
+  print '(i0, a, f5.1, a)', wear%unworn + steps - 1, ' cycles solved: the deepest node is worn by', &
+    wear%deepest/1.0e-9_wp, ' nm'
 end program press_and_shear

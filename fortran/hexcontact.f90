@@ -48,7 +48,9 @@ module hexcontact
   use hc_load_path, only: advance, step_settings_t
   use hc_window_growth, only: grown_window, extend_state
   use hc_adaptive_path, only: adaptive_path_t, adaptive_steps_t, two_paths_t
-  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown
+  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown, &
+                             pending
+  use hc_wear_path, only: wear_path_t, wear_cycle_t, cycle_step_t
   use hc_step_error, only: step_change_t, compare_halves
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
   use hc_expected_error, only: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, &

@@ -23,7 +23,13 @@ module hc_contact_solver
     type(friction_problem_t) :: problem
     !> Tractions and motions that a method may start from: those that the next step is likely to end with
     type(contact_state_t), allocatable :: guess
+    !> Gap before loading of surfaces that are worn by now, without the wear (n_col, n_row) [m]
+    real(wp), allocatable :: unworn_gap(:, :)
   contains
+    !> Worn depth, which adds to the gap before loading
+    procedure :: wear
+    !> Another gap before loading
+    procedure :: set_gap
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure(solver_displacements), deferred :: displacements
   end type friction_solver_t
@@ -64,5 +70,26 @@ module hc_contact_solver
       type(error_t), allocatable, intent(out) :: error
     end subroutine solver_displacements
   end interface
+
+contains
+
+  !> Set the worn depth of the surfaces.
+  subroutine wear(self, depth)
+    class(friction_solver_t), intent(inout) :: self
+    !> Depth of both bodies together (n_col, n_row) [m]
+    real(wp), intent(in) :: depth(:, :)
+
+    if (.not. allocated(self%unworn_gap)) self%unworn_gap = self%problem%initial_gap
+    call self%set_gap(merge(self%unworn_gap + depth, self%unworn_gap, self%problem%candidate))
+  end subroutine wear
+
+  !> Set the gap before loading; methods that derive something from it do so again.
+  subroutine set_gap(self, gap)
+    class(friction_solver_t), intent(inout) :: self
+    !> Gap before loading (n_col, n_row) [m]
+    real(wp), intent(in) :: gap(:, :)
+
+    self%problem%initial_gap = gap
+  end subroutine set_gap
 
 end module hc_contact_solver

@@ -23,7 +23,7 @@ module hc_direct_friction
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state
-  use hc_transfer, only: restrict_vector
+  use hc_transfer, only: restrict_field, restrict_vector
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: exchange
   use hc_area_factors, only: area_factors_t
@@ -50,6 +50,7 @@ module hc_direct_friction
   contains
     procedure :: solve_step
     procedure :: displacements
+    procedure :: set_gap
   end type direct_friction_t
 
 contains
@@ -77,6 +78,17 @@ contains
 
     call self%problem%displacements(self%operator, pressure, traction, displacement, error)
   end subroutine displacements
+
+  !> Set the gap before loading, on all lattices.
+  recursive subroutine set_gap(self, gap)
+    class(direct_friction_t), intent(inout) :: self
+    real(wp), intent(in) :: gap(:, :)
+
+    self%problem%initial_gap = gap
+    if (allocated(self%coarser)) then
+      call self%coarser%set_gap(restrict_field(self%problem%lattice, gap, self%coarser%problem%lattice))
+    end if
+  end subroutine set_gap
 
   recursive subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_friction_t), intent(inout), target :: self

@@ -11,7 +11,7 @@ module hc_frictional_contact
   use hc_options, only: newton_options_t
   use hc_field_space, only: space_over
   use hc_scratch, only: scratch_t
-  use hc_hierarchy, only: level_count, build_levels
+  use hc_hierarchy, only: level_count, build_levels, restrict_gap
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
@@ -37,6 +37,7 @@ module hc_frictional_contact
   contains
     procedure :: solve_step
     procedure :: displacements
+    procedure :: set_gap
   end type frictional_contact_t
 
 contains
@@ -87,6 +88,15 @@ contains
     end subroutine prepare
 
   end subroutine new_frictional_contact
+
+  !> Set the gap before loading on all lattices.
+  subroutine set_gap(self, gap)
+    class(frictional_contact_t), intent(inout) :: self
+    real(wp), intent(in) :: gap(:, :)
+
+    self%problem%initial_gap = gap
+    call restrict_gap(self%problem, self%coarse)
+  end subroutine set_gap
 
   !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
   pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, unlike)

@@ -31,6 +31,7 @@ module hc_subwindow_solver
     type(kernel_cache_t), pointer :: cache => null()
   contains
     procedure :: solve_step
+    procedure :: set_gap
   end type windowed_friction_t
 
 contains
@@ -123,6 +124,15 @@ contains
     state%operator_applications = state%operator_applications + work
     state%sweeps = state%sweeps + sweeps
   end subroutine solve_step
+
+  !> Set the gap before loading; the part of the window is set up again.
+  subroutine set_gap(self, gap)
+    class(windowed_friction_t), intent(inout) :: self
+    real(wp), intent(in) :: gap(:, :)
+
+    if (allocated(self%part)) deallocate (self%part)
+    call self%frictional_contact_t%set_gap(gap)
+  end subroutine set_gap
 
   !> Set up the solver on the part of the window between some columns and rows, unless it is set up already.
   subroutine extract_part(self, low, high, error)

@@ -9,7 +9,7 @@ module hc_hierarchy
   implicit none
   private
 
-  public :: level_t, level_count, build_levels
+  public :: level_t, level_count, build_levels, restrict_gap
 
   !> Contact problem on one lattice.
   type, abstract :: level_t
@@ -73,6 +73,21 @@ contains
       call coarse(l - 1)%coarsen(coarse(l))
     end do
   end subroutine build_levels
+
+  !> Set the gap on all coarser lattices again.
+  subroutine restrict_gap(finest, coarse)
+    !> The problem on the finest lattice
+    class(level_t), intent(in) :: finest
+    !> The same on the coarser ones, finer ones first
+    class(level_t), intent(inout) :: coarse(:)
+    integer :: l
+
+    if (size(coarse) == 0) return
+    coarse(1)%initial_gap = restrict_field(finest%lattice, finest%initial_gap, coarse(1)%lattice)
+    do l = 2, size(coarse)
+      coarse(l)%initial_gap = restrict_field(coarse(l - 1)%lattice, coarse(l - 1)%initial_gap, coarse(l)%lattice)
+    end do
+  end subroutine restrict_gap
 
   !> Set up the same problem on the lattice of every second node.
   subroutine coarsen(self, coarse)

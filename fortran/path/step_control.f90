@@ -20,11 +20,11 @@ module hc_step_control
   implicit none
   private
 
-  public :: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown
+  public :: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown, pending
 
   !> What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones are of no
-  !> use; it did not converge, and is the smallest there is; it reached the rim of a window that grows.
-  integer, parameter :: rejected = 0, accepted = 1, limited = 2, failed = 3, outgrown = 4
+  !> use; it did not converge, and is the smallest there is; it reached the rim of a window that grows; it is not solved to its end.
+  integer, parameter :: rejected = 0, accepted = 1, limited = 2, failed = 3, outgrown = 4, pending = 5
 
   !> One attempt at a load step.
   type :: step_attempt_t

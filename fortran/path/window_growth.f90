@@ -11,7 +11,7 @@ module hc_window_growth
   implicit none
   private
 
-  public :: grown_window, extend_state
+  public :: grown_window, embed, extend_state
 
   !> Share of its columns or rows by which a window grows on a side, and the fewest that it grows by.
   real(wp), parameter :: growth = 0.25_wp
@@ -34,6 +34,23 @@ contains
     larger%first = lattice%first - low
     larger%extent = lattice%extent + low + high
   end function grown_window
+
+  !> Put a field of a smaller window on a larger one; its new nodes have 0.
+  pure subroutine embed(lattice, larger, field)
+    !> The smaller and the larger window
+    type(lattice_t), intent(in) :: lattice, larger
+    !> The field (n_col, n_row)
+    real(wp), allocatable, intent(inout) :: field(:, :)
+    real(wp), allocatable :: small(:, :)
+    integer :: low(2), high(2)
+
+    if (.not. allocated(field)) return
+    call move_alloc(field, small)
+    low = lattice%first - larger%first + 1
+    high = low + lattice%extent - 1
+    allocate (field(larger%extent(1), larger%extent(2)), source=0.0_wp)
+    field(low(1):high(1), low(2):high(2)) = small
+  end subroutine embed
 
   !> Extend a state of a smaller window to that of a solver.
   subroutine extend_state(solver, lattice, state, extended, error)

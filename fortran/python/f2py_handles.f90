@@ -21,11 +21,12 @@ module hc_f2py_handles
   use hc_power_interface, only: power_interface_t
   use hc_contact_state, only: contact_state_t
   use hc_contact_solver, only: contact_solver_t, friction_solver_t
+  use hc_wear_path, only: wear_path_t
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
 
-  public :: slot_t, take_slot, enter, leave, free_object, hold, find_state, kernel_cache, own_cache, report
+  public :: slot_t, take_slot, enter, leave, free_object, hold, hold_wear, find_state, find_wear, kernel_cache, own_cache, report
   public :: with_springs, friction_of, normal_law_of
 
   !> Object of a handle: one of these.
@@ -41,6 +42,7 @@ module hc_f2py_handles
     class(contact_solver_t), pointer :: pressed => null()
     class(friction_solver_t), pointer :: sheared => null()
     type(contact_state_t), pointer :: state => null()
+    type(wear_path_t), pointer :: wear => null()
   end type slot_t
 
   !> Entry of the table.
@@ -147,6 +149,7 @@ contains
     if (associated(slot%pressed)) deallocate (slot%pressed)
     if (associated(slot%sheared)) deallocate (slot%sheared)
     if (associated(slot%state)) deallocate (slot%state)
+    if (associated(slot%wear)) deallocate (slot%wear)
     deallocate (slot)
   end subroutine free_object
 
@@ -246,6 +249,42 @@ contains
     end if
     call raise(error, status%bad_handle, 'the handle is stale: its state has been freed')
   end subroutine find_state
+
+  !> Give a path through cycles of wear a handle; on failure it is freed.
+  subroutine hold_wear(path, handle, error)
+    !> The path
+    type(wear_path_t), pointer, intent(inout) :: path
+    !> Its handle, 0 on failure
+    integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+
+    call take_slot(slot, handle, error)
+    if (allocated(error)) then
+      deallocate (path)
+    else
+      slot%wear => path
+    end if
+  end subroutine hold_wear
+
+  !> Return the path through cycles of wear of a handle.
+  subroutine find_wear(handle, path, error)
+    !> Its handle
+    integer(c_int64_t), intent(in) :: handle
+    !> The path
+    type(wear_path_t), pointer, intent(out) :: path
+    !> Allocated if the handle is stale
+    type(error_t), allocatable, intent(out) :: error
+    integer :: place
+
+    path => null()
+    call lock(handle_table)
+    place = place_of(handle)
+    if (place > 0) path => entries(place)%slot%wear
+    call unlock(handle_table)
+    if (.not. associated(path)) call raise(error, status%bad_handle, 'the handle is stale: its path has been freed')
+  end subroutine find_wear
 
   !> Return elastic constants with the tangential springs of an interface.
   pure type(elastic_pair_t) function with_springs(pair, interface)

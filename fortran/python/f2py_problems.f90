@@ -22,14 +22,14 @@ module hc_f2py_problems
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_sheared, secure_entry, new_held_state, find_field
+  public :: new_operator, new_pressed, new_sheared, secure_fields, entry_fields, wear_fields, new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
   integer, parameter :: fft_based = 1, as_written = 2
   !> Bytes by node of fields of the direct method; its matrices are checked where they are allocated
   integer(c_int64_t), parameter :: dense_fields = 500
-  !> Fields that the entry of nodes takes
-  integer(c_int64_t), parameter :: entry_fields = 45
+  !> Fields that the entry of nodes takes, and those of a cycle of wear with its states
+  integer, parameter :: entry_fields = 45, wear_fields = 60
 
 contains
 
@@ -171,13 +171,15 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_sheared
 
-  !> Refuse the entry of nodes if there is no memory for its fields.
-  subroutine secure_entry(slot, error)
+  !> Refuse a load step if there is no memory for further fields beside the solution.
+  subroutine secure_fields(slot, n_field, error)
     type(slot_t), intent(in) :: slot
+    !> Number of fields
+    integer, intent(in) :: n_field
     type(error_t), allocatable, intent(out) :: error
 
-    call require_memory(slot%working + entry_fields*8*slot%lattice%size(), error, slot%space%threads)
-  end subroutine secure_entry
+    call require_memory(slot%working + int(n_field, c_int64_t)*8*slot%lattice%size(), error, slot%space%threads)
+  end subroutine secure_fields
 
   !> Make a state with some numbers, and fields that are not set.
   subroutine new_held_state(numbers, extent, handle, error)

@@ -12,7 +12,7 @@ module test_steps
   use hc_load_path, only: advance, step_settings_t
   use hc_options, only: step_options_t
   use hc_step_error, only: compare_halves, shear_free, step_change_t
-  use hc_step_control, only: accepted, failed, limited, outgrown, rejected, step_attempt_t, step_control_t
+  use hc_step_control, only: accepted, failed, limited, outgrown, pending, rejected, step_attempt_t, step_control_t
   use hc_adaptive_path, only: adaptive_path_t
   use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
@@ -22,11 +22,12 @@ module test_steps
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_wear_ahead, only: energy_ahead, worn_cycle_t
+  use hc_wear_path, only: cycle_step_t, wear_path_t
   use hc_wear_jumps, only: energy_of_second_jump, jump_change, two_jumps_t, wear_by, wear_law_t, wear_left
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring, turning_error
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_raised, check_true, largest
+  use testing, only: test_t, new_test, check, check_raised, check_true, fail, largest
   implicit none
   private
 
@@ -56,11 +57,122 @@ contains
       new_test('expected_errors', test_expected), &
       new_test('wear_jumps', test_wear_jumps), &
       new_test('wear_ahead', test_wear_ahead), &
+      new_test('wear_path', test_wear_path), &
+      new_test('wear_without_slip', test_no_wear), &
       new_test('change_by_halves', test_change_by_halves), &
       new_test('wear_left', test_wear_left), &
       new_test('turning_limits_a_step', test_turning) &
     ]
   end subroutine collect_steps
+
+  !> Cycles that wear a sphere, on a window that grows on the way and on one that is large from the beginning: the worn volume is
+  !> that of the dissipated work, (V2), and a smaller part of it is solved twice.
+  subroutine test_wear_path(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(wear_path_t) :: growing, fixed
+    type(lattice_t) :: large
+    integer :: n_grown, low(2), high(2)
+
+    call new_sphere(contact, 7, 0.0_wp, 0.0_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    large = contact%problem%lattice
+    large%first = 2*large%first
+    large%extent = 2*large%extent - 1
+    growing%grows = .true.
+    call wear_sphere(contact, growing, n_grown, error)
+    if (allocated(error)) return
+    call check_true(error, n_grown > 0, 'the window grew')
+    if (allocated(error)) return
+    low = contact%problem%lattice%first - large%first + 1
+    high = low + contact%problem%lattice%extent - 1
+    call on_window(contact%problem, large, contact, error)
+    if (allocated(error)) return
+    call wear_sphere(contact, fixed, n_grown, error)
+    if (allocated(error)) return
+    associate (energy => fixed%cycle%state%dissipation_density, depth => fixed%cycle%worn, area => large%cell_area())
+      call check(error, largest(depth - fixed%coefficient*energy/mu), 0.0_wp, 1.0e-12_wp*fixed%deepest, 'depth of the work')
+      if (allocated(error)) return
+      call check(error, fixed%volume, area*sum(depth), 1.0e-12_wp*fixed%volume, 'volume')
+      if (allocated(error)) return
+      call check(error, largest(growing%cycle%worn - depth(low(1):high(1), low(2):high(2))), 0.0_wp, 1.0e-2_wp*fixed%deepest, &
+                 'depth on the growing window')
+      if (allocated(error)) return
+    end associate
+    call check_true(error, fixed%unworn == 1 .and. fixed%depth_error > 0.0_wp .and. fixed%depth_error < 0.5_wp*fixed%deepest, &
+                    'bound on the error')
+  end subroutine test_wear_path
+
+  !> Press a sphere, shear it to and fro, and wear it; the window grows if the path allows.
+  subroutine wear_sphere(contact, path, n_grown, error)
+    type(frictional_contact_t), intent(inout) :: contact
+    type(wear_path_t), intent(inout) :: path
+    !> How often the window grew
+    integer, intent(out) :: n_grown
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: shear(3) = 0.6_wp*mu*load*[0.0_wp, 1.0_wp, -1.0_wp]
+    type(contact_state_t) :: state, next
+    type(cycle_step_t) :: steps(3)
+    type(lattice_t) :: small
+    integer :: i
+
+    n_grown = 0
+    call new_friction_state(state, contact%problem%lattice)
+    do i = 1, 3
+      steps(i)%target = load_target_t(value=[load, shear(i)])
+      call advance(contact, state, steps(i)%target, step_settings_t(), next, error)
+      if (allocated(error)) return
+      state = next
+    end do
+    ! the work of the history wears nothing
+    state%dissipation_density = 0.0_wp
+    path%coefficient = 1.0_wp
+    path%cycles = 20.0_wp
+    path%tolerance = 0.1_wp
+    call path%initialize(state, steps([3, 2, 3]))
+    do
+      call path%advance(contact, error)
+      if (allocated(error)) return
+      select case (path%verdict)
+      case (pending)
+      case (outgrown)
+        n_grown = n_grown + 1
+        small = contact%problem%lattice
+        call on_window(contact%problem, path%larger, contact, error)
+        if (.not. allocated(error)) call path%carry(contact, small, error)
+        if (allocated(error)) return
+      case (failed)
+        call fail(error, 'no convergence')
+        return
+      case default
+        if (path%cycle%cycles >= path%cycles) exit
+      end select
+    end do
+  end subroutine wear_sphere
+
+  !> A cycle in which nothing slips wears nothing, and says so.
+  subroutine test_no_wear(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(wear_path_t) :: path
+    type(contact_state_t) :: state, next
+    type(cycle_step_t) :: steps(2)
+    type(error_t), allocatable :: raised
+
+    call new_sphere(contact, 6, 0.0_wp, 0.0_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    steps%target = load_target_t(value=[load])
+    call new_friction_state(state, contact%problem%lattice)
+    call advance(contact, state, steps(1)%target, step_settings_t(), next, error)
+    if (allocated(error)) return
+    path%coefficient = 1.0_wp
+    call path%initialize(next, steps)
+    do
+      call path%advance(contact, raised)
+      if (allocated(raised) .or. path%verdict /= pending) exit
+    end do
+    call check_raised(error, raised, status%invalid_input, 'a cycle without slip')
+  end subroutine test_no_wear
 
   !> Depth and volume of cycles that are all alike, and what two jumps change: by hand, with nodes that cannot wear.
   subroutine test_wear_jumps(error)

@@ -11,10 +11,8 @@ import numpy as np
 
 from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError
 from hexcontact.core import kernel_cache
-from hexcontact.core.contact import UNILATERAL, ElasticPair
-from hexcontact.core.friction import FrictionLaw
-from hexcontact.core.handles import HeldState
-from hexcontact.core.steps import energy_of_jump
+from hexcontact.core.contact import ElasticPair
+from hexcontact.core.steps import ACCEPTED, PENDING, CyclesOfWear, WearSettings
 
 PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
 SPACING = 2e-6
@@ -31,15 +29,6 @@ gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
 def attempt(kind: str) -> None:
     """Set a problem up and solve it twice."""
     approach = (0.7 * half * SPACING) ** 2 / (200 * SPACING)
-    if kind == "wear":
-        pressure = np.maximum(1e8 - 1e18 * gap**2, 0.0)
-        slip = np.where(gap > 0.0, 1e-9, 0.0)
-        end = HeldState.copied({"pressure": pressure, "gap": np.maximum(gap - approach, 0.0)}, {})
-        mask = np.full(lattice.shape, True)
-        friction = FrictionLaw(0.5)
-        cycle = 0.5 * slip * pressure, slip
-        energy_of_jump(lattice, PAIR, UNILATERAL, mask, friction, 1e-14, cycle, end, True, 100.0, 1e-4)
-        return
     if kind == "normal":
         contact = NormalContact(lattice, PAIR, gap)
         for share in (0.3, 1.0):
@@ -51,6 +40,15 @@ def attempt(kind: str) -> None:
     for depth, shift in ((0.3, 0.0), (1.0, 0.0), (1.0, 0.1)):
         state = problem.advance(state, ("displacement",) * 4, (depth * approach, shift * approach, 0.0, 0.0))
         assert state.converged
+    if kind == "wear":
+        numbers = dict.fromkeys(WearSettings._fields, 0) | {"coefficient": 1e-14, "cycles": 200, "jump": 100}
+        numbers |= {"tolerance": 1.0, "cycle_tolerance": 1e-4, "most_unworn": 1, "residual": 1e-4}
+        shifts = (0.1, -0.1, 0.1)
+        targets = [[approach, share * approach, 0.0, 0.0, 0.0, 0.0, 0.0] for share in shifts]
+        steps = [([2, 2, 2, 2], values, [0.0] * 4, 1) for values in targets]
+        cycles = CyclesOfWear(WearSettings(**numbers), PAIR, steps, state)
+        while (now := cycles.advance(problem)).cycles < 200:
+            assert now.verdict in (ACCEPTED, PENDING)
 
 
 def limited(kind: str, spare: int) -> int:
@@ -74,7 +72,7 @@ def limited(kind: str, spare: int) -> int:
 
 kernel_cache.configure(memory=0)
 np.linalg.norm(np.ones(3))
-step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB, "wear": MB // 2}[KIND]
+step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB, "wear": 2 * MB}[KIND]
 codes: list[int] = []
 while codes[-2:] != [0, 0] and len(codes) < 60:
     codes.append(limited(KIND, MB + step * len(codes)))

@@ -254,13 +254,12 @@ class Contact(Handle):
         gap = checked_field(np.where(self._mask, self._gap, 0.0), self.lattice, "initial_gap")
         return self.lattice, self._pair, gap, self._mask
 
-    def _solved(self, kind: type[S], procedure: Callable[..., int], *arguments: Any) -> S:
-        """Return the solution that a procedure of the core finds, with views of its fields."""
+    def called(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
+        """Return the results of a procedure of the core that uses spectra of kernels."""
         try:
-            handle = procedure(self, *arguments)
+            return procedure(self, *arguments)
         finally:
             kernel_cache.warn_of_faults()
-        return self._found(kind, handle)
 
     def _found(self, kind: type[S], handle: int) -> S:
         """Return the solution behind a handle, with views of its fields."""
@@ -357,7 +356,7 @@ class NormalContact(Contact):
             control, target = 2, number(approach, "approach", fits=np.isfinite)
         checked_tolerance(tolerance)
         limits = tolerance, integer(max_sweeps, "max_sweeps")
-        solution = self._solved(NormalSolution, flat.press, control, target, *limits)
+        solution = self._found(NormalSolution, self.called(flat.press, control, target, *limits))
         solution.gap[~self._mask] += self._gap[~self._mask]
         self._warn_of_rim(solution)
         return solution

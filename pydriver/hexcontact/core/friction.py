@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import flat, kernel_cache
+from . import flat
 from .contact import (
     UNILATERAL,
     Contact,
@@ -39,7 +39,7 @@ Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 MAX_SWEEPS, MAX_CUTS = 40, 6
-_CONTROLS = {"force": 1, "displacement": 2}
+CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS = CORE["fields"]
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
@@ -271,7 +271,7 @@ class FrictionalContact(Contact):
             the advance ends without convergence: repeat it from the first state on a larger window).
         """
         known = isinstance(control, list | tuple) and len(control) == 4
-        if not known or not all(isinstance(kind, str) and kind in _CONTROLS for kind in control):
+        if not known or not all(isinstance(kind, str) and kind in CONTROLS for kind in control):
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
         targets = reals(value, "value")
         if targets.shape != (4,) or not np.isfinite(targets).all():
@@ -284,17 +284,22 @@ class FrictionalContact(Contact):
         checked_tolerance(tolerance)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
-        found = self._solved(
-            *(ContactState, flat.advance, [_CONTROLS[word] for word in control], [*targets, *strain], static),
+        handle = self.called(
+            *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
             *(entry == "interpolated", tolerance),
             *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts"), self._held(state)),
         )
-        found = self._masked(found)
+        found = self.solution(handle)
         self._warn_of_rim(found)
         return found
 
-    def _masked(self, found: ContactState) -> ContactState:
-        """Return a state whose gap is NaN where the bodies cannot touch."""
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        flat.set_worn_depth(self, depth)
+
+    def solution(self, handle: int) -> ContactState:
+        """Return the state of a handle, whose gap is NaN where the bodies cannot touch."""
+        found = self._found(ContactState, handle)
         if self._mask.all():
             return found
         gap = np.where(self._mask, found.gap, np.nan)
@@ -320,14 +325,10 @@ class FrictionalContact(Contact):
         start = self._held(before)
         ends = start, start if whole is None else self._held(whole)
         limits = tolerance, MAX_SWEEPS, MAX_CUTS
-        kinds = [_CONTROLS[word] for word in control]
-        try:
-            steps, *handles = flat.attempt_step(
-                self, steps, kinds, *targets, entry == "interpolated", *limits, *ends
-            )
-        finally:
-            kernel_cache.warn_of_faults()
-        after, apart = (self._masked(self._found(ContactState, each)) if each else None for each in handles)
+        kinds = [CONTROLS[word] for word in control]
+        given = steps, kinds, *targets, entry == "interpolated", *limits, *ends
+        steps, *handles = self.called(flat.attempt_step, *given)
+        after, apart = (self.solution(each) if each else None for each in handles)
         return steps, after, apart
 
     def _held(self, state: ContactState) -> HeldState:
@@ -354,7 +355,7 @@ class FrictionalContact(Contact):
         """
         start = state.held
         handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
-        found = self._masked(self._found(ContactState, handle))
+        found = self.solution(handle)
         fields = {name: getattr(found, name) for name in (*_FIELDS, "zone")}
         return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)
 

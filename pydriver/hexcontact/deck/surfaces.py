@@ -424,9 +424,12 @@ class Separation:
         one, two = self.surface_1, self.surface_2
         if one.curvature is None or two.curvature is None:
             return None
+        total = one.curvature + two.curvature
+        if one.offset == two.offset:
+            return total, one.offset
         # (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders; solved about o1, so that large
         # offsets cost no digits
-        apart, total = np.subtract(two.offset, one.offset), one.curvature + two.curvature
+        apart = np.subtract(two.offset, one.offset)
         point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
         return total, (float(point[0]), float(point[1]))
 

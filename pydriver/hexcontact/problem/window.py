@@ -53,7 +53,7 @@ class Estimate(NamedTuple):
     cell: float  # coarse spacing (m); the edge of the contact is within one cell of the bounds
     size: Array  # extent (m) of the contact in x and in y, (2,)
     max_pressure: float  # largest pressure (Pa)
-    slope: float  # largest slope of the gap within the contact
+    slope: float = 0.0  # largest slope of the gap within the contact
     # those of the surfaces of body 1 and body 2; empty if only their gap is known
     body_slopes: tuple[float, ...] = ()
 
@@ -126,7 +126,9 @@ def estimate_contact(
     lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), pattern)
     enclosed, enlargements = False, 0
     for _ in range(MOST_TRIALS):
-        pressure = _solve(pair, gap, lattice, interface, **drive)
+        x, y = lattice.x, lattice.y
+        height = np.asarray(gap(x, y), float)
+        pressure = _solve(pair, height, lattice, interface, **drive)
         contact = pressure > 0
         if not contact.any():
             # under load control there is always contact; at an approach it may lie between the nodes
@@ -141,15 +143,18 @@ def estimate_contact(
                 lattice = centered(2 * lattice.spacing, center, lattice.shape, pattern)
             continue
         enclosed = True
-        estimate = _measure(lattice, pressure, gap, heights)
-        if estimate.half_width >= NARROW_NODES * lattice.spacing:
-            return estimate
-        factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
-        cell = lattice.spacing
-        finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, pattern)
-        if finer.n_row * finer.n_col > MOST_COARSE_NODES:
-            return estimate
-        lattice = finer
+        estimate = _measure(lattice, pressure, x[contact], y[contact])
+        narrow = estimate.half_width < NARROW_NODES * lattice.spacing
+        if narrow:
+            factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
+            cell = lattice.spacing
+            finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, pattern)
+            if finer.size <= MOST_COARSE_NODES:
+                lattice = finer
+                continue
+        surfaces = [height, *(surface(x, y) for surface in heights)]
+        slope, *body_slopes = (_steepest(each, lattice, contact) for each in surfaces)
+        return estimate._replace(slope=slope, body_slopes=tuple(body_slopes))
     raise NoContactFound("the contact has no end, or nothing touches")
 
 
@@ -187,11 +192,8 @@ def starting_half_size(
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def _solve(
-    pair: ElasticPair, gap: GapFunction, lattice: Lattice, interface: Interface, **drive: Any
-) -> Array:
+def _solve(pair: ElasticPair, height: Array, lattice: Lattice, interface: Interface, **drive: Any) -> Array:
     """Return the pressure of a rough frictionless solution; 0 where no node can touch."""
-    height = np.asarray(gap(lattice.x, lattice.y), float)
     candidate = np.isfinite(height)
     if not candidate.any():
         return np.zeros(lattice.shape)
@@ -204,19 +206,20 @@ def _solve(
 
 def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: list[dict[str, float]]) -> int:
     """Return the nodes of a window in contact at the largest of some drives, given the gap at all nodes."""
-    pressures = [_solve(pair, lambda *_: gap, lattice, UNILATERAL, **drive) for drive in drives]
+    pressures = [_solve(pair, gap, lattice, UNILATERAL, **drive) for drive in drives]
     return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
 
 
-def _measure(lattice: Lattice, pressure: Array, gap: GapFunction, heights: Sequence[GapFunction]) -> Estimate:
-    contact = pressure > 0
-    rows, cols = np.nonzero(contact)
-    x, y = lattice.x[contact], lattice.y[contact]
+def _measure(lattice: Lattice, pressure: Array, x: Array, y: Array) -> Estimate:
+    """Return the estimate by a solution, whose nodes in contact lie at x and y, without slopes."""
+    rows, cols = np.nonzero(pressure > 0)
     area = lattice.cell_area * len(rows)
-    moments = np.cov(np.stack([x, y]), bias=True) + np.eye(2) * lattice.cell_area / 12  # a cell's own inertia
-    half_width = 2 * math.sqrt(max(float(np.linalg.eigvalsh(moments)[0]), 0.0))
+    right, up = x - x.mean(), y - y.mean()
+    xx, yy, xy = (float(product.mean()) for product in (right * right, up * up, right * up))
+    # the smaller principal second moment, with the inertia of a cell itself
+    least = (xx + yy) / 2 - math.hypot((xx - yy) / 2, xy) + lattice.cell_area / 12
+    half_width = 2 * math.sqrt(max(least, 0.0))
     indices = np.array([cols + lattice.col_first, rows + lattice.row_first]) * lattice.spacing
-    slope, *body_slopes = (_steepest(height, lattice, contact) for height in (gap, *heights))
     return Estimate(
         radius=math.sqrt(area / math.pi),
         half_width=half_width,
@@ -225,14 +228,12 @@ def _measure(lattice: Lattice, pressure: Array, gap: GapFunction, heights: Seque
         cell=lattice.spacing,
         size=np.array([np.ptp(x), np.ptp(y)]) + lattice.spacing,
         max_pressure=float(pressure.max()),
-        slope=slope,
-        body_slopes=tuple(body_slopes),
     )
 
 
-def _steepest(height: GapFunction, lattice: Lattice, contact: Mask) -> float:
+def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     """Return the largest slope of a surface within the contact."""
-    heights = np.where(contact, height(lattice.x, lattice.y), np.nan)
+    heights = np.where(contact, height, np.nan)
     steepest = max(np.nanmax(np.abs(np.diff(heights, axis=axis)), initial=0.0) for axis in (0, 1))
     return float(steepest) / lattice.spacing
 

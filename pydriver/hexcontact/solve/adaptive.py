@@ -44,25 +44,17 @@ class GivenPath:
         `begun` has the loads and motions at the beginning of its segment. If the contact reaches the rim, the
         step is solved again on a larger window.
         """
-        started = time.perf_counter()
-        state, reached = self._reached(state, target, target.values(begun))
-        step = self.window.step(target, reached, state, started)
-        del state  # its memory goes before the step is written
-        yield step, reached
-
-    def _reached(
-        self, state: Any, target: LoadStep, values: tuple[float, ...], **how: Any
-    ) -> tuple[Any, Any]:
-        """Return the states at the beginning and at the end of a load step, on the window at its end."""
-        while self.window.outgrown(reached := self.window.advance(state, target, values, **how)):
+        started, values = time.perf_counter(), target.values(begun)
+        while self.window.outgrown(reached := self.window.advance(state, target, values)):
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
             state = self.window.carried(state, smaller)
-            how.pop("guess", None)  # of the smaller window
         if not reached.converged:
             from . import nonconvergence
 
             raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
-        return state, reached
+        step = self.window.step(target, reached, state, started)
+        del state  # its memory goes before the step is written
+        yield step, reached
 
     def after(self, state: Any) -> Iterator[Step]:
         """Solve further steps after the load history; here none."""

@@ -50,7 +50,7 @@ class Window(ABC, Generic[S]):
         self.initial_gap: Array = self._where_touching(gap)
         self.friction = case.friction_law(lattice)
         self._bodies: dict[int, FlexibilityOperator] = {}
-        self._contact: Any = self._solver(gap)
+        self.contact: Any = self._solver(gap)
 
     @abstractmethod
     def _solver(self, gap: Array) -> Any:
@@ -89,7 +89,7 @@ class Window(ABC, Generic[S]):
                 f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
                 'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
             )
-        del self._contact  # its memory goes before that of the next comes
+        del self.contact  # its memory goes before that of the next comes
         self._bodies.clear()
         larger = self.lattice.grown(solution.zone > 0)
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
@@ -189,7 +189,7 @@ class NormalWindow(Window[NormalSolution]):
     ) -> NormalSolution:
         """Press with a force or to an approach."""
         driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
-        solution: NormalSolution = self._contact.solve(**driven, tolerance=self.case.solver.tolerance)
+        solution: NormalSolution = self.contact.solve(**driven, tolerance=self.case.solver.tolerance)
         return solution
 
 
@@ -197,7 +197,7 @@ class FrictionWindow(Window[ContactState]):
     """Contact with friction; a step starts from the state at the end of the step before."""
 
     state = STATE[True]
-    _contact: FrictionalContact
+    contact: FrictionalContact
 
     def _solver(self, gap: Array) -> FrictionalContact:
         return FrictionalContact(
@@ -218,16 +218,15 @@ class FrictionWindow(Window[ContactState]):
         state: ContactState | None,
         target: LoadStep,
         values: tuple[float, ...],
-        **how: Any,
     ) -> ContactState:
-        """Advance a state to new loads and motions; `how` goes to the solver."""
-        return self._contact.advance(
-            self._contact.virgin() if state is None else state,
+        """Advance a state to new loads and motions."""
+        return self.contact.advance(
+            self.contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
-            **self._how | how,
+            **self._how,
         )
 
     def attempt(
@@ -238,11 +237,11 @@ class FrictionWindow(Window[ContactState]):
         parts: Sequence[tuple[LoadStep, tuple[float, ...]]],
     ) -> tuple[AdaptiveSteps, ContactState | None, ContactState | None]:
         """Attempt an adaptive load step, whose parts are the load steps to its middle and to its end."""
-        return self._contact.attempt(
+        return self.contact.attempt(
             steps,
             [motion.control for motion in parts[-1][0].targets],
             [[*values, *self.case.bulk(part.bulk)[1]] for part, values in parts],
-            self._contact.virgin() if before is None else before,
+            self.contact.virgin() if before is None else before,
             whole,
             **self._how,
         )
@@ -257,19 +256,18 @@ class FrictionWindow(Window[ContactState]):
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
         self.worn = depth
-        del self._contact  # frees the memory of the solver before that of the next
-        self._contact = self._solver(np.where(self.candidate, self.initial_gap + depth, np.inf))
+        self.contact.wear(depth)
 
     def grown(self, solution: ContactState, target: LoadStep) -> Self:
         """Return the problem on a larger window, with its worn depth."""
         larger = super().grown(solution, target)
         if self.worn is not None:
-            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0), dtype=float))
+            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0)))
         return larger
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; the history of the new nodes follows from it."""
-        return None if state is None else self._contact.extended(state, lattice)
+        return None if state is None else self.contact.extended(state, lattice)
 
     def restored(self, step: Step) -> ContactState | None:
         """Return the whole state, and set the worn depth of the step."""

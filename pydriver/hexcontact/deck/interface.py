@@ -59,11 +59,10 @@ class FrictionKind(Kind):
 
     kind = Quantity(NUMBER, at_least=0, infinite=True)
 
-    def _expected(self) -> str:
-        return (
-            f'{self.kind.expected}, {{ map = "mu.nc" }}, {{ along = 0.3, across = 0.2, angle = "30 deg" }}, '
-            'or a formula of x and y in m such as "0.3 + 0.1*tanh(x/50e-6)"'
-        )
+    expected = (
+        f'{kind.expected}, {{ map = "mu.nc" }}, {{ along = 0.3, across = 0.2, angle = "30 deg" }}, '
+        'or a formula of x and y in m such as "0.3 + 0.1*tanh(x/50e-6)"'
+    )
 
     def written(self, value: float | NodalCoefficient | TwoCoefficients) -> Any:
         """Return the number, text or table of a deck."""
@@ -99,7 +98,9 @@ class FrictionKind(Kind):
             return along if along == across else TwoCoefficients(along, across, angle)
         refuse(f"expected {self.expected}")
 
-    def _schema(self) -> Schema:
+    @property
+    def schema(self) -> Schema:  # type: ignore[override]
+        """A number, a formula, or one of the tables."""
         file = {"type": "string", "description": "netCDF file of one variable over x and y"}
         above = {"type": "number", "exclusiveMinimum": 0}
         numbers = {"type": "array", "items": {"type": "number"}}

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -20,7 +19,7 @@ from ..errors import DeckError
 from ..files import is_defect, require_ordinary, text_of
 from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
-from .kinds import Kind, Quantity, Schema, Several, Text, refuse
+from .kinds import Kind, Quantity, Several, Text, refuse
 from .table_base import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
@@ -98,14 +97,12 @@ MOST_STEPS = 100_000
 # --- the table ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class OrEmpty(Kind):
     """A value, or "" in rows without it."""
 
-    kind: Kind
-
-    def _expected(self) -> str:
-        return self.kind.expected
+    def __init__(self, kind: Kind) -> None:
+        self.kind, self.expected = kind, kind.expected
+        self.schema = {"anyOf": [{"const": ""}, kind.schema]}
 
     def _parse(self, value: object) -> Any:
         return None if value is None or value == "" else self.kind.parse(value)
@@ -113,9 +110,6 @@ class OrEmpty(Kind):
     def written(self, value: Any) -> Any:
         """Return the value, or ""."""
         return "" if value is None else self.kind.written(value)
-
-    def _schema(self) -> Schema:
-        return {"anyOf": [{"const": ""}, self.kind.schema()]}
 
 
 _Header = Annotated[str, Text()] | None

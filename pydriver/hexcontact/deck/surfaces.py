@@ -343,8 +343,7 @@ _REFUSED = {
 class SurfaceKind(Kind):
     """A surface: one of the shapes as an inline table, or a `Surface` of Python."""
 
-    def _expected(self) -> str:
-        return 'a table such as { shape = "sphere", radius = "1 mm" }'
+    expected = 'a table such as { shape = "sphere", radius = "1 mm" }'
 
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""

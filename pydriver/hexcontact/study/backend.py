@@ -179,14 +179,11 @@ KEYS: dict[str, Any] = {}
 _POLL = 0.2  # s between checks for cancellation
 
 
-@dataclass(frozen=True)
 class OptionTable(Kind):
     """A table whose keys belong to another program."""
 
-    example: str
-
-    def _expected(self) -> str:
-        return f"a table such as {self.example}"
+    def __init__(self, example: str) -> None:
+        self.expected = f"a table such as {example}"
 
     def _parse(self, value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):

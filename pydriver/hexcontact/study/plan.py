@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -43,51 +43,41 @@ from . import backends  # noqa: F401 (each registers its key)
 from .backend import KEYS, MOST_CASES, hash_of
 
 
-@dataclass(frozen=True)
 class Anything(Kind):
     """A value of any kind, which is checked with the deck."""
 
-    def _expected(self) -> str:
-        return "a value of that key"
-
-    def _parse(self, value: object) -> object:
-        return value
+    expected = "a value of that key"
 
 
-@dataclass(frozen=True)
 class VariableName(Text):
     """A name that a netCDF file can have for a variable."""
 
-    def _expected(self) -> str:
-        return "a name of letters, digits and _"
+    expected = "a name of letters, digits and _"
 
     def _parse(self, value: object) -> str:
         name = super()._parse(value)
         return name if re.fullmatch(r"\w(?:[\w .+-]*[\w.+-])?", name) else refuse(f"expected {self.expected}")
 
 
-@dataclass(frozen=True)
+_KEY = {"type": "string", "minLength": 1}
+
+
 class Keys(Kind):
     """One dotted key of a deck, or several that share one value."""
 
-    def _expected(self) -> str:
-        return 'a dotted key of the deck, or an array of them, such as "load.1.normal_load"'
+    expected = 'a dotted key of the deck, or an array of them, such as "load.1.normal_load"'
+    schema: ClassVar[Schema] = {"anyOf": [_KEY, {"type": "array", "items": _KEY, "minItems": 1}]}  # type: ignore[misc]
 
     def _parse(self, value: object) -> tuple[str, ...]:
         keys = tuple(value) if isinstance(value, list | tuple) else (value,)
         whole = keys and all(isinstance(key, str) and key.strip() for key in keys)
         return keys if whole else refuse(f"expected {self.expected}")
 
-    def _schema(self) -> Schema:
-        text = {"type": "string", "minLength": 1}
-        return {"anyOf": [text, {"type": "array", "items": text, "minItems": 1}]}
-
     def written(self, value: tuple[str, ...]) -> str | list[str]:
         """Return one key as text, several as a list."""
         return value[0] if len(value) == 1 else list(value)
 
 
-@dataclass(frozen=True)
 class Expression(Text):
     """A formula over parameters and keys of the deck."""
 

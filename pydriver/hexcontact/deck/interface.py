@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from ..arrays import Array
@@ -154,7 +153,8 @@ def stiffness(exponent: float) -> Dimension:
     return Dimension(f"a coefficient in {unit}", unit, f'"1e15 {unit}"')
 
 
-_Stiffness = Annotated[float, PowerCoefficient("Pa/m^m", '"1e15 Pa/m^2"')]
+_Stiffness = Annotated[float, PowerCoefficient("Pa/m^m", stiffness, "exponent")]
+_FrictionStiffness = Annotated[float, PowerCoefficient("Pa/m^m", stiffness, "friction_exponent", "exponent")]
 
 
 class Interface(Table):
@@ -170,7 +170,7 @@ class Interface(Table):
     friction_exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=20)] | None = meaning(
         None, "exponent m_t of its own friction limit; `exponent` if absent", "2.5"
     )
-    friction_coefficient: _Stiffness | None = meaning(
+    friction_coefficient: _FrictionStiffness | None = meaning(
         None,
         "coefficient c_t of its own friction limit, ❘q❘ ≤ c_t ψ^m_t, instead of [friction]; none if absent",
         '"3e14 Pa/m^2"',
@@ -178,16 +178,6 @@ class Interface(Table):
     tangential_stiffness: Annotated[float, Quantity(stiffness(1.0), above=0, any_size=True)] | None = meaning(
         None, "stiffness k_T of tangential springs in series with the slip; none if absent", '"1e14 Pa/m"'
     )
-
-    @field_validator("coefficient", "friction_coefficient")
-    @classmethod
-    def _to_si(cls, value: object, info: ValidationInfo) -> float | None:
-        exponent = info.data.get("exponent")
-        if info.field_name == "friction_coefficient":
-            exponent = info.data.get("friction_exponent", math.nan) or exponent
-        if exponent is None or math.isnan(exponent) or value is None:  # wrong, and reported itself
-            return None if value is None else 0.0
-        return Quantity(stiffness(exponent), above=0, any_size=True).parse(value)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

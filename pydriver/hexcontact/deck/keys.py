@@ -444,5 +444,5 @@ class Deck(Table):
 def _reader(name: str) -> Callable[[Any], Any]:
     """Return the function that checks one table of a deck."""
     info = Deck.model_fields[name]
-    whole: Any = Annotated[(info.annotation, *info.metadata)]
+    whole: Any = Annotated[info.annotation, info]
     return TypeAdapter(whole).validate_python

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, NoReturn, TypeVar
 
 import numpy as np
+from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from ..arrays import Array
@@ -68,6 +69,10 @@ class Formula:
             known = ", ".join(FUNCTIONS)
             raise ValueError(f"a formula of numbers, names, + - * / ** ( ) and {known}") from None
         self.names = tuple(name for name in symbols if name not in _CONSTANTS)
+        self._text = text
+
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        return Formula, (self._text,)
 
     def _read(self, node: ast.AST) -> _Term:
         """Return the term of a node of the tree; ValueError for anything but arithmetic."""
@@ -225,12 +230,25 @@ class Quantity(Kind):
 
 
 class PowerCoefficient(Kind):
-    """A coefficient above 0 of a power law, which its table parses in a unit that depends on the exponent."""
+    """A coefficient above 0 of a power law, in a unit that follows from the exponent.
 
-    def __init__(self, unit: str, example: str) -> None:
-        self.unit = unit
-        self.expected = f"a coefficient above 0 in {unit} such as {example}"
+    That is the first of some keys of its table that has a value.
+    """
+
+    def __init__(self, unit: str, dimension: Callable[[float], Dimension], *exponents: str) -> None:
+        self.unit, self._dimension, self._exponents = unit, dimension, exponents
+        self.expected = f"a coefficient above 0 in {unit} such as {dimension(2.0).example}"
         self.schema = {"type": ["number", "string"], "description": self.expected}
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Validate when the exponents are known."""
+        return core_schema.with_info_plain_validator_function(self._of_table)
+
+    def _of_table(self, value: object, info: ValidationInfo) -> float:
+        known = [info.data.get(key, math.nan) for key in self._exponents]  # NaN: wrong, and reported itself
+        exponent = next(number for number in known if number is not None)
+        dimension = self._dimension(exponent)
+        return 0.0 if math.isnan(exponent) else Quantity(dimension, above=0, any_size=True).parse(value)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 from ..arrays import Array, Mask
@@ -41,6 +40,16 @@ from .table_base import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")
+
+
+def _coefficient_dimension(exponent: float) -> Dimension:
+    """Return the dimension of the coefficient of a power law, a length to the power 1 - n."""
+    power = f"{1.0 - exponent:g}"
+    if power == "0":
+        return NUMBER
+    return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
+
+
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
 if TYPE_CHECKING:
@@ -55,7 +64,7 @@ else:
     CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
     LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
     Angle = Annotated[float, Quantity(ANGLE)]
-    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')]
+    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
     Point = Annotated[
         tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
     ]
@@ -236,14 +245,6 @@ class Cone(Surface):
         return self.slope * np.hypot(x, y)
 
 
-def _coefficient_dimension(exponent: float) -> Dimension:
-    """Return the dimension of the coefficient of a power law, a length to the power 1 - n."""
-    power = f"{1.0 - exponent:g}"
-    if power == "0":
-        return NUMBER
-    return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
-
-
 @shape("power")
 class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
@@ -251,14 +252,6 @@ class Power(Surface):
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
     coefficient: Coefficient = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
-
-    @field_validator("coefficient")
-    @classmethod
-    def _to_si(cls, value: object, info: ValidationInfo) -> float:
-        if "exponent" not in info.data:  # wrong, and reported itself
-            return 0.0
-        dimension = _coefficient_dimension(info.data["exponent"])
-        return Quantity(dimension, above=0, any_size=True).parse(value)
 
     def _height(self, x: Array, y: Array) -> Array:
         return self.coefficient * np.hypot(x, y) ** self.exponent

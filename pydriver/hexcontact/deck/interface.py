@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +13,6 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from ..arrays import Array
 from ..text import quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .table_base import Table, meaning
@@ -86,7 +86,11 @@ class FrictionKind(Kind):
         if keys == {"map"} and isinstance(name, str) and name:
             return NodalCoefficient(Path(name), dict(value))
         if keys == set(_GRID):
-            return NodalCoefficient(_grid(value), dict(value))
+            with contextlib.suppress(TypeError, ValueError):
+                x, y, values = (np.asarray(value[key], float) for key in _GRID)
+                if x.ndim == y.ndim == 1 and values.shape == (x.size, y.size):
+                    return NodalCoefficient((x, y, values), dict(value))
+            refuse("expected numbers x and y (m), and values, an array over y for each x")
         if {"along", "across"} <= keys <= {"along", "across", "angle"}:
             number = Quantity(NUMBER, above=0)
             try:
@@ -121,18 +125,6 @@ class FrictionKind(Kind):
         description = self.expected[0].upper() + self.expected[1:]
         kinds = [{"type": "number", "minimum": 0}, {"type": "string"}, *objects]
         return {"anyOf": kinds, "description": description}
-
-
-def _grid(value: Mapping[str, Any]) -> tuple[Array, Array, Array]:
-    """Return the points (m) and values of a map in a deck."""
-    expected = "expected numbers x and y (m), and values, an array over y for each x"
-    try:
-        x, y, values = (np.asarray(value[key], float) for key in _GRID)
-    except (TypeError, ValueError):
-        refuse(expected)
-    if x.ndim != 1 or y.ndim != 1 or values.shape != (x.size, y.size):
-        refuse(expected)
-    return x, y, values
 
 
 def _is_pure(text: str) -> bool:

@@ -23,7 +23,7 @@ from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .interface import FROM_PYTHON
 from .keys import Deck
 from .series import Series, read_series
-from .surfaces import Separation, Surface
+from .surfaces import Flat, Separation, Surface
 from .toml import parse_toml, read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
@@ -207,8 +207,8 @@ class RecordedDeck:
     @property
     def only_surface(self) -> Surface | None:
         """The surface of a body on a flat one; None if there is none, or both have one."""
-        bodies = None if "surface" in self.given else self.tables("body").get("body")
-        curved = [body.surface for body in (bodies.body_1, bodies.body_2) if body.surface] if bodies else []
+        gap = self.separation
+        curved = [one for one in (gap.surface_1, gap.surface_2) if not isinstance(one, Flat)] if gap else []
         return curved[0] if len(curved) == 1 else None
 
 

@@ -232,8 +232,11 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     problems: list[str] = []
     for key, column in chosen.items():
         series[key] = []
-        if key != "label" and column.unit and (fault := _unit_fault(key, column.unit)):
-            problems.append(f"{path}, column {shown(column.header)}: {fault}")
+        try:  # once instead of in each row
+            if key != "label" and column.unit:
+                DRIVEN[key].kind.parse(f"1 {column.unit}")
+        except PydanticCustomError as error:
+            problems.append(f"{path}, column {shown(column.header)}: {error.message()}")
             continue
         for line, cell in zip(lines, column.cells, strict=True):
             try:
@@ -252,15 +255,6 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     return series
 
 
-def _unit_fault(key: str, unit: str) -> str:
-    """Return the fault of the unit of a column, once instead of in each row."""
-    try:
-        DRIVEN[key].kind.parse(f"1 {unit}")
-    except PydanticCustomError as error:
-        return error.message()
-    return ""
-
-
 def _noise(cells: Sequence[Any], cell: Any) -> str:
     """Return the remedy for a small normal load below 0."""
     numbers = [number for number in map(_number, map(str, cells)) if number is not None]
@@ -271,26 +265,21 @@ def _noise(cells: Sequence[Any], cell: Any) -> str:
 
 
 def _value(key: str, cell: Any, unit: str) -> Any:
-    if isinstance(cell, str) and cell.lower() in _MISSING:
-        return ""
-    kind = DRIVEN[key].kind
     if isinstance(cell, str):
-        cell = spelled(cell)
-        if re.fullmatch(_THOUSANDS, cell):
+        if cell.lower() in _MISSING:
+            return ""
+        text = cell = spelled(cell)
+        if re.fullmatch(_THOUSANDS, text):
             refuse("expected a number without separators of thousands")
-        if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):
+        if re.fullmatch(r"[+-]?[\d.]+,\d+", text):
             refuse("expected a decimal point, not a comma")
-        number = _number(cell)
-        if number is None and unit and _number(cell.split()[0] if cell.split() else "") is not None:
+        if (number := _number(text)) is not None:
+            cell = re.sub(_FORTRAN_EXPONENT, "e", text) if unit else number
+        elif unit and _number([*text.split(), ""][0]) is not None:
             refuse(f"expected a number without a unit, since the header has the unit [{unit}]")
-        if number is None:
-            quantity: Any = cell
         else:
-            quantity = f"{re.sub(_FORTRAN_EXPONENT, 'e', cell)} {unit}" if unit else number
-    else:
-        quantity = f"{cell!r} {unit}" if unit else cell
-    value = kind.parse(quantity)
-    return f"{value!r} rad" if kind.dimension is ANGLE else value
+            unit = ""  # it has its own
+    return DRIVEN[key].kind.written(DRIVEN[key].kind.parse(f"{cell} {unit}" if unit else cell))
 
 
 def _number(text: str) -> float | None:
@@ -443,7 +432,10 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
                 name: variable.shape[0]
                 for name, variable in file.variables.items()
                 if name not in file.dimensions
-                and ((variable.ndim == 1 and _is_readable(variable.dtype)) or _is_text(variable))
+                and (
+                    (variable.ndim == 1 and getattr(variable.dtype, "kind", "U") in "iufU")
+                    or _is_text(variable)
+                )
             }
             longest = max(lengths.values(), default=0)
             count = next((lengths[key] for key in DRIVEN if key in lengths), longest)
@@ -468,11 +460,6 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
             raise
         raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
     return columns, list(range(1, count + 1))
-
-
-def _is_readable(dtype: Any) -> bool:
-    """Return whether a variable of a type holds numbers or text."""
-    return dtype is str or getattr(dtype, "kind", "") in tuple("iuf")
 
 
 def _is_text(variable: Any) -> bool:

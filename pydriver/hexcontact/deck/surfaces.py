@@ -411,16 +411,22 @@ class Separation:
         return x, y, float(self._sum(x, y))
 
     @cached_property
+    def curvature(self) -> Array | None:
+        """Second derivatives (1/m) of a gap that is a quadratic form; None of others."""
+        one, two = self.surface_1.curvature, self.surface_2.curvature
+        return None if one is None or two is None else one + two
+
+    @cached_property
     def quadratic(self) -> tuple[Array, tuple[float, float]] | None:
         """Second derivatives (1/m) and lowest point (m) of a gap that is a quadratic form; None of others."""
-        one, two = self.surface_1, self.surface_2
-        if one.curvature is None or two.curvature is None:
+        second = self.surface_2.curvature
+        if self.curvature is None or second is None:
             return None
         # (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders; solved about o1, so that large
         # offsets cost no digits
-        apart, total = np.subtract(two.offset, one.offset), one.curvature + two.curvature
-        point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
-        return total, (float(point[0]), float(point[1]))
+        apart = np.subtract(self.surface_2.offset, self.surface_1.offset)
+        point = np.linalg.pinv(self.curvature, hermitian=True) @ second @ apart + self.surface_1.offset
+        return self.curvature, (float(point[0]), float(point[1]))
 
     def _sum(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.surface_1.height(x, y) + self.surface_2.height(x, y)

@@ -51,7 +51,8 @@ class HeightMap:
         order = np.argsort(x), np.argsort(y)
         self.x, self.y, self.gap = x[order[0]], y[order[1]], gap[np.ix_(*order)]
         there = np.isfinite(self.gap)
-        if not all(map(_are_distinct, (x, y))) or (degree == 1 and not there.all()):
+        ascending = [len(at) > 1 and np.isfinite(at).all() and np.diff(at).all() for at in (self.x, self.y)]
+        if not all(ascending) or (degree == 1 and not there.all()):
             raise DeckError(f"{name}: expected numbers at all points of a rectangular grid, without holes")
         if not there.any() or np.isneginf(self.gap).any():
             raise DeckError(f"{name}: expected heights, NaN in holes, and inf where nothing can touch")
@@ -99,23 +100,23 @@ class HeightMap:
         if self._smooth is not None:
             share = np.clip(self._smooth.ev(x, y), 0.0, 1.0)
             near = inside & (share < 1.0 - 1e-9)
-            monotone = self._monotone(np.asarray(x)[near], np.asarray(y)[near])
+            inner = np.asarray(x)[near], np.asarray(y)[near]
+            monotone = np.clip(self._bicubic(np.stack(inner, axis=-1)), *self._range(*inner))
             found[near] = share[near] * found[near] + (1.0 - share[near]) * monotone
         if not self._there.all():
-            found[inside & (self._linear(~self._there).ev(x, y) > 1e-9)] = np.inf
+            found[inside & (self._through(~self._there).ev(x, y) > 1e-9)] = np.inf
         return found
 
-    def _linear(self, values: Array) -> Any:
+    def _through(self, values: Array, degree: int = 1) -> Any:
+        """Return the spline through values at the points."""
         from scipy.interpolate import RectBivariateSpline
 
-        return RectBivariateSpline(self.x, self.y, values.astype(float), kx=1, ky=1)
+        kx, ky = (min(degree, len(along) - 1) for along in (self.x, self.y))
+        return RectBivariateSpline(self.x, self.y, values.astype(float), kx=kx, ky=ky)
 
     @cached_property
     def _spline(self) -> Any:
-        from scipy.interpolate import RectBivariateSpline
-
-        kx, ky = (min(self._degree, len(along) - 1) for along in (self.x, self.y))
-        return RectBivariateSpline(self.x, self.y, self._filled, kx=kx, ky=ky)
+        return self._through(self._filled, self._degree)
 
     @cached_property
     def near_steps(self) -> Mask:
@@ -136,7 +137,7 @@ class HeightMap:
             return None
         from scipy.ndimage import binary_dilation
 
-        return self._linear(np.asarray(~binary_dilation(self.near_steps, iterations=_ECHO)))
+        return self._through(np.asarray(~binary_dilation(self.near_steps, iterations=_ECHO)))
 
     @cached_property
     def _bicubic(self) -> Any:
@@ -148,10 +149,6 @@ class HeightMap:
         along_x, across = (CubicHermiteSpline(x, *pair).c for pair in ((values, of_x), (of_y, twist)))
         coefficients: Any = CubicHermiteSpline(y, along_x, across, axis=2).c
         return NdPPoly(coefficients.transpose(2, 0, 3, 1), (x, y))
-
-    def _monotone(self, x: Array, y: Array) -> Array:
-        """Return the bicubic at points of the map, in the range of the four heights around each."""
-        return np.clip(self._bicubic(np.stack([x, y], axis=-1)), *self._range(x, y))
 
     def _range(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the smallest and the largest of the four heights around points of the map."""
@@ -273,10 +270,6 @@ def _is_at_end(values: Array) -> bool:
 
 def _place(x: float, y: float) -> str:
     return f"x = {x:.4g} m, y = {y:.4g} m"
-
-
-def _are_distinct(along: Array) -> bool:
-    return bool(len(along) > 1 and np.isfinite(along).all() and (np.diff(np.sort(along)) > 0.0).all())
 
 
 def in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
@@ -473,10 +466,8 @@ class FrictionField:
             # the longer half-axis ends at the limit, and the ellipse shrinks as a whole
             numbers["shear_limit"] = numbers.get("shear_limit", math.inf) * mean / max(mu.along, mu.across)
             mu = mean
-        self._numbers = numbers
-        self._coefficient = mu
+        self._numbers, self._coefficient, self.in_deck = numbers, mu, mu
         self.varies = isinstance(mu, NodalCoefficient)
-        self.in_deck = mu
         if isinstance(mu, NodalCoefficient):
             source: Any = mu.source
             if isinstance(source, Path):

@@ -238,13 +238,14 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
 def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     """Return the words in the sentences of limits that are no numbers."""
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
+    steps = f"{found.get('growing_steps', 0.0):.2g}"
     worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
     return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
         "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
-        "growing_words": _even_steps(found.get("growing_steps", 0.0)),
+        "growing_words": "one step" if steps == "1" else f"{steps} even steps",
         "step_percent": percent(found.get("step_error", 0.0)),
         "turning_percent": percent(found.get("turning_error", 0.0)),
         "ring_percent": _at_most(found.get("ring_error", 0.0)),
@@ -304,12 +305,6 @@ def _counted(count: float, noun: str) -> str:
     """Return a number of things in words."""
     words = f"{count:.2g}"
     return f"{words} {noun}{'s' * (words != '1')}"
-
-
-def _even_steps(count: float) -> str:
-    """Return a number of even steps in words."""
-    words = f"{count:.2g}"
-    return "one step" if words == "1" else f"{words} even steps"
 
 
 def limits() -> list[dict[str, Any]]:

@@ -312,20 +312,7 @@ class Problem:
         )
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
-        """Return the same case with other values for some keys of its deck.
-
-        Parameters
-        ----------
-        changes : mapping
-            New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
-            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is computed
-            again, also if a `Lattice` was given; that of a gap over its nodes cannot change.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each fault.
-        """
+        """Return the same case with other values for some dotted keys of its deck; None removes one."""
         folder = self.deck_file.parent if self.deck_file else Path()
         lattice = self.lattice if self._gap.at_nodes else None
         given = assemble(plain(self._given.data), folder=folder, overrides=changes)
@@ -395,12 +382,13 @@ class Problem:
             return lattice
         try:
             self._check_interface(source)
-            estimate = self._largest_contact()
+            self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
         except NoContactFound as error:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
             raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
-        self.estimate = estimate
+        first, *second = self._estimates.values()  # by force, and by approach
+        self.estimate = estimate = first.joined(*second) if second else first
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
@@ -439,12 +427,6 @@ class Problem:
         except NoContactFound:
             return 0.0
         return math.log(large.radius / small.radius) / math.log(8.0)
-
-    def _largest_contact(self) -> Estimate:
-        """Estimate the contact at the largest load of the history, by force and by approach."""
-        self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
-        found = [*self._estimates.values()]
-        return found[0] if len(found) == 1 else found[0].joined(found[1])
 
     @property
     def largest_drives(self) -> list[dict[str, float]]:

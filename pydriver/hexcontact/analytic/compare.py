@@ -192,9 +192,8 @@ class ClosedForms:
             return None
         history = History(self.dataset, number, self.static)
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
-        if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
-            return None
-        if history.is_worn:
+        aside = shear > _ASIDE * self.friction * history.normal_load
+        if not history.normal_load > 0.0 or aside or history.is_worn:
             return None
         hertz = self.gap.contact(history.normal_load)
         contact = LubkinTorsion(

@@ -77,7 +77,7 @@ def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dic
     """Return a copy of a deck with single keys replaced."""
     result = copy.deepcopy(dict(data))
     for dotted_key, value in overrides.items():
-        if bracket := re.search(_BRACKET, dotted_key):
+        if "[" in dotted_key and (bracket := re.search(_BRACKET, dotted_key)):
             given = f"{bracket[1]}.1{dotted_key[bracket.end() :]}"
             raise DeckError(f"{dotted_key}: expected the number of an entry between points, from 1: {given}")
         *parents, last = dotted_key.split(".")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -61,29 +60,21 @@ class HeightMap:
         self.x, self.y, self.gap, there = self.x[rows], self.y[cols], self.gap[rows, cols], there[rows, cols]
         self._degree, self._there = degree, there
         self._filled = self.gap if there.all() else self.gap[_nearest(there)]
+        row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
+        self.first_touch = float(self.x[row]), float(self.y[col])  # point (m) where the gap is smallest
+        # median distances (m) of its points along x and y
+        self.distances = float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
 
     @classmethod
-    def of(
-        cls, gap: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH, degree: int = 3
-    ) -> Self:
+    def of(cls, gap: xarray.DataArray, rule: Rule) -> Self:
         """Return the map of an array with the coordinates x and y, each along a dimension."""
+        name = rule.key
         x, y = gap.coords["x"], gap.coords["y"]
         if sorted(map(str, gap.dims)) != sorted(map(str, x.dims + y.dims)):
             named = listed([str(name) for name in gap.dims], "and")
             raise DeckError(f"{name}: expected the dimensions of x and y, not {named}")
-        values = in_si(gap.transpose(*x.dims, *y.dims), name, dimension)
-        return cls(in_si(x, name), in_si(y, name), values, name, degree)
-
-    @property
-    def first_touch(self) -> tuple[float, float]:
-        """Point (m) of the grid where the gap is smallest."""
-        row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
-        return float(self.x[row]), float(self.y[col])
-
-    @property
-    def distances(self) -> tuple[float, float]:
-        """Median distances (m) of its points along x and y."""
-        return float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
+        values = in_si(gap.transpose(*x.dims, *y.dims), name, rule.dimension)
+        return cls(in_si(x, name), in_si(y, name), values, name, rule.degree)
 
     @property
     def holes(self) -> tuple[Array, Array]:
@@ -320,7 +311,7 @@ def given_field(values: Any, rule: Rule, lattice: Lattice | None) -> FieldSource
             named = listed([str(coordinate) for coordinate in coordinates], "and")
             raise DeckError(f"{name}: expected coordinates x and y (m), not {named}")
         if coordinates["x"].ndim == coordinates["y"].ndim == 1:
-            return HeightMap.of(values, rule.key, rule.dimension, rule.degree)
+            return HeightMap.of(values, rule)
         values = values.copy(data=in_si(values, name, rule.dimension))
     reals(values, name)  # other values need another sentence
     if lattice is None:
@@ -331,33 +322,20 @@ def given_field(values: Any, rule: Rule, lattice: Lattice | None) -> FieldSource
     return shaped(values, lattice, name).copy()
 
 
-@dataclass(frozen=True)
 class PlaneField:
-    """A quantity over the plane, and the rule of its values."""
+    """A quantity over the plane, and the rule of its values.
 
-    source: FieldSource
-    rule: Rule
+    `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
+    the map, if it is one; `heights`: those (m) of both surfaces, none if only their sum is known.
+    """
 
-    @property
-    def at_nodes(self) -> bool:
-        """Whether it is an array over the nodes of one window."""
-        return isinstance(self.source, np.ndarray)
-
-    @property
-    def given(self) -> bool:
-        """Whether it was given in Python, not as two surfaces."""
-        return not isinstance(self.source, Separation)
-
-    @property
-    def map(self) -> HeightMap | None:
-        """The map, if it is one."""
-        return self.source if isinstance(self.source, HeightMap) else None
-
-    @property
-    def heights(self) -> tuple[Callable[[Array, Array], Array], ...]:
-        """Heights (m) of the surfaces of body 1 and body 2; empty if only their sum is known."""
-        known = self.source
-        return (known.surface_1.height, known.surface_2.height) if isinstance(known, Separation) else ()
+    def __init__(self, source: FieldSource, rule: Rule) -> None:
+        self.source, self.rule = source, rule
+        self.at_nodes, self.given = isinstance(source, np.ndarray), not isinstance(source, Separation)
+        self.map = source if isinstance(source, HeightMap) else None
+        self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
+        if isinstance(source, Separation):
+            self.heights = source.surface_1.height, source.surface_2.height
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
@@ -403,7 +381,7 @@ class PlaneField:
         self._refuse(values, bad, lattice.x, lattice.y)
         if self.rule is GAP and (abs(values[np.isfinite(values)]) > LARGEST).any():
             raise DeckError(f"{key}: expected lengths of at most {LARGEST:g} m, {_OR_OPEN}")
-        ours = isinstance(source, np.ndarray | HeightMap | Separation)
+        ours = self.at_nodes or self.map or not self.given
         return values if ours else values.copy()  # a function may keep, and change, its result
 
     def _refuse(self, values: Array, bad: Mask, x: Array, y: Array) -> None:
@@ -497,7 +475,7 @@ def _read_map(path: Path) -> Any:
                 )
             # the values, their spline, and copies of both
             memory.require(8 * 8 * maps[0].size, f"the map {path}", "choose a coarser one")
-            return _of_few_points(HeightMap.of(maps[0].load(), _NAME, COEFFICIENT.dimension, 1))
+            return _of_few_points(HeightMap.of(maps[0].load(), COEFFICIENT))
     except FileNotFoundError:
         raise DeckError(f"{_NAME}: there is no file {path}") from None
     except DeckError as error:

@@ -315,10 +315,12 @@ def work(case: Problem) -> str:
     """Return the estimate in words: "about 1,800 operator applications, about 4 s on one core"."""
     runs = [[*cases] for cases in (least_and_most(case) if case.accuracy else ([case],))]
     found: Any = [[(operator_applications(one), seconds(one)) for one in cases] for cases in runs]
-    for estimates, finest in zip(found, (cases[-1] for cases in runs), strict=True):
-        for one in coarser(finest) if case.estimates_tables else []:  # counted on the finest lattice
+    below = (*case.deck.stress, *case.deck.fatigue)
+    estimates = any(table.estimate_error or case.accuracy for table in below)
+    for counted, finest in zip(found, (cases[-1] for cases in runs), strict=True):
+        for one in coarser(finest) if estimates else []:  # counted on the finest lattice
             number, share = operator_applications(one), one.lattice.size / finest.lattice.size
-            estimates.append((None if number is None else number * share, seconds(one)))
+            counted.append((None if number is None else number * share, seconds(one)))
     if any(None in estimate for run in found for estimate in run):
         return "LAPACK on the nodes in contact, not estimated"
     applications, times = zip(*(map(math.fsum, zip(*run, strict=True)) for run in found), strict=True)

@@ -51,11 +51,6 @@ class Source:
         name, place = self.found(key)
         return f"{name}:{place.line}:{place.column}: " if place else name and f"{name}: "
 
-    def order(self, key: str) -> tuple[int, int, int]:
-        """Return the sort key of a dotted key: file, line and column."""
-        name, place = self.found(key)
-        return ([entry for entry, _ in self._places].index(name), *place) if place else (-1, 0, 0)
-
     def _overridden(self, key: str) -> bool:
         return any(key == name or key.startswith(f"{name}.") for name in self.overrides)
 
@@ -70,16 +65,18 @@ NOWHERE = Source()
 
 def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     """Return one exception for all mistakes, a line for each."""
-    faults = []
-    for problem in sorted(problems, key=lambda problem: source.order(dotted(problem.key))):
+    faults: dict[Fault, tuple[int, int, int]] = {}  # with file, line and column, by which they are sorted
+    files = [source.name, *(name for name, _ in source.included)]
+    for problem in problems:
         key = dotted(problem.key)
         value = "" if problem.value is MISSING else shown(problem.value)
         message = f"{source.locate(key)}{key}{value and ' = '}{value}: {problem.sentence}"
         file, place = source.found(key)
         line, column = place or (None, None)
-        faults.append(Fault(message, key, value, file, line, column, problem.sentence))
-    faults = list(dict.fromkeys(faults))
-    return DeckError("\n".join(dict.fromkeys(fault.message for fault in faults)), faults)
+        fault = Fault(message, key, value, file, line, column, problem.sentence)
+        faults[fault] = (files.index(file), *place) if place else (-1, 0, 0)
+    ordered = sorted(faults, key=lambda fault: faults[fault])
+    return DeckError("\n".join(dict.fromkeys(fault.message for fault in ordered)), ordered)
 
 
 # --- line and column of each key, which tomllib does not return ---------------------------------------------

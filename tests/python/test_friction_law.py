@@ -1,6 +1,7 @@
 """Friction that varies from node to node, and a bound of the shear traction: decks, Python, messages."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -60,6 +61,7 @@ def test_formula_over_arrays():
     formula = Formula("max(min(x, 0.5), 0) ** 2 - -tanh(x) * pi / exp(abs(x))")
     expected = [formula.value({"x": float(at)}) for at in x]
     np.testing.assert_allclose(formula.over(x=x), expected, rtol=1e-14)
+    np.testing.assert_equal(pickle.loads(pickle.dumps(formula)).over(x=x), formula.over(x=x))
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,8 @@ from ..errors import DeckError
 from ..text import TextTable, html_table, quantity, text_table
 from ..variables import VARIABLES, spelled
 from . import friction
-from .friction import LubkinTorsion, MindlinContact
-from .frictionless import AxisymmetricContact, EllipticContact, cone, flat_punch, power_law, rounded_punch
+from .friction import LubkinTorsion, MindlinContact, SuperposedContact
+from .frictionless import EllipticContact, cone, flat_punch, power_law, rounded_punch
 from .hertz_gap import (
     SIMILAR,
     QuadraticGap,
@@ -79,19 +79,80 @@ def superposed(first: Callable[[float], Array | float], turns: Sequence[float]) 
 
 
 @dataclass(frozen=True)
-class PartialSlip:
-    """Similar bodies sheared along one line under a constant normal load, over a Hertz circle or ellipse.
+class Pressed:
+    """A contact without friction that has a closed solution at every load."""
 
-    Over an ellipse the tractions have the same form as over a circle: stick and contact area are similar.
-    """
+    name: str  # name of the solution
+    center: tuple[float, float]  # m
+    contact: Callable[[float], Any]  # the contact under a load (N), axisymmetric or elliptic
+    energy: float  # its elastic energy over load times approach; 0: unknown
+    lowest: float = 0.0  # gap at the center, m
+    rim: bool = False  # whether it ends at a sharp rim
 
-    contact: MindlinContact  # spheres with a contact of the same area
-    ellipse: EllipticContact  # Hertz contact
-    center: tuple[float, float]  # its center, m
+    def pressure(self, load: float, x: Array, y: Array) -> Array:
+        """Return the pressure (Pa) under a load (N) at points (m)."""
+        contact, x, y = self.contact(load), x - self.center[0], y - self.center[1]
+        at = (x, y) if isinstance(contact, EllipticContact) else (np.hypot(x, y),)
+        return np.asarray(contact.pressure(*at))
+
+
+_SHAPES: dict[str, Callable[[Any, float], Pressed]] = {  # by surface and effective modulus (Pa)
+    "cone": lambda s, e: Pressed("Sneddon", s.offset, lambda p: cone(e, s.slope, normal_load=p), 1.0 / 3.0),
+    "power": lambda s, e: Pressed(
+        *("Sneddon", s.offset, lambda p: power_law(e, s.coefficient, s.exponent, normal_load=p)),
+        s.exponent / (2.0 * s.exponent + 1.0),  # P ~ approach^(1 + 1/n)
+    ),
+    "punch": lambda s, e: Pressed(
+        "Sneddon", s.offset, lambda p: flat_punch(e, s.radius, normal_load=p), 0.5, rim=True
+    ),
+    "rounded_punch": lambda s, e: Pressed(
+        *("Sneddon, Galin", s.offset),
+        lambda p: rounded_punch(e, s.flat_radius, s.edge_radius, normal_load=p),
+        0.0,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """Similar bodies sheared along one line under a constant normal load, over a circle."""
+
+    contact: Any  # of the first loading: `MindlinContact` or `SuperposedContact`
+    center: tuple[float, float]  # m
     direction: tuple[float, float]  # unit vector of the tangential load
     # turning points of the tangential load along `direction`, N; the last is the present load
     turns: tuple[float, ...]
     loads: tuple[float, ...]  # all loads along `direction`, N
+
+    @property
+    def name(self) -> str:
+        """Name of the solution."""
+        return "Jaeger, Ciavarella"
+
+    @property
+    def swing(self) -> float:
+        """Load of a first loading with the same stick area, N."""
+        return self.turns[0] if len(self.turns) == 1 else 0.5 * (self.turns[-1] - self.turns[-2])
+
+    def distance(self, x: Array, y: Array) -> Array:
+        """Return the distance (m) of points (m) from the center."""
+        return np.asarray(np.hypot(x - self.center[0], y - self.center[1]))
+
+    def traction(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return the shear traction on body 1 along x and y (Pa) at points (m)."""
+        radius = self.distance(x, y)
+        size = superposed(lambda load: self.contact.traction(radius, load), self.turns)
+        return size * self.direction[0], size * self.direction[1]
+
+
+@dataclass(frozen=True)
+class PartialSlip(Sheared):
+    """The same over a Hertz circle or ellipse, with the contact of spheres of the same area.
+
+    Over an ellipse the tractions have the same form as over a circle: stick and contact area are similar.
+    """
+
+    ellipse: EllipticContact  # Hertz contact
 
     @property
     def name(self) -> str:
@@ -101,15 +162,12 @@ class PartialSlip:
     @property
     def stick_ratio(self) -> float:
         """Size of the stick area relative to the contact area, c/a."""
-        swing = self.turns[0] if len(self.turns) == 1 else 0.5 * (self.turns[-1] - self.turns[-2])
-        return float(self.contact.stick_radius(swing)) / self.contact.contact_radius
+        return float(self.contact.stick_radius(self.swing)) / self.ellipse.radius
 
-    def traction(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the shear traction on body 1 along x and y (Pa) at points (m)."""
+    def distance(self, x: Array, y: Array) -> Array:
+        """Return the distance (m) from the center in the circle of the same area."""
         way = np.hypot(*self.ellipse.local(x - self.center[0], y - self.center[1]))
-        radius = way * self.contact.contact_radius
-        size = superposed(lambda load: self.contact.traction(radius, load), self.turns)
-        return size * self.direction[0], size * self.direction[1]
+        return np.asarray(way * self.ellipse.radius)
 
 
 class ClosedForms:
@@ -145,32 +203,41 @@ class ClosedForms:
         except DeckError:
             return None
 
-    def partial_slip(self, number: int) -> PartialSlip | None:
-        """Return the closed solution of a step with shear, None if there is none."""
-        sheared = self.sheared(number)
-        if sheared is None or self.gap is None:
-            return None
-        history, direction, loads = sheared
-        hertz = self.gap.contact(history.normal_load)
-        contact = MindlinContact(
-            self.friction, history.normal_load, hertz.radius, 4.0 / self.modulus * (1.0 + 0.5 * self.gamma)
-        )
-        if np.abs(history["twist"]).max() * contact.contact_radius > _ASIDE * contact.sliding_shift:
-            return None
-        return PartialSlip(
-            contact, hertz, self.gap.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
-        )
+    @cached_property
+    def pressed(self) -> Pressed | None:
+        """The contact without friction: Hertz for a quadratic gap, else by the shape of the surface."""
+        if self.gap is not None:
+            return Pressed("Hertz", self.gap.center, self.gap.contact, 0.4, self.gap.lowest)
+        surface = self.surface
+        known = _SHAPES.get(surface.shape) if surface is not None else None
+        return known(surface, self.modulus) if known else None
 
-    def sheared(self, number: int) -> tuple[History, tuple[float, float], Array] | None:
-        """Return history, line and loads of a step if similar bodies are sheared along it at a constant P."""
-        history = History(self.dataset, number, self.static)
+    def sheared(self, number: int) -> Sheared | None:
+        """Return the closed solution of a step with shear, None if there is none."""
+        history, pressed = History(self.dataset, number, self.static), self.pressed
         scale = self.friction * history.normal_load
         load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
         direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
-        if direction is None or history.is_worn:
+        if pressed is None or direction is None or history.is_worn:
             return None
         loads = history.at_constant_pressure(np.array(direction) @ load, scale)
-        return None if loads is None else (history, direction, loads)
+        if loads is None:
+            return None
+        line = pressed.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
+        law, twist = (self.friction, history.normal_load), history["twist"]
+        hertz = pressed.contact(history.normal_load)
+        if isinstance(hertz, EllipticContact):
+            alike = MindlinContact(*law, hertz.radius, 4.0 / self.modulus * (1.0 + 0.5 * self.gamma))
+            twisted = np.abs(twist).max() * hertz.radius > _ASIDE * alike.sliding_shift
+            return None if twisted else PartialSlip(alike, *line, hertz)
+        contact = SuperposedContact(*law, self.gamma, pressed.contact)
+        slides = abs(line[2][-1]) > (1.0 - _STEADY) * contact.sliding_load
+        return None if slides or twist.any() else Sheared(contact, *line)
+
+    def partial_slip(self, number: int) -> PartialSlip | None:
+        """Return the closed solution of a step with shear over a Hertz contact, None if there is none."""
+        found = self.sheared(number)
+        return found if isinstance(found, PartialSlip) else None
 
     def shear_loop(self) -> tuple[Array, Array] | None:
         """Return the curve of the shift (m) over the tangential load (N) along its direction, for spheres."""
@@ -192,9 +259,8 @@ class ClosedForms:
             return None
         history = History(self.dataset, number, self.static)
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
-        if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
-            return None
-        if history.is_worn:
+        aside = shear > _ASIDE * self.friction * history.normal_load
+        if not history.normal_load > 0.0 or aside or history.is_worn:
             return None
         hertz = self.gap.contact(history.normal_load)
         contact = LubkinTorsion(
@@ -310,127 +376,48 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
 
 
 def _normal(closed: ClosedForms, load: float) -> list[Exact]:
-    """Return the contact without friction: Hertz for a quadratic gap, else by the shape of the surface."""
-    if not pressure_is_frictionless(closed.dataset.attrs):
+    """Return the contact without friction."""
+    pressed = closed.pressed
+    if pressed is None or not pressure_is_frictionless(closed.dataset.attrs):
         return []
-    without_friction = closed.friction == 0.0  # else shear stores energy, too
-    if (gap := closed.gap) is not None:
-        hertz = gap.contact(load)
-        values = {"max_pressure": hertz.max_pressure, "approach": gap.approach(load)}
-        values["contact_radius_fit"] = hertz.radius
-        if without_friction:
-            values["elastic_energy"] = 0.4 * load * hertz.approach
-        x0, y0 = gap.center
-        fields = {"pressure": lambda x, y: hertz.pressure(x - x0, y - y0)}
-        return [Exact("Hertz", values, fields, {"pressure": hertz.max_pressure})]
-    surface, shape = _shape_of(closed)
-    if shape is None:
-        return []
-    contact = shape.contact(surface, closed.modulus, load)
-    values = {"max_pressure": contact.max_pressure, "approach": contact.approach}
-    if not shape.rim:
-        values["contact_radius_fit"] = contact.contact_radius
-    if without_friction and (energy := shape.energy(surface)):
-        values["elastic_energy"] = energy * load * contact.approach
-    if not math.isfinite(values["max_pressure"]):
+    contact = pressed.contact(load)
+    values = {"max_pressure": contact.max_pressure, "approach": contact.approach + pressed.lowest}
+    if not pressed.rim:
+        ellipse = isinstance(contact, EllipticContact)
+        values["contact_radius_fit"] = contact.radius if ellipse else contact.contact_radius
+    if closed.friction == 0.0 and pressed.energy:  # else shear stores energy, too
+        values["elastic_energy"] = pressed.energy * load * contact.approach
+    if not math.isfinite(contact.max_pressure):
         del values["max_pressure"]
-        return [Exact(shape.name, values)]
-    x0, y0 = surface.offset
-    fields = {"pressure": lambda x, y: contact.pressure(np.hypot(x - x0, y - y0))}
-    return [Exact(shape.name, values, fields, {"pressure": contact.max_pressure})]
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """A surface of revolution with a closed solution."""
-
-    name: str  # name of the solution
-    # the contact of a surface of this shape with an effective modulus (Pa) under a load (N)
-    contact: Callable[[Any, float, float], AxisymmetricContact]
-    energy: Callable[[Any], float]  # its elastic energy over load times approach; 0: unknown
-    rim: bool = False  # whether the contact ends at a sharp rim
-
-
-_SHAPES = {
-    "cone": _Shape("Sneddon", lambda s, e, p: cone(e, s.slope, normal_load=p), lambda s: 1.0 / 3.0),
-    "power": _Shape(
-        "Sneddon",
-        lambda s, e, p: power_law(e, s.coefficient, s.exponent, normal_load=p),
-        lambda s: s.exponent / (2.0 * s.exponent + 1.0),  # P ~ approach^(1 + 1/n)
-    ),
-    "punch": _Shape(
-        "Sneddon", lambda s, e, p: flat_punch(e, s.radius, normal_load=p), lambda s: 0.5, rim=True
-    ),
-    "rounded_punch": _Shape(
-        "Sneddon, Galin",
-        lambda s, e, p: rounded_punch(e, s.flat_radius, s.edge_radius, normal_load=p),
-        lambda s: 0.0,
-    ),
-}
-
-
-def _shape_of(closed: ClosedForms) -> tuple[Any, _Shape | None]:
-    """Return the only surface that is not flat, and its shape if that has a closed solution."""
-    surface = closed.surface
-    return surface, _SHAPES.get(surface.shape) if surface is not None else None
+        return [Exact(pressed.name, values)]
+    fields = {"pressure": partial(pressed.pressure, load)}
+    return [Exact(pressed.name, values, fields, {"pressure": contact.max_pressure})]
 
 
 # --- similar bodies, sheared or twisted ---------------------------------------------------------------------
 
 
 def _shear(closed: ClosedForms, number: int) -> list[Exact]:
-    """Return Cattaneo-Mindlin, or Mindlin-Deresiewicz after reversals."""
-    slip = closed.partial_slip(number)
-    if slip is None:
-        return _shear_of_shape(closed, number)
-    radius, sliding = slip.contact.contact_radius, slip.contact.sliding_load
-    values = {}
-    if abs(slip.turns[-1]) < (1.0 - _STEADY) * sliding:
-        values["stick_radius_fit"] = slip.stick_ratio * radius
-        if is_circular(slip.ellipse):
-            shift = float(superposed(slip.contact.shift, slip.turns))
-            along = {"shift_x": shift * slip.direction[0], "shift_y": shift * slip.direction[1]}
+    """Return Cattaneo-Mindlin, Mindlin-Deresiewicz after reversals, or superposed contacts."""
+    slip, pressed = closed.sheared(number), closed.pressed
+    if slip is None or pressed is None:
+        return []
+    contact, values = slip.contact, {}
+    if abs(slip.turns[-1]) < (1.0 - _STEADY) * contact.sliding_load:
+        if not pressed.rim:
+            values["stick_radius_fit"] = float(contact.stick_radius(slip.swing))
+        if not isinstance(slip, PartialSlip) or is_circular(slip.ellipse):
+            shift = float(superposed(contact.shift, slip.turns))
+            along = {f"shift_{axis}": shift * part for axis, part in zip("xy", slip.direction, strict=True)}
             values |= {name: value for name, value in along.items() if abs(value) > 1e-9 * abs(shift)}
 
     def component(axis: int) -> Callable[[Array, Array], Array]:
         return lambda x, y: slip.traction(x, y)[axis]
 
-    fields = {f"traction_{'xy'[k]}": component(k) for k in (0, 1) if abs(slip.direction[k]) > 1e-9}
-    scale = slip.contact.friction_coefficient * slip.ellipse.max_pressure
+    scale = closed.friction * pressed.contact(contact.normal_load).max_pressure
+    known = [axis for axis in (0, 1) if abs(slip.direction[axis]) > 1e-9 and math.isfinite(scale)]
+    fields = {f"traction_{'xy'[axis]}": component(axis) for axis in known}
     return [Exact(slip.name, values, fields, dict.fromkeys(fields, scale))]
-
-
-def _shear_of_shape(closed: ClosedForms, number: int) -> list[Exact]:
-    """Return the superposition of contacts without friction, if the shape of the surface has them."""
-    surface, shape = _shape_of(closed)
-    sheared = closed.sheared(number) if shape is not None else None
-    if sheared is None or shape is None:
-        return []
-    history, direction, loads = sheared
-    contact = friction.SuperposedContact(
-        closed.friction, history.normal_load, closed.gamma, partial(shape.contact, surface, closed.modulus)
-    )
-    turns = turning_points(loads)
-    if history["twist"].any() or abs(turns[-1]) > (1.0 - _STEADY) * contact.sliding_load:
-        return []
-    swing = turns[0] if len(turns) == 1 else 0.5 * (turns[-1] - turns[-2])
-    shift = float(superposed(contact.shift, turns))
-    values = {
-        f"shift_{axis}": shift * part for axis, part in zip("xy", direction, strict=True) if abs(part) > 1e-9
-    }
-    if not shape.rim:
-        values["stick_radius_fit"] = contact.stick_radius(swing)
-    x0, y0 = surface.offset
-
-    def component(axis: int) -> Callable[[Array, Array], Array]:
-        return lambda x, y: (
-            direction[axis] * superposed(partial(contact.traction, np.hypot(x - x0, y - y0)), turns)
-        )
-
-    peak = contact.pressed(history.normal_load).max_pressure
-    along = [axis for axis in (0, 1) if abs(direction[axis]) > 1e-9 and math.isfinite(peak)]
-    fields = {f"traction_{'xy'[axis]}": component(axis) for axis in along}
-    return [Exact("Jaeger, Ciavarella", values, fields, dict.fromkeys(fields, closed.friction * peak))]
 
 
 def _torsion(closed: ClosedForms, number: int) -> list[Exact]:

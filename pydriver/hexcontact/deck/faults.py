@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -51,11 +51,6 @@ class Source:
         name, place = self.found(key)
         return f"{name}:{place.line}:{place.column}: " if place else name and f"{name}: "
 
-    def order(self, key: str) -> tuple[int, int, int]:
-        """Return the sort key of a dotted key: file, line and column."""
-        name, place = self.found(key)
-        return ([entry for entry, _ in self._places].index(name), *place) if place else (-1, 0, 0)
-
     def _overridden(self, key: str) -> bool:
         return any(key == name or key.startswith(f"{name}.") for name in self.overrides)
 
@@ -70,16 +65,18 @@ NOWHERE = Source()
 
 def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     """Return one exception for all mistakes, a line for each."""
-    faults = []
-    for problem in sorted(problems, key=lambda problem: source.order(dotted(problem.key))):
+    faults: dict[Fault, tuple[int, int, int]] = {}  # with file, line and column, by which they are sorted
+    files = [source.name, *(name for name, _ in source.included)]
+    for problem in problems:
         key = dotted(problem.key)
         value = "" if problem.value is MISSING else shown(problem.value)
         message = f"{source.locate(key)}{key}{value and ' = '}{value}: {problem.sentence}"
         file, place = source.found(key)
         line, column = place or (None, None)
-        faults.append(Fault(message, key, value, file, line, column, problem.sentence))
-    faults = list(dict.fromkeys(faults))
-    return DeckError("\n".join(dict.fromkeys(fault.message for fault in faults)), faults)
+        fault = Fault(message, key, value, file, line, column, problem.sentence)
+        faults[fault] = (files.index(file), *place) if place else (-1, 0, 0)
+    ordered = sorted(faults, key=lambda fault: faults[fault])
+    return DeckError("\n".join(dict.fromkeys(fault.message for fault in ordered)), ordered)
 
 
 # --- line and column of each key, which tomllib does not return ---------------------------------------------
@@ -98,12 +95,75 @@ class Place(NamedTuple):
 KeyPath = tuple[str, ...]
 """Path of a key; entries of arrays count from 1: ("load", "2", "steps")."""
 
+_TOKENS = "|".join(  # compiled when a fault is located
+    [
+        r'"""(?:[^\\]|\\.)*?"{3,5}',
+        r"'''.*?'{3,5}",
+        r'"(?:[^"\\\n]|\\.)*"',
+        r"'[^'\n]*'",
+        r"[\n\[\]{}=,.]",
+        r"#[^\n]*",
+        r"[^\s\[\]{}=,.#\"']+",
+    ]
+)
+
 
 def places(text: str) -> dict[KeyPath, Place]:
     """Return the first place of each key, table and array entry of a deck."""
-    scanner = _Scanner(text)
-    scanner.scan()
-    return scanner.found
+    starts = [0, *(line.end() for line in re.finditer("\n", text))]
+    found: dict[KeyPath, Place] = {}
+    counts: dict[KeyPath, int] = {}  # entries of arrays of tables so far
+    around: list[tuple[KeyPath, int]] = []  # open arrays with the number of the entry, inline tables with 0
+    table: KeyPath = ()
+    path: KeyPath = ()  # of the key that was read last
+    parts: list[tuple[str, int]] = []  # of a key or header, and where they begin
+    state = "key"  # or header, value, after a value
+
+    def note(path: KeyPath, at: int) -> None:
+        line = bisect.bisect_right(starts, at)
+        found.setdefault(path, Place(line, at - starts[line - 1] + 1))
+
+    for token in re.finditer(_TOKENS, text, re.DOTALL):
+        mark, at = token[0], token.start()
+        if mark[0] == "#" or (mark == "\n" and around):
+            continue
+        if mark == "\n":
+            parts, state = [], "key"
+        elif state == "key" and mark == "[":
+            state, opened = "header", at
+        elif state == "header" and mark == "]":
+            array, table, state = text.startswith("[[", opened), (), "after"
+            for number, (part, _) in enumerate(parts, start=1):
+                table += (part,)
+                if array and number == len(parts):
+                    note(table, opened)
+                    counts[table] = counts.get(table, 0) + 1
+                if table in counts:
+                    table += (str(counts[table]),)
+                note(table, opened)
+        elif state == "key" and mark == "=":
+            path = around[-1][0] if around else table
+            for part, start in parts:
+                path += (part,)
+                note(path, start)
+            parts, state = [], "value"
+        elif state in ("key", "header") and mark not in "[.,}":
+            parts.append((mark[1:-1] if mark[0] in "\"'" else mark, at))
+        elif mark in "]}" and around:
+            path, _ = around.pop()
+            state = "after"
+        elif state == "value":
+            if around and around[-1][1]:
+                path = (*around[-1][0], str(around[-1][1]))
+                note(path, at)
+            if mark in "[{":
+                around.append((path, int(mark == "[")))
+            state = {"[": "value", "{": "key"}.get(mark, "after")
+        elif state == "after" and mark == "," and around:
+            outer, number = around.pop()
+            around.append((outer, number and number + 1))
+            state = "value" if number else "key"
+    return found
 
 
 def place_of(found: dict[KeyPath, Place], path: KeyPath) -> tuple[int, Place | None]:
@@ -112,115 +172,3 @@ def place_of(found: dict[KeyPath, Place], path: KeyPath) -> tuple[int, Place | N
         if place := found.get(path[:length]):
             return length, place
     return 0, None
-
-
-# compiled when a fault is located
-_BLANK = r"(?:[ \t\r\n]|#[^\n]*)*"
-_SPACE = r"[ \t]*"
-_BARE = r"[^\s\[\]{}=,.#\"']+"
-_PLAIN = r"[^\[\]{},#\n\"']+"
-_STRINGS = (r'"""(?:[^\\]|\\.)*?"{3,5}', r"'''.*?'{3,5}", r'"(?:[^"\\\n]|\\.)*"', r"'[^'\n]*'")
-
-
-class _Scanner:
-    """A scanner of one pass over a text; every method reads on from `self.at`."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.at = 0
-        self.found: dict[KeyPath, Place] = {}
-        self.entries: dict[KeyPath, int] = {}  # of arrays of tables
-        self.starts = [0, *(match.end() for match in re.finditer("\n", text))]
-
-    def scan(self) -> None:
-        table: KeyPath = ()
-        while self.skip(_BLANK) and self.at < len(self.text):
-            before = self.at
-            if self.text[self.at] == "[":
-                table = self.header()
-            else:
-                self.entry(table)
-            if self.at == before:  # not TOML after all
-                return
-
-    def skip(self, pattern: str) -> bool:
-        """Move behind a match at the current place; return whether there is one."""
-        match = re.compile(pattern, re.DOTALL).match(self.text, self.at)
-        self.at = match.end() if match else self.at
-        return match is not None
-
-    def take(self, words: str) -> bool:
-        if not self.text.startswith(words, self.at):
-            return False
-        self.at += len(words)
-        return True
-
-    def note(self, path: KeyPath, at: int) -> None:
-        line = bisect.bisect_right(self.starts, at)
-        self.found.setdefault(path, Place(line, at - self.starts[line - 1] + 1))
-
-    def header(self) -> KeyPath:
-        """Read [table] or [[array]]."""
-        start, array = self.at, self.text.startswith("[[", self.at)
-        self.at += 2 if array else 1
-        parts = list(self.key())
-        path: KeyPath = ()
-        for number, (part, _) in enumerate(parts, start=1):
-            path += (part,)
-            if array and number == len(parts):
-                self.note(path, start)
-                self.entries[path] = self.entries.get(path, 0) + 1
-            if path in self.entries:
-                path += (str(self.entries[path]),)
-            self.note(path, start)
-        self.skip(r"[ \t]*\]{1,2}")
-        return path
-
-    def key(self) -> Iterator[tuple[str, int]]:
-        """Yield the parts of a dotted key, and where each begins."""
-        while True:
-            self.skip(_SPACE)
-            start = self.at
-            if not (self.string() or self.skip(_BARE)):
-                return
-            part = self.text[start : self.at]
-            yield (part[1:-1] if part[0] in "\"'" else part), start
-            self.skip(_SPACE)
-            if not self.take("."):
-                return
-
-    def entry(self, table: KeyPath) -> None:
-        """Read key = value."""
-        path = table
-        for part, start in self.key():
-            path += (part,)
-            self.note(path, start)
-        self.skip(_SPACE)
-        if self.take("="):
-            self.value(path)
-
-    def value(self, path: KeyPath) -> None:
-        self.skip(_SPACE)
-        if self.take("["):
-            number = 1
-            while self.skip(_BLANK) and self.at < len(self.text) and not self.take("]"):
-                before, entry = self.at, (*path, str(number))
-                self.note(entry, before)
-                self.value(entry)
-                self.skip(_BLANK)
-                number += self.take(",")
-                if self.at == before:
-                    return
-        elif self.take("{"):
-            while self.skip(_BLANK) and self.at < len(self.text) and not self.take("}"):
-                before = self.at
-                self.entry(path)
-                self.skip(_BLANK)
-                self.take(",")
-                if self.at == before:
-                    return
-        elif not self.string():
-            self.skip(_PLAIN)
-
-    def string(self) -> bool:
-        return any(self.skip(pattern) for pattern in _STRINGS)

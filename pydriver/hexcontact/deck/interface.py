@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,10 +11,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from ..arrays import Array
 from ..text import quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .table_base import Table, meaning
@@ -59,11 +58,10 @@ class FrictionKind(Kind):
 
     kind = Quantity(NUMBER, at_least=0, infinite=True)
 
-    def _expected(self) -> str:
-        return (
-            f'{self.kind.expected}, {{ map = "mu.nc" }}, {{ along = 0.3, across = 0.2, angle = "30 deg" }}, '
-            'or a formula of x and y in m such as "0.3 + 0.1*tanh(x/50e-6)"'
-        )
+    expected = (
+        f'{kind.expected}, {{ map = "mu.nc" }}, {{ along = 0.3, across = 0.2, angle = "30 deg" }}, '
+        'or a formula of x and y in m such as "0.3 + 0.1*tanh(x/50e-6)"'
+    )
 
     def written(self, value: float | NodalCoefficient | TwoCoefficients) -> Any:
         """Return the number, text or table of a deck."""
@@ -88,7 +86,11 @@ class FrictionKind(Kind):
         if keys == {"map"} and isinstance(name, str) and name:
             return NodalCoefficient(Path(name), dict(value))
         if keys == set(_GRID):
-            return NodalCoefficient(_grid(value), dict(value))
+            with contextlib.suppress(TypeError, ValueError):
+                x, y, values = (np.asarray(value[key], float) for key in _GRID)
+                if x.ndim == y.ndim == 1 and values.shape == (x.size, y.size):
+                    return NodalCoefficient((x, y, values), dict(value))
+            refuse("expected numbers x and y (m), and values, an array over y for each x")
         if {"along", "across"} <= keys <= {"along", "across", "angle"}:
             number = Quantity(NUMBER, above=0)
             try:
@@ -99,7 +101,9 @@ class FrictionKind(Kind):
             return along if along == across else TwoCoefficients(along, across, angle)
         refuse(f"expected {self.expected}")
 
-    def _schema(self) -> Schema:
+    @property
+    def schema(self) -> Schema:  # type: ignore[override]
+        """A number, a formula, or one of the tables."""
         file = {"type": "string", "description": "netCDF file of one variable over x and y"}
         above = {"type": "number", "exclusiveMinimum": 0}
         numbers = {"type": "array", "items": {"type": "number"}}
@@ -123,18 +127,6 @@ class FrictionKind(Kind):
         return {"anyOf": kinds, "description": description}
 
 
-def _grid(value: Mapping[str, Any]) -> tuple[Array, Array, Array]:
-    """Return the points (m) and values of a map in a deck."""
-    expected = "expected numbers x and y (m), and values, an array over y for each x"
-    try:
-        x, y, values = (np.asarray(value[key], float) for key in _GRID)
-    except (TypeError, ValueError):
-        refuse(expected)
-    if x.ndim != 1 or y.ndim != 1 or values.shape != (x.size, y.size):
-        refuse(expected)
-    return x, y, values
-
-
 def _is_pure(text: str) -> bool:
     try:
         to_si(text, NUMBER)
@@ -153,7 +145,8 @@ def stiffness(exponent: float) -> Dimension:
     return Dimension(f"a coefficient in {unit}", unit, f'"1e15 {unit}"')
 
 
-_Stiffness = Annotated[float, PowerCoefficient("Pa/m^m", '"1e15 Pa/m^2"')]
+_Stiffness = Annotated[float, PowerCoefficient("Pa/m^m", stiffness, "exponent")]
+_FrictionStiffness = Annotated[float, PowerCoefficient("Pa/m^m", stiffness, "friction_exponent", "exponent")]
 
 
 class Interface(Table):
@@ -169,7 +162,7 @@ class Interface(Table):
     friction_exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=20)] | None = meaning(
         None, "exponent m_t of its own friction limit; `exponent` if absent", "2.5"
     )
-    friction_coefficient: _Stiffness | None = meaning(
+    friction_coefficient: _FrictionStiffness | None = meaning(
         None,
         "coefficient c_t of its own friction limit, ❘q❘ ≤ c_t ψ^m_t, instead of [friction]; none if absent",
         '"3e14 Pa/m^2"',
@@ -177,16 +170,6 @@ class Interface(Table):
     tangential_stiffness: Annotated[float, Quantity(stiffness(1.0), above=0, any_size=True)] | None = meaning(
         None, "stiffness k_T of tangential springs in series with the slip; none if absent", '"1e14 Pa/m"'
     )
-
-    @field_validator("coefficient", "friction_coefficient")
-    @classmethod
-    def _to_si(cls, value: object, info: ValidationInfo) -> float | None:
-        exponent = info.data.get("exponent")
-        if info.field_name == "friction_coefficient":
-            exponent = info.data.get("friction_exponent", math.nan) or exponent
-        if exponent is None or math.isnan(exponent) or value is None:  # wrong, and reported itself
-            return None if value is None else 0.0
-        return Quantity(stiffness(exponent), above=0, any_size=True).parse(value)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

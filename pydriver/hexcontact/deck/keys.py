@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, get_origin
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, ValidationError, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
 from ..variables import BULK_STRESS, FIELDS, LOADS
 from .below import Fatigue, Stress
@@ -37,7 +36,7 @@ from .kinds import (
 )
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
-from .table_base import Table, extended, kind_of, meaning, parts_of, problems_of
+from .table_base import Table, extended, meaning, problems_of
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, Dimension
 
 ALGORITHMS = ("frictionless", "static", "incremental")
@@ -207,8 +206,9 @@ class Solver(Table):
 class Fractions(Several):
     """Fractions of a segment, rising to 1."""
 
-    def _expected(self) -> str:
-        return f"fractions of the segment, rising to 1, such as {self.example}"
+    def __init__(self, kind: Quantity, example: str) -> None:
+        super().__init__(kind, "", example)
+        self.expected = f"fractions of the segment, rising to 1, such as {example}"
 
     def _parse(self, value: object) -> tuple[float, ...]:
         fractions = super()._parse(value)
@@ -216,8 +216,10 @@ class Fractions(Several):
             refuse(f"expected {self.expected}")
         return fractions
 
-    def _schema(self) -> Schema:
-        return super()._schema() | {"uniqueItems": True}
+    @property
+    def schema(self) -> Schema:  # type: ignore[override]
+        """An array of different numbers."""
+        return super().schema | {"uniqueItems": True}
 
 
 def _annotation(name: str, kind: Quantity) -> Any:
@@ -254,8 +256,7 @@ class Segment(_Driven):
         "linear", "cubic: the cube root of normal_load grows evenly, all else linearly"
     )
     values: (
-        Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "", "[0.1, 0.4, 1]")]
-        | None
+        Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "[0.1, 0.4, 1]")] | None
     ) = meaning(None, "fraction of the segment done at the end of each step, instead of `ramp`")
     label: Annotated[str, Text()] = meaning("", "name of the segment in the result", '"press"')
 
@@ -420,46 +421,28 @@ class Deck(Table):
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Mistake]]:
         """Return the valid tables of a deck and its mistakes."""
-        if data.keys() <= cls.model_fields.keys():
-            # Each table alone: pydantic need not build the models of tables that the deck does not have.
-            with suppress(ValidationError, PydanticCustomError, LookupError):
-                return {
-                    name: _reader(name)(data[name]) if name in data or info.is_required() else _absent(info)
-                    for name, info in cls.model_fields.items()
-                }, []
-        try:
-            return dict(cls.model_validate(data)), []
-        except ValidationError as error:
-            problems = problems_of(error)
-        faulty = {problem.key[0] for problem in problems if problem.key}
-        tables = {}
+        tables: dict[str, Any] = {}
+        info: Any
         for name, info in cls.model_fields.items():
-            if name in data and name not in faulty:
-                with suppress(ValidationError):  # an absent key of another table, which is reported
+            if name not in data and not info.is_required():
+                # `get_default` of pydantic takes longer
+                tables[name] = info.default if info.default_factory is None else info.default_factory()
+            elif name in data:
+                # Each table alone: pydantic need not build the models of tables that the deck does not have.
+                with suppress(ValidationError):
                     tables[name] = _reader(name)(data[name])
-            elif name not in faulty:
-                tables[name] = _absent(info)
-        return tables, problems
-
-
-def _absent(info: Any) -> Any:
-    """Return the value of a table that a deck does not have; `get_default` of pydantic takes longer."""
-    return info.default if info.default_factory is None else info.default_factory()
+        if tables.keys() == cls.model_fields.keys() >= data.keys():
+            return tables, []
+        try:
+            cls.model_validate(data)
+        except ValidationError as error:
+            return tables, problems_of(error)
+        return tables, []
 
 
 @functools.cache
 def _reader(name: str) -> Callable[[Any], Any]:
-    """Return the function that checks one table of a deck, and raises an error if anything is wrong."""
+    """Return the function that checks one table of a deck."""
     info = Deck.model_fields[name]
-    if kind := kind_of(info):
-        return kind.parse
-    (table,) = (part for part in parts_of(info.annotation) if issubclass(part, Table))
-    if get_origin(info.annotation) is not list:
-        return table.model_validate
-
-    def entries(value: Any) -> list[Table]:
-        if not isinstance(value, list) or not value:
-            raise LookupError(name)
-        return [table.model_validate(entry) for entry in value]
-
-    return entries
+    whole: Any = Annotated[info.annotation, info]
+    return TypeAdapter(whole).validate_python

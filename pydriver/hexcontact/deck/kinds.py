@@ -8,12 +8,13 @@ import functools
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, NoReturn, TypeGuard, TypeVar
+from typing import Any, ClassVar, Generic, NoReturn, TypeVar
 
 import numpy as np
+from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from ..arrays import Array
@@ -42,9 +43,12 @@ _OVER_ARRAYS: dict[Callable[..., float], Callable[..., Any]] = {
     min: lambda *values: functools.reduce(np.minimum, values),
     max: lambda *values: functools.reduce(np.maximum, values),
     math.pow: np.power,
+    float: np.float64,  # 1/0 of arrays is infinite
 }
 _NAME = r"(?<![\w.])[^\W\d]\w*+(?:\.\w++)*+(?!\s*\()"
 _LONGEST = 300  # characters; the parser and the evaluation need stack for each level of parentheses
+_Term = Callable[[Mapping[str, Any], Mapping[Callable[..., float], Any]], Any]
+"""A part of a formula: its value by the values of names, and the functions that stand for those of `math`."""
 
 
 class Formula:
@@ -54,47 +58,50 @@ class Formula:
     """
 
     def __init__(self, text: str) -> None:
-        found: dict[str, str] = {}
-
-        def symbol(match: re.Match[str]) -> str:
-            return found.setdefault(match[0], f"_{len(found)}")
-
+        symbols: dict[str, str] = {}  # by name: identifiers of Python
         try:
             if len(text) > _LONGEST:
                 raise ValueError
-            self._tree = ast.parse(re.sub(_NAME, symbol, text.strip()), mode="eval").body
-            self._names = {symbol: name for name, symbol in found.items()}
-            self._checked(self._tree)
+            spelt = re.sub(_NAME, lambda name: symbols.setdefault(name[0], f"_{len(symbols)}"), text.strip())
+            self._names = {symbol: name for name, symbol in symbols.items()}
+            self._term = self._read(ast.parse(spelt, mode="eval").body)
         except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):
             known = ", ".join(FUNCTIONS)
             raise ValueError(f"a formula of numbers, names, + - * / ** ( ) and {known}") from None
-        self.names = tuple(name for name in found if name not in _CONSTANTS)
+        self.names = tuple(name for name in symbols if name not in _CONSTANTS)
+        self._text = text
 
-    def _checked(self, node: ast.AST) -> None:
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        return Formula, (self._text,)
+
+    def _read(self, node: ast.AST) -> _Term:
+        """Return the term of a node of the tree; ValueError for anything but arithmetic."""
+        function: Callable[..., float]
         match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                float(number)  # OverflowError beyond its range
-                return
-            case ast.Name(id=name) if name in self._names:
-                return
-            case ast.UnaryOp() if type(node.op) in _OPERATORS:
-                parts: list[ast.expr] = [node.operand]
-            case ast.BinOp() if type(node.op) in _OPERATORS:
-                parts = [node.left, node.right]
-            case ast.Call(func=ast.Name(id=name), keywords=[]) if name in FUNCTIONS:
-                parts = node.args
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                number = float(value)  # OverflowError beyond its range
+                return lambda values, over: over.get(float, float)(number)
+            case ast.Name(id=symbol) if symbol in self._names:
+                name = self._names[symbol]
+                return lambda values, over: _CONSTANTS[name] if name in _CONSTANTS else values[name]
+            case ast.UnaryOp(op=of, operand=operand) if type(of) in _OPERATORS:
+                function, parts = _OPERATORS[type(of)], [operand]
+            case ast.BinOp(op=of, left=left, right=right) if type(of) in _OPERATORS:
+                function, parts = _OPERATORS[type(of)], [left, right]
+            case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in FUNCTIONS:
+                function = FUNCTIONS[name]
                 # numpy takes a further argument as the array for the values of a function.
                 if not 1 + (_MOST.get(name) == math.inf) <= len(parts) <= _MOST.get(name, 1):
                     raise ValueError
             case _:
                 raise ValueError
-        for part in parts:
-            self._checked(part)
+        terms = [self._read(part) for part in parts]
+        return lambda values, over: over.get(function, function)(*[term(values, over) for term in terms])
 
     def value(self, numbers: Mapping[str, float]) -> float:
         """Return the value for the numbers of its names."""
         try:
-            found = float(self._evaluated(self._tree, numbers, {}))
+            found = float(self._term(numbers, {}))
         except (ArithmeticError, TypeError, ValueError) as error:
             raise ValueError(f"has no value here: {error}") from None
         if not math.isfinite(found):
@@ -104,26 +111,7 @@ class Formula:
     def over(self, **arrays: Array) -> Array:
         """Return the values over arrays of its names; NaN or infinite where there are none."""
         with np.errstate(all="ignore"):
-            return np.asarray(self._evaluated(self._tree, arrays, _OVER_ARRAYS), float)
-
-    def _evaluated(
-        self, node: Any, values: Mapping[str, Any], replaced: Mapping[Callable[..., float], Any]
-    ) -> Any:
-        """Return the value of a node of the tree, with some functions replaced."""
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return np.float64(number) if replaced else float(number)  # 1/0 of arrays is infinite
-            case ast.Name():
-                name = self._names[node.id]
-                return _CONSTANTS[name] if name in _CONSTANTS else values[name]
-            case ast.UnaryOp():
-                function, parts = _OPERATORS[type(node.op)], [node.operand]
-            case ast.BinOp():
-                function, parts = _OPERATORS[type(node.op)], [node.left, node.right]
-            case _:
-                function, parts = FUNCTIONS[node.func.id], node.args
-        arguments = [self._evaluated(part, values, replaced) for part in parts]
-        return replaced.get(function, function)(*arguments)
+            return np.asarray(self._term(arrays, _OVER_ARRAYS), float)
 
 
 Schema = dict[str, Any]
@@ -144,10 +132,11 @@ _SHARE = rf"([+-]?{DIGITS})\s*(?:\*\s*)?(?:mu|[\u00b5\u03bc])\s*(?:\*\s*)?P"  # 
 class Kind:
     """A kind of value, for annotations ``Annotated[float, kind]``."""
 
-    @property
-    def expected(self) -> str:
-        """Description of a value of this kind, to follow the word "expected"."""
-        return self._expected()
+    expected: str
+    """Description of a value, to follow the word "expected"."""
+
+    schema: Schema
+    """JSON schema of the kind; without it any value."""
 
     def parse(self, value: object) -> Any:
         """Return the value of an entry of a deck, or `refuse` it."""
@@ -157,18 +146,8 @@ class Kind:
         """Return a parsed value as a deck holds it."""
         return value
 
-    def schema(self) -> Schema:
-        """Return the JSON schema of the kind."""
-        return self._schema()
-
-    def _expected(self) -> str:
-        raise NotImplementedError
-
     def _parse(self, value: object) -> Any:
-        raise NotImplementedError
-
-    def _schema(self) -> Schema:
-        return {}
+        return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         """Validate with `parse`."""
@@ -176,7 +155,7 @@ class Kind:
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
         """Describe with `schema`."""
-        return self.schema()
+        return getattr(self, "schema", {})
 
 
 class Read(Generic[_Value, _Given]):
@@ -188,61 +167,38 @@ class Read(Generic[_Value, _Given]):
     def __set__(self, table: object, value: _Given) -> None: ...
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Quantity(Kind):
     """A finite number with a dimension and bounds, in SI once read.
 
     `infinite` admits +inf; `any_size` also admits values beyond those of lengths, forces and moduli.
     """
 
-    dimension: Dimension
-    above: float | None = None
-    at_least: float | None = None
-    at_most: float | None = None
-    infinite: bool = False
-    any_size: bool = False
-
-    def _expected(self) -> str:
+    def __init__(
+        self,
+        dimension: Dimension,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        at_most: float = math.inf,
+        infinite: bool = False,
+        any_size: bool = False,
+    ) -> None:
+        self.dimension, self.infinite, self.any_size = dimension, infinite, any_size
+        self.above, self.at_least, self.at_most = above, at_least, at_most
         limits = [
-            f"{word} {bound:g} {self.dimension.unit if bound else ''}".strip()
-            for word, bound in (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
-            if bound is not None
+            f"{word} {bound:g} {dimension.unit if bound else ''}".strip()
+            for word, bound in (("above", above), ("at least", at_least), ("at most", at_most))
+            if math.isfinite(bound)
         ]
-        if limits and not limits[0].startswith("above"):
-            limits[0] = f"of {limits[0]}"
-        example = "" if self.dimension is NUMBER else f" such as {self.dimension.example}"
-        infinite = " (or inf)" if self.infinite else ""
-        return " ".join([self.dimension.name, " and ".join(limits)]).strip() + infinite + example
+        of = "of " if limits and math.isinf(above) else ""
+        known = f"{dimension.name} {of}{' and '.join(limits)}".strip() + " (or inf)" * infinite
+        self.expected = known if dimension is NUMBER else f"{known} such as {dimension.example}"
 
-    def _parse(self, value: object) -> float:
-        try:
-            number = to_si(value, self.dimension)
-        except UnitError as error:
-            refuse(f"expected {self.expected}" + (f"; {error}" if str(error) else ""))
-        if not (math.isfinite(number) or (self.infinite and number == math.inf)):
-            refuse(f"expected {self.expected}, a finite number")
-        inside = (
-            (self.above is None or number > self.above)
-            and (self.at_least is None or number >= self.at_least)
-            and (self.at_most is None or number <= self.at_most)
-        )
-        if not inside:
-            refuse(f"expected {self.expected}")
-        if not self.any_size and LARGEST < abs(number) < math.inf:
-            refuse(f"expected {self.expected}, not above {LARGEST:g} in SI")
-        if not self.any_size and self.above == 0 and number < SMALLEST:
-            refuse(f"expected {self.expected}, not below {SMALLEST:g} in SI")
-        return number
-
-    def written(self, value: float) -> float | str:
-        """Return a number in SI, with its unit if the dimension requires one."""
-        return f"{value!r} rad" if self.dimension is ANGLE else value
-
-    def _schema(self) -> Schema:
+    @property
+    def schema(self) -> Schema:  # type: ignore[override]
+        """A number in SI, or a text with a unit."""
         bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
-        number = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-        least = self.above if self.above is not None else self.at_least
-        sign = r"\+?" if least is not None and least >= 0 else "[+\u2212-]?"
+        number = {"type": "number"} | {key: bound for key, bound in bounds.items() if math.isfinite(bound)}
+        sign = r"\+?" if max(self.above, self.at_least) >= 0 else "[+\u2212-]?"
         text = {"type": "string", "pattern": rf"^\s*{sign}{DIGITS}\s*[^\s\d.+-].*$"}
         known: Schema = {"description": self.expected[0].upper() + self.expected[1:]}
         if self.dimension is NUMBER:
@@ -253,22 +209,46 @@ class Quantity(Kind):
         known["description"] += f"; a bare number is in {self.dimension.unit}"
         return {"anyOf": [text, number], **known}
 
+    def written(self, value: float) -> float | str:
+        """Return a number in SI, with its unit if the dimension requires one."""
+        return f"{value!r} rad" if self.dimension is ANGLE else value
 
-@dataclass(frozen=True, eq=False, repr=False)
+    def _parse(self, value: object) -> float:
+        try:
+            number = to_si(value, self.dimension)
+        except UnitError as error:
+            refuse(f"expected {self.expected}" + (f"; {error}" if str(error) else ""))
+        if not (math.isfinite(number) or (self.infinite and number == math.inf)):
+            refuse(f"expected {self.expected}, a finite number")
+        if not (self.above < number and self.at_least <= number <= self.at_most):
+            refuse(f"expected {self.expected}")
+        if not self.any_size and LARGEST < abs(number) < math.inf:
+            refuse(f"expected {self.expected}, not above {LARGEST:g} in SI")
+        if not self.any_size and self.above == 0 and number < SMALLEST:
+            refuse(f"expected {self.expected}, not below {SMALLEST:g} in SI")
+        return number
+
+
 class PowerCoefficient(Kind):
-    """A coefficient above 0 of a power law, which its table parses in a unit that depends on the exponent."""
+    """A coefficient above 0 of a power law, in a unit that follows from the exponent.
 
-    unit: str
-    example: str
+    That is the first of some keys of its table that has a value.
+    """
 
-    def _expected(self) -> str:
-        return f"a coefficient above 0 in {self.unit} such as {self.example}"
+    def __init__(self, unit: str, dimension: Callable[[float], Dimension], *exponents: str) -> None:
+        self.unit, self._dimension, self._exponents = unit, dimension, exponents
+        self.expected = f"a coefficient above 0 in {unit} such as {dimension(2.0).example}"
+        self.schema = {"type": ["number", "string"], "description": self.expected}
 
-    def _parse(self, value: object) -> Any:
-        return value
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Validate when the exponents are known."""
+        return core_schema.with_info_plain_validator_function(self._of_table)
 
-    def _schema(self) -> Schema:
-        return {"type": ["number", "string"], "description": self.expected}
+    def _of_table(self, value: object, info: ValidationInfo) -> float:
+        known = [info.data.get(key, math.nan) for key in self._exponents]  # NaN: wrong, and reported itself
+        exponent = next(number for number in known if number is not None)
+        dimension = self._dimension(exponent)
+        return 0.0 if math.isnan(exponent) else Quantity(dimension, above=0, any_size=True).parse(value)
 
 
 @dataclass(frozen=True)
@@ -281,15 +261,17 @@ class Share:
         return f"{self.share!r} mu P"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class OrShare(Kind):
     """A force, or a share of the limit of friction."""
 
-    kind: Quantity
+    def __init__(self, kind: Quantity) -> None:
+        measured, self.kind = kind.dimension, kind
+        self.expected = f'{measured.name}, or a share of mu P, such as {measured.example} or "0.6 mu P"'
+        self.schema = kind.schema | {"examples": ["10 N", "0.6 mu P"]}
 
-    def _expected(self) -> str:
-        measured = self.kind.dimension
-        return f'{measured.name}, or a share of mu P, such as {measured.example} or "0.6 mu P"'
+    def written(self, value: float | Share) -> float | str:
+        """Return newtons, or the share as text."""
+        return str(value) if isinstance(value, Share) else self.kind.written(value)
 
     def _parse(self, value: object) -> float | Share:
         if isinstance(value, Share):
@@ -303,23 +285,14 @@ class OrShare(Kind):
         except PydanticCustomError as error:
             refuse(error.message().replace(self.kind.expected, self.expected, 1))
 
-    def written(self, value: float | Share) -> float | str:
-        """Return newtons, or the share as text."""
-        return str(value) if isinstance(value, Share) else self.kind.written(value)
 
-    def _schema(self) -> Schema:
-        return self.kind.schema() | {"examples": ["10 N", "0.6 mu P"]}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class Whole(Kind):
     """A whole number between two bounds."""
 
-    at_least: int
-    at_most: int = 10**9
-
-    def _expected(self) -> str:
-        return f"a whole number of at least {self.at_least}"
+    def __init__(self, at_least: int, at_most: int = 10**9) -> None:
+        self.at_least, self.at_most = at_least, at_most
+        self.expected = f"a whole number of at least {at_least}"
+        self.schema = {"type": "integer", "minimum": at_least, "maximum": at_most}
 
     def _parse(self, value: object) -> int:
         try:
@@ -332,41 +305,30 @@ class Whole(Kind):
             refuse(f"expected a whole number of at most {self.at_most}")
         return number
 
-    def _schema(self) -> Schema:
-        return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
 
-
-@dataclass(frozen=True, eq=False, repr=False)
 class Word(Kind):
     """One of several words."""
 
-    words: tuple[str, ...]
-
-    def _expected(self) -> str:
-        return listed([f'"{word}"' for word in self.words], "or")
+    def __init__(self, words: tuple[str, ...]) -> None:
+        self.words, self.schema = words, {"enum": list(words)}
+        self.expected = listed([f'"{word}"' for word in words], "or")
 
     def _parse(self, value: object) -> str:
         if not isinstance(value, str) or value not in self.words:
             refuse(f"expected {self.expected}{did_you_mean(value, self.words)}")
         return value
 
-    def _schema(self) -> Schema:
-        return {"enum": list(self.words)}
-
 
 class Text(Kind):
     """Any text."""
 
-    def _expected(self) -> str:
-        return "text in quotes"
+    expected = "text in quotes"
+    schema: ClassVar[Schema] = {"type": "string"}  # type: ignore[misc]
 
     def _parse(self, value: object) -> str:
         if not isinstance(value, str) or re.search("[\ud800-\udfff]", value):  # unpaired surrogates
             refuse(f"expected {self.expected}")
         return value
-
-    def _schema(self) -> Schema:
-        return {"type": "string"}
 
 
 class FileName(Text):
@@ -395,8 +357,7 @@ def formula_over_plane(text: str, expected: str) -> Formula:
 class HeightFormula(Text):
     """A formula of x and y, as text."""
 
-    def _expected(self) -> str:
-        return 'a formula of x and y in m such as "min((x - 1e-4)**2, (x + 1e-4)**2)/2e-2 + y**2/2e-2"'
+    expected = 'a formula of x and y in m such as "min((x - 1e-4)**2, (x + 1e-4)**2)/2e-2 + y**2/2e-2"'
 
     def _parse(self, value: object) -> str:
         text = super()._parse(value)
@@ -407,16 +368,11 @@ class HeightFormula(Text):
 class Flag(Kind):
     """True or false."""
 
-    def _expected(self) -> str:
-        return "true or false"
+    expected = "true or false"
+    schema: ClassVar[Schema] = {"type": "boolean"}  # type: ignore[misc]
 
     def _parse(self, value: object) -> bool:
-        if not isinstance(value, bool):
-            refuse(f"expected {self.expected}")
-        return value
-
-    def _schema(self) -> Schema:
-        return {"type": "boolean"}
+        return value if isinstance(value, bool) else refuse(f"expected {self.expected}")
 
 
 class RadiusOfCurvature(Quantity):
@@ -433,24 +389,42 @@ class RadiusOfCurvature(Quantity):
             raise
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Several(Kind):
-    """An array of values of one kind: `count` of them, or at least one."""
+    """An array of values of one kind: `count` of them, or at least one.
 
-    kind: Kind
-    plural: str  # noun for them
-    example: str  # an array as in a deck
-    count: int | None = None
-    fault_of: Callable[[Any], str] = lambda _: ""  # sentence about values that do not fit together
+    `plural` is the noun for them, `example` an array as in a deck; `fault_of` returns a sentence about values
+    that do not fit together.
+    """
 
-    def _expected(self) -> str:
-        number = {None: "an array of", 2: "two", 3: "three"}[self.count]
-        return f"{number} {self.plural} such as {self.example}"
+    def __init__(
+        self,
+        kind: Kind,
+        plural: str,
+        example: str,
+        count: int | None = None,
+        fault_of: Callable[[Any], str] = lambda _: "",
+    ) -> None:
+        self.kind, self.example, self.count, self.fault_of = kind, example, count, fault_of
+        number = {None: "an array of", 2: "two", 3: "three"}[count]
+        self.expected = f"{number} {plural} such as {example}"
+
+    @property
+    def schema(self) -> Schema:  # type: ignore[override]
+        """An array of the values."""
+        most = {"maxItems": self.count} if self.count else {}
+        items = getattr(self.kind, "schema", {})
+        return {"type": "array", "items": items, "minItems": self.count or 1, **most}
+
+    def written(self, value: Any) -> list[Any]:
+        """Return the entries."""
+        return [self.kind.written(entry) for entry in value]
 
     def _parse(self, value: object) -> tuple[Any, ...]:
-        if isinstance(value, str | bytes | Mapping) or not _is_array(value):
+        # an array: a list, a tuple, or an array of numpy
+        sized = hasattr(value, "__getitem__") and hasattr(value, "__len__")
+        if isinstance(value, str | bytes | Mapping) or not sized or getattr(value, "shape", (1,)) == ():
             refuse(f"expected {self.expected}")
-        entries = list(value)
+        entries: list[Any] = list(value)  # type: ignore[call-overload]
         if not entries or self.count not in (None, len(entries)):
             refuse(f"expected {self.expected}")
         parsed = []
@@ -463,38 +437,20 @@ class Several(Kind):
             refuse(fault)
         return tuple(parsed)
 
-    def written(self, value: Any) -> list[Any]:
-        """Return the entries."""
-        return [self.kind.written(entry) for entry in value]
 
-    def _schema(self) -> Schema:
-        most = {"maxItems": self.count} if self.count else {}
-        return {"type": "array", "items": self.kind.schema(), "minItems": self.count or 1, **most}
-
-
-def _is_array(value: object) -> TypeGuard[Iterable[Any]]:
-    """Return whether a value is an array: a list, a tuple, or an array of numpy."""
-    return hasattr(value, "__getitem__") and hasattr(value, "__len__") and getattr(value, "shape", (1,)) != ()
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class WordOr(Kind):
     """One fixed word, or a value of another kind."""
 
-    word: str
-    kind: Kind
-
-    def _expected(self) -> str:
-        return f'"{self.word}" or {self.kind.expected}'
-
-    def _parse(self, value: object) -> Any:
-        if isinstance(value, str):
-            return value if value == self.word else refuse(f"expected {self.expected}")
-        return self.kind.parse(value)
+    def __init__(self, word: str, kind: Kind) -> None:
+        self.word, self.kind = word, kind
+        self.expected = f'"{word}" or {kind.expected}'
+        self.schema = {"anyOf": [{"const": word}, kind.schema]}
 
     def written(self, value: Any) -> Any:
         """Return the word, or the value."""
         return value if value == self.word else self.kind.written(value)
 
-    def _schema(self) -> Schema:
-        return {"anyOf": [{"const": self.word}, self.kind.schema()]}
+    def _parse(self, value: object) -> Any:
+        if isinstance(value, str):
+            return value if value == self.word else refuse(f"expected {self.expected}")
+        return self.kind.parse(value)

@@ -23,7 +23,7 @@ from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .interface import FROM_PYTHON
 from .keys import Deck
 from .series import Series, read_series
-from .surfaces import Separation, Surface
+from .surfaces import Flat, Separation, Surface
 from .toml import parse_toml, read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
@@ -68,7 +68,7 @@ def assemble(
         refuse_deep(merged, source.name)
     source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included))
     merged = copy.deepcopy(merged)
-    for table, key in _named_files(merged):
+    for table, key, _ in _named_files(merged):
         if key == "map":  # read when the case is built, from any folder
             table[key] = str((folder / table[key]).absolute())
     return Assembled(merged, None, source, list(_read_series(merged, folder)))
@@ -105,7 +105,7 @@ def _merged(
         sizes.append(len(text))
         below = Source(str(path), text)
         inner, further = _merged(tables, below, path.parent, (*chain, path.resolve()), sizes)
-        for table, key in _named_files(inner):  # relative to the file that names them
+        for table, key, _ in _named_files(inner):  # relative to the file that names them
             table[key] = os.path.relpath(path.parent / table[key], folder)
         beneath = _over(inner, beneath)
         files = [(str(path), text), *further, *files]
@@ -124,27 +124,19 @@ def _over(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _series_with_files(data: Mapping[str, Any]) -> Iterator[tuple[int, Any]]:
-    """Yield the index of each entry of [[load]] whose series is a file, and the series."""
+def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str, int]]:
+    """Yield the tables that name files, their keys, and the indices of their entries of [[load]]."""
     loads = data.get("load")
-    for number, load in enumerate(loads if isinstance(loads, list) else ()):
-        series = load.get("series") if isinstance(load, Mapping) else None
-        if isinstance(series, dict) and isinstance(series.get("file"), str):
-            yield number, series
-
-
-def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str]]:
-    """Yield the tables that name files, and their keys."""
-    yield from ((series, "file") for _, series in _series_with_files(data))
-    friction = data.get("friction")
-    coefficient = friction.get("coefficient") if isinstance(friction, Mapping) else None
-    if isinstance(coefficient, dict) and isinstance(coefficient.get("map"), str) and coefficient["map"]:
-        yield coefficient, "map"
+    places = [(load, "series", "file") for load in (loads if isinstance(loads, list) else ())]
+    for number, (outer, name, key) in enumerate([*places, (data.get("friction"), "coefficient", "map")]):
+        table = outer.get(name) if isinstance(outer, Mapping) else None
+        if isinstance(table, dict) and isinstance(table.get(key), str) and (table[key] or key == "file"):
+            yield table, key, number
 
 
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
     """Replace the names of files by their rows, and yield the mistakes in them."""
-    found = list(_series_with_files(data))
+    found = [(number, table) for table, key, number in _named_files(data) if key == "file"]
     if len(found) > MOST_SERIES:
         raise DeckError(f"load: expected at most {MOST_SERIES} files of series")
     for number, series in found:
@@ -207,8 +199,8 @@ class RecordedDeck:
     @property
     def only_surface(self) -> Surface | None:
         """The surface of a body on a flat one; None if there is none, or both have one."""
-        bodies = None if "surface" in self.given else self.tables("body").get("body")
-        curved = [body.surface for body in (bodies.body_1, bodies.body_2) if body.surface] if bodies else []
+        gap = self.separation
+        curved = [one for one in (gap.surface_1, gap.surface_2) if not isinstance(one, Flat)] if gap else []
         return curved[0] if len(curved) == 1 else None
 
 

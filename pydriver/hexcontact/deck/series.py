@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -20,7 +19,7 @@ from ..errors import DeckError
 from ..files import is_defect, require_ordinary, text_of
 from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
-from .kinds import Kind, Quantity, Schema, Several, Text, refuse
+from .kinds import Kind, Quantity, Several, Text, refuse
 from .table_base import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
@@ -98,14 +97,12 @@ MOST_STEPS = 100_000
 # --- the table ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class OrEmpty(Kind):
     """A value, or "" in rows without it."""
 
-    kind: Kind
-
-    def _expected(self) -> str:
-        return self.kind.expected
+    def __init__(self, kind: Kind) -> None:
+        self.kind, self.expected = kind, kind.expected
+        self.schema = {"anyOf": [{"const": ""}, kind.schema]}
 
     def _parse(self, value: object) -> Any:
         return None if value is None or value == "" else self.kind.parse(value)
@@ -113,9 +110,6 @@ class OrEmpty(Kind):
     def written(self, value: Any) -> Any:
         """Return the value, or ""."""
         return "" if value is None else self.kind.written(value)
-
-    def _schema(self) -> Schema:
-        return {"anyOf": [{"const": ""}, self.kind.schema()]}
 
 
 _Header = Annotated[str, Text()] | None
@@ -238,8 +232,11 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     problems: list[str] = []
     for key, column in chosen.items():
         series[key] = []
-        if key != "label" and column.unit and (fault := _unit_fault(key, column.unit)):
-            problems.append(f"{path}, column {shown(column.header)}: {fault}")
+        try:  # once instead of in each row
+            if key != "label" and column.unit:
+                DRIVEN[key].kind.parse(f"1 {column.unit}")
+        except PydanticCustomError as error:
+            problems.append(f"{path}, column {shown(column.header)}: {error.message()}")
             continue
         for line, cell in zip(lines, column.cells, strict=True):
             try:
@@ -258,15 +255,6 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     return series
 
 
-def _unit_fault(key: str, unit: str) -> str:
-    """Return the fault of the unit of a column, once instead of in each row."""
-    try:
-        DRIVEN[key].kind.parse(f"1 {unit}")
-    except PydanticCustomError as error:
-        return error.message()
-    return ""
-
-
 def _noise(cells: Sequence[Any], cell: Any) -> str:
     """Return the remedy for a small normal load below 0."""
     numbers = [number for number in map(_number, map(str, cells)) if number is not None]
@@ -277,26 +265,21 @@ def _noise(cells: Sequence[Any], cell: Any) -> str:
 
 
 def _value(key: str, cell: Any, unit: str) -> Any:
-    if isinstance(cell, str) and cell.lower() in _MISSING:
-        return ""
-    kind = DRIVEN[key].kind
     if isinstance(cell, str):
-        cell = spelled(cell)
-        if re.fullmatch(_THOUSANDS, cell):
+        if cell.lower() in _MISSING:
+            return ""
+        text = cell = spelled(cell)
+        if re.fullmatch(_THOUSANDS, text):
             refuse("expected a number without separators of thousands")
-        if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):
+        if re.fullmatch(r"[+-]?[\d.]+,\d+", text):
             refuse("expected a decimal point, not a comma")
-        number = _number(cell)
-        if number is None and unit and _number(cell.split()[0] if cell.split() else "") is not None:
+        if (number := _number(text)) is not None:
+            cell = re.sub(_FORTRAN_EXPONENT, "e", text) if unit else number
+        elif unit and _number([*text.split(), ""][0]) is not None:
             refuse(f"expected a number without a unit, since the header has the unit [{unit}]")
-        if number is None:
-            quantity: Any = cell
         else:
-            quantity = f"{re.sub(_FORTRAN_EXPONENT, 'e', cell)} {unit}" if unit else number
-    else:
-        quantity = f"{cell!r} {unit}" if unit else cell
-    value = kind.parse(quantity)
-    return f"{value!r} rad" if kind.dimension is ANGLE else value
+            unit = ""  # it has its own
+    return DRIVEN[key].kind.written(DRIVEN[key].kind.parse(f"{cell} {unit}" if unit else cell))
 
 
 def _number(text: str) -> float | None:
@@ -449,7 +432,10 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
                 name: variable.shape[0]
                 for name, variable in file.variables.items()
                 if name not in file.dimensions
-                and ((variable.ndim == 1 and _is_readable(variable.dtype)) or _is_text(variable))
+                and (
+                    (variable.ndim == 1 and getattr(variable.dtype, "kind", "U") in "iufU")
+                    or _is_text(variable)
+                )
             }
             longest = max(lengths.values(), default=0)
             count = next((lengths[key] for key in DRIVEN if key in lengths), longest)
@@ -474,11 +460,6 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
             raise
         raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
     return columns, list(range(1, count + 1))
-
-
-def _is_readable(dtype: Any) -> bool:
-    """Return whether a variable of a type holds numbers or text."""
-    return dtype is str or getattr(dtype, "kind", "") in tuple("iuf")
 
 
 def _is_text(variable: Any) -> bool:

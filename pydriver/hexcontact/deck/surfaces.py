@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 from ..arrays import Array, Mask
@@ -41,6 +40,16 @@ from .table_base import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")
+
+
+def _coefficient_dimension(exponent: float) -> Dimension:
+    """Return the dimension of the coefficient of a power law, a length to the power 1 - n."""
+    power = f"{1.0 - exponent:g}"
+    if power == "0":
+        return NUMBER
+    return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
+
+
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
 if TYPE_CHECKING:
@@ -55,7 +64,7 @@ else:
     CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
     LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
     Angle = Annotated[float, Quantity(ANGLE)]
-    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')]
+    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
     Point = Annotated[
         tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
     ]
@@ -236,14 +245,6 @@ class Cone(Surface):
         return self.slope * np.hypot(x, y)
 
 
-def _coefficient_dimension(exponent: float) -> Dimension:
-    """Return the dimension of the coefficient of a power law, a length to the power 1 - n."""
-    power = f"{1.0 - exponent:g}"
-    if power == "0":
-        return NUMBER
-    return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
-
-
 @shape("power")
 class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
@@ -251,14 +252,6 @@ class Power(Surface):
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
     coefficient: Coefficient = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
-
-    @field_validator("coefficient")
-    @classmethod
-    def _to_si(cls, value: object, info: ValidationInfo) -> float:
-        if "exponent" not in info.data:  # wrong, and reported itself
-            return 0.0
-        dimension = _coefficient_dimension(info.data["exponent"])
-        return Quantity(dimension, above=0, any_size=True).parse(value)
 
     def _height(self, x: Array, y: Array) -> Array:
         return self.coefficient * np.hypot(x, y) ** self.exponent
@@ -343,8 +336,7 @@ _REFUSED = {
 class SurfaceKind(Kind):
     """A surface: one of the shapes as an inline table, or a `Surface` of Python."""
 
-    def _expected(self) -> str:
-        return 'a table such as { shape = "sphere", radius = "1 mm" }'
+    expected = 'a table such as { shape = "sphere", radius = "1 mm" }'
 
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""
@@ -419,19 +411,24 @@ class Separation:
         return x, y, float(self._sum(x, y))
 
     @cached_property
+    def curvature(self) -> Array | None:
+        """Second derivatives (1/m) of a gap that is a quadratic form; None of others."""
+        one, two = self.surface_1.curvature, self.surface_2.curvature
+        return None if one is None or two is None else one + two
+
+    @cached_property
     def quadratic(self) -> tuple[Array, tuple[float, float]] | None:
         """Second derivatives (1/m) and lowest point (m) of a gap that is a quadratic form; None of others."""
-        one, two = self.surface_1, self.surface_2
-        if one.curvature is None or two.curvature is None:
+        second = self.surface_2.curvature
+        if self.curvature is None or second is None:
             return None
-        total = one.curvature + two.curvature
-        if one.offset == two.offset:
-            return total, one.offset
+        if self.surface_1.offset == self.surface_2.offset:
+            return self.curvature, self.surface_1.offset
         # (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders; solved about o1, so that large
         # offsets cost no digits
-        apart = np.subtract(two.offset, one.offset)
-        point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
-        return total, (float(point[0]), float(point[1]))
+        apart = np.subtract(self.surface_2.offset, self.surface_1.offset)
+        point = np.linalg.pinv(self.curvature, hermitian=True) @ second @ apart + self.surface_1.offset
+        return self.curvature, (float(point[0]), float(point[1]))
 
     def _sum(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.surface_1.height(x, y) + self.surface_2.height(x, y)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NoReturn, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
@@ -66,13 +66,6 @@ def not_included(word: str) -> str:
     of_word = folded(word[:100])
     found = [name for name, words in _NOT_INCLUDED.items() if of_word.startswith(words)]
     return f"{found[0]}: not included (docs/limits.md says what is, and what to do instead)" if found else ""
-
-
-def _half_of(value: object) -> str:
-    """Return the assignment of half a diameter; empty if it is none."""
-    with contextlib.suppress(UnitError):
-        return f": {to_si(value, LENGTH) / 2.0:.12g} m"
-    return ""
 
 
 class Table(BaseModel):
@@ -183,7 +176,7 @@ class Table(BaseModel):
                 if (key, sentence) in remaining:
                     found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:
-            raise ValidationError.from_exception_data(cls.__name__, [_details(problem) for problem in found])
+            raise _error(cls.__name__, found)
         return table
 
     @classmethod
@@ -200,7 +193,9 @@ class Table(BaseModel):
             if feature := not_included(word):
                 return Mistake(key, MISSING, f"unknown key; {feature}")
             if folded(word).startswith("diameter") and (radius := cls.meant(word)):
-                sentence = f"unknown key; use {radius}, half the diameter{_half_of(value)}"
+                sentence = f"unknown key; use {radius}, half the diameter"
+                with contextlib.suppress(UnitError):
+                    sentence += f": {to_si(value, LENGTH) / 2.0:.12g} m"
                 return Mistake(key, value, sentence)
             near = cls.meant(word)
             hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"
@@ -254,7 +249,7 @@ def expectation(info: Any) -> str:
 
 def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
     """Reject one key of a table that is validated as a single value."""
-    raise ValidationError.from_exception_data("", [_details(Mistake((key,), value, sentence))])
+    raise _error("", [Mistake((key,), value, sentence)])
 
 
 def parts_of(annotation: Any) -> list[type]:
@@ -262,11 +257,14 @@ def parts_of(annotation: Any) -> list[type]:
     return [part for part in (annotation, *get_args(annotation)) if isinstance(part, type)]
 
 
-def _details(problem: Mistake) -> InitErrorDetails:
-    context = {"sentence": problem.sentence, "missing": problem.value is MISSING}
-    value = None if problem.value is MISSING else problem.value
-    error = PydanticCustomError("deck", "{sentence}", context)
-    return InitErrorDetails(type=error, loc=problem.key, input=value)
+def _error(title: str, problems: Sequence[Mistake]) -> ValidationError:
+    """Return the error of pydantic for some mistakes."""
+    details: list[InitErrorDetails] = []
+    for key, value, sentence in problems:
+        missing = value is MISSING
+        error = PydanticCustomError("deck", "{sentence}", {"sentence": sentence, "missing": missing})
+        details.append({"type": error, "loc": key, "input": None if missing else value})
+    return ValidationError.from_exception_data(title, details)
 
 
 def problems_of(error: ValidationError) -> list[Mistake]:

@@ -41,7 +41,6 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[L
         algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
         solver = solver.model_copy(update={"algorithm": algorithm})
         found += _mistakes(tables, _law_problems(tables, mu, algorithm))
-        found += _mistakes(tables, _iteration_problems(tables, algorithm))
         if "load" in tables:
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
             steps, against = load_steps(tables["load"], known, tables.get("bulk"))
@@ -71,7 +70,7 @@ def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
 
 def _law_problems(tables: Mapping[str, Any], mu: float | None, algorithm: str) -> Found:
     """Yield conflicts of the law of friction with the interface and the algorithm."""
-    friction, layer = tables["friction"], tables["interface"]
+    solver, friction, layer = tables["solver"], tables["friction"], tables["interface"]
     if friction and layer and layer.friction_coefficient is not None:
         sentence = "expected nothing, since [friction] has a coefficient; or no [friction]"
         yield ("interface", "friction_coefficient"), sentence
@@ -80,18 +79,14 @@ def _law_problems(tables: Mapping[str, Any], mu: float | None, algorithm: str) -
         yield ("friction", "coefficient"), f"expected 0, {needed}"
     if algorithm != "frictionless" and mu is None:
         yield ("friction", "coefficient"), f"missing; expected a number of at least 0 (or inf), {needed}"
-
-
-def _iteration_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
-    """Yield features that the iteration of the dissertation lacks: it is for comparison only."""
-    solver, friction, needed = tables["solver"], tables["friction"], 'since solver.iteration = "dissertation"'
     if solver.iteration == "newton":
         return
+    needed = 'since solver.iteration = "dissertation"'  # which is for comparison only
     if solver.method != "direct":
         yield ("solver", "method"), f'expected "direct", {needed}'
     elif algorithm == "frictionless":
         yield ("solver", "iteration"), 'expected "newton" without friction'
-    elif tables["interface"]:
+    elif layer:
         yield ("interface",), f"expected nothing, {needed}"
     elif friction and isinstance(friction.coefficient, TwoCoefficients):
         yield ("friction", "coefficient"), f"expected one coefficient, {needed}"
@@ -231,9 +226,9 @@ def _touching_problems(gap: Separation) -> Found:
     except DeckError as error:
         yield ("body", "2", "surface"), str(error)
         return
-    if gap.quadratic is None:
+    if gap.curvature is None:
         return
-    smaller, larger, _ = principal_curvatures(gap.quadratic[0])
+    smaller, larger, _ = principal_curvatures(gap.curvature)
     if smaller > 1e-12 * larger:
         return
     sentence = (

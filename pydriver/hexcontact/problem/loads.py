@@ -41,7 +41,7 @@ class Target(NamedTuple):
 
 
 class Ramp(NamedTuple):
-    """A segment in increments that are chosen during its solution (``steps = "auto"``)."""
+    """The way of the loads in a segment."""
 
     segment: Segment  # the segment of the deck
     start: Mapping[Motion, Target]  # target of each motion at its beginning
@@ -50,16 +50,37 @@ class Ramp(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """Largest increment, as a part of the segment."""
+        """Largest increment of chosen ones (``steps = "auto"``), as a part of the segment."""
         return 1.0 if self.segment.largest_step is None else self.segment.largest_step
 
+    def target(self, motion: Motion, fraction: float) -> Target:
+        """Return the target of a motion at a fraction of the segment."""
+        segment, start = self.segment, self.start[motion]
+        force, displacement = (getattr(segment, key) for key in LOADS[motion])
+        if force is None and displacement is None:
+            return start
+        goal = Target("displacement", displacement) if force is None else Target("force", force)
+        if fraction == 1.0:
+            return goal
+        if start.control != goal.control and not self.virgin:
+            return Target(goal.control, fraction * goal.value, 1.0 - fraction)
+        begin = start.value if start.control == goal.control else 0.0
+        if motion == "z" and segment.ramp == "cubic":
+            root = math.cbrt(begin) + fraction * (math.cbrt(goal.value) - math.cbrt(begin))
+            return Target(goal.control, root**3)
+        return Target(goal.control, begin + fraction * (goal.value - begin))
+
     def targets(self, fraction: float) -> dict[str, Any]:
-        """Return the target of each motion, and the bulk stress, at a fraction of the segment."""
-        targets: dict[str, Any] = {
-            motion: _ramp(self.segment, motion, self.start[motion], fraction, self.virgin)
-            for motion in MOTIONS
-        }
-        return targets | {"bulk": _bulk(self.segment, self.bulk, fraction)}
+        """Return the target of each motion, and the bulk stress, at a fraction of the segment.
+
+        Components of the bulk stress that the segment does not name are constant.
+        """
+        goals = [getattr(self.segment, name) for name in BULK_STRESS]
+        stress = tuple(
+            begin if goal is None else goal if fraction == 1.0 else begin + fraction * (goal - begin)
+            for begin, goal in zip(self.bulk, goals, strict=True)
+        )
+        return {motion: self.target(motion, fraction) for motion in MOTIONS} | {"bulk": stress}
 
 
 @dataclass(frozen=True)
@@ -129,11 +150,11 @@ class History:
         self.steps: list[LoadStep] = []
         self._mu = friction_coefficient
         self._overloaded: tuple[str | int, ...] = ()  # segment whose load friction cannot carry
-        self._bulk, self._stress = bulk, (0.0, 0.0, 0.0)
+        self._bulk = bulk
         self._entries: list[Load] = []
         self._count = 0
         self._segments = 0
-        self._now = START
+        self._now: Mapping[Any, Any] = {**START, "bulk": (0.0, 0.0, 0.0)}
         self._problems: dict[tuple[str | int, ...], Mistake] = {}
 
     def append(self, load: Load) -> None:
@@ -149,23 +170,21 @@ class History:
     def _run(self, stretch: _Stretch) -> None:
         """Append the load steps of a segment."""
         key, segment, label, carries_on = stretch
-        start, virgin = self._now, not self._segments
+        ramp = Ramp(segment, self._now, not self._segments, self._now["bulk"])
         self._segments += not carries_on
-        if segment.ramp == "cubic" and start["z"].control != "force":
+        if segment.ramp == "cubic" and self._now["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
             self._complain(Mistake((*key, "ramp"), "cubic", sentence))
-        segment = self._in_newtons(key, segment, _ramp(segment, "z", start["z"], 1.0, virgin))
+        segment = self._in_newtons(key, segment, ramp.target("z", 1.0))
         self._complain_of_bulk(key, segment)
-        stress = self._stress
-        ramp = Ramp(segment, start, virgin, stress) if segment.steps == AUTO else None
-        for fraction in _fractions(segment):
-            now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
-            number = self._segments - 1
-            bulk = _bulk(segment, stress, fraction)
-            step = LoadStep(len(self.steps), number, label, **now, fraction=fraction, ramp=ramp, bulk=bulk)
+        ramp, chosen = ramp._replace(segment=segment), segment.steps == AUTO
+        count = _count(segment)
+        for fraction in segment.values or [step / count for step in range(1, count + 1)]:  # the last is 1
+            self._now = ramp.targets(fraction)
+            place = len(self.steps), self._segments - 1, label
+            step = LoadStep(*place, **self._now, fraction=fraction, ramp=ramp if chosen else None)
             self.steps.append(step)
-            self._now, self._stress = now, bulk
-            for part in _WATCHED if ramp else (1.0,):
+            for part in _WATCHED if chosen else (1.0,):
                 problems = list(_overload(key, stretch.segment, step.until(part), self._mu))
                 # a load that is too large at the beginning of a segment is a fault of the segment before it
                 if not self._overloaded or self._overloaded == key:
@@ -177,16 +196,17 @@ class History:
 
     def _complain_of_bulk(self, key: tuple[str | int, ...], segment: Segment) -> None:
         """Note bulk stress without friction or body, or along a direction without strain."""
-        for name in BULK_STRESS:
-            sentence = ""
+        given = {name: value for name in BULK_STRESS if (value := getattr(segment, name)) is not None}
+        for name, value in given.items():
             if self._mu is None:
                 sentence = f"expected nothing, {_FRICTION}"
             elif self._bulk is None:
                 sentence = "expected a [bulk] table, which names the body"
             elif name not in self._bulk.components:
                 sentence = f"expected nothing: in {self._bulk.state} it follows from the other component"
-            if sentence and (value := getattr(segment, name)) is not None:
-                self._complain(Mistake((*key, name), value, sentence))
+            else:
+                continue
+            self._complain(Mistake((*key, name), value, sentence))
 
     def _in_newtons(self, key: tuple[str | int, ...], segment: Segment, normal: Target) -> Segment:
         """Return a segment with its shares of mu P at its end as forces."""
@@ -275,39 +295,6 @@ def _count(segment: Segment) -> int:
     if segment.values:
         return len(segment.values)
     return segment.steps if isinstance(segment.steps, int) else 1
-
-
-def _fractions(segment: Segment) -> Sequence[float]:
-    """Return the fraction of a segment at the end of each step; the last is exactly 1."""
-    count = _count(segment)
-    return segment.values or [step / count for step in range(1, count + 1)]
-
-
-def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virgin: bool) -> Target:
-    """Return the target of a motion at a fraction of a segment; `virgin`: all is zero at its beginning."""
-    force, displacement = (getattr(segment, key) for key in LOADS[motion])
-    if force is None and displacement is None:
-        return start
-    goal = Target("displacement", displacement) if force is None else Target("force", force)
-    if fraction == 1.0:
-        return goal
-    if start.control != goal.control and not virgin:
-        return Target(goal.control, fraction * goal.value, 1.0 - fraction)
-    begin = start.value if start.control == goal.control else 0.0
-    if motion == "z" and segment.ramp == "cubic":
-        root = math.cbrt(begin) + fraction * (math.cbrt(goal.value) - math.cbrt(begin))
-        return Target(goal.control, root**3)
-    return Target(goal.control, begin + fraction * (goal.value - begin))
-
-
-def _bulk(segment: Segment, start: Stress, fraction: float) -> Stress:
-    """Return the bulk stress at a fraction of a segment; components that it does not name are constant."""
-    goals = [getattr(segment, name) for name in BULK_STRESS]
-    xx, yy, xy = (
-        begin if goal is None else goal if fraction == 1.0 else begin + fraction * (goal - begin)
-        for begin, goal in zip(start, goals, strict=True)
-    )
-    return xx, yy, xy
 
 
 def _overload(

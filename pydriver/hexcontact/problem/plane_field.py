@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -51,7 +50,8 @@ class HeightMap:
         order = np.argsort(x), np.argsort(y)
         self.x, self.y, self.gap = x[order[0]], y[order[1]], gap[np.ix_(*order)]
         there = np.isfinite(self.gap)
-        if not all(map(_are_distinct, (x, y))) or (degree == 1 and not there.all()):
+        ascending = [len(at) > 1 and np.isfinite(at).all() and np.diff(at).all() for at in (self.x, self.y)]
+        if not all(ascending) or (degree == 1 and not there.all()):
             raise DeckError(f"{name}: expected numbers at all points of a rectangular grid, without holes")
         if not there.any() or np.isneginf(self.gap).any():
             raise DeckError(f"{name}: expected heights, NaN in holes, and inf where nothing can touch")
@@ -60,29 +60,21 @@ class HeightMap:
         self.x, self.y, self.gap, there = self.x[rows], self.y[cols], self.gap[rows, cols], there[rows, cols]
         self._degree, self._there = degree, there
         self._filled = self.gap if there.all() else self.gap[_nearest(there)]
+        row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
+        self.first_touch = float(self.x[row]), float(self.y[col])  # point (m) where the gap is smallest
+        # median distances (m) of its points along x and y
+        self.distances = float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
 
     @classmethod
-    def of(
-        cls, gap: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH, degree: int = 3
-    ) -> Self:
+    def of(cls, gap: xarray.DataArray, rule: Rule) -> Self:
         """Return the map of an array with the coordinates x and y, each along a dimension."""
+        name = rule.key
         x, y = gap.coords["x"], gap.coords["y"]
         if sorted(map(str, gap.dims)) != sorted(map(str, x.dims + y.dims)):
             named = listed([str(name) for name in gap.dims], "and")
             raise DeckError(f"{name}: expected the dimensions of x and y, not {named}")
-        values = in_si(gap.transpose(*x.dims, *y.dims), name, dimension)
-        return cls(in_si(x, name), in_si(y, name), values, name, degree)
-
-    @property
-    def first_touch(self) -> tuple[float, float]:
-        """Point (m) of the grid where the gap is smallest."""
-        row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
-        return float(self.x[row]), float(self.y[col])
-
-    @property
-    def distances(self) -> tuple[float, float]:
-        """Median distances (m) of its points along x and y."""
-        return float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
+        values = in_si(gap.transpose(*x.dims, *y.dims), name, rule.dimension)
+        return cls(in_si(x, name), in_si(y, name), values, name, rule.degree)
 
     @property
     def holes(self) -> tuple[Array, Array]:
@@ -99,23 +91,23 @@ class HeightMap:
         if self._smooth is not None:
             share = np.clip(self._smooth.ev(x, y), 0.0, 1.0)
             near = inside & (share < 1.0 - 1e-9)
-            monotone = self._monotone(np.asarray(x)[near], np.asarray(y)[near])
+            inner = np.asarray(x)[near], np.asarray(y)[near]
+            monotone = np.clip(self._bicubic(np.stack(inner, axis=-1)), *self._range(*inner))
             found[near] = share[near] * found[near] + (1.0 - share[near]) * monotone
         if not self._there.all():
-            found[inside & (self._linear(~self._there).ev(x, y) > 1e-9)] = np.inf
+            found[inside & (self._through(~self._there).ev(x, y) > 1e-9)] = np.inf
         return found
 
-    def _linear(self, values: Array) -> Any:
+    def _through(self, values: Array, degree: int = 1) -> Any:
+        """Return the spline through values at the points."""
         from scipy.interpolate import RectBivariateSpline
 
-        return RectBivariateSpline(self.x, self.y, values.astype(float), kx=1, ky=1)
+        kx, ky = (min(degree, len(along) - 1) for along in (self.x, self.y))
+        return RectBivariateSpline(self.x, self.y, values.astype(float), kx=kx, ky=ky)
 
     @cached_property
     def _spline(self) -> Any:
-        from scipy.interpolate import RectBivariateSpline
-
-        kx, ky = (min(self._degree, len(along) - 1) for along in (self.x, self.y))
-        return RectBivariateSpline(self.x, self.y, self._filled, kx=kx, ky=ky)
+        return self._through(self._filled, self._degree)
 
     @cached_property
     def near_steps(self) -> Mask:
@@ -136,7 +128,7 @@ class HeightMap:
             return None
         from scipy.ndimage import binary_dilation
 
-        return self._linear(np.asarray(~binary_dilation(self.near_steps, iterations=_ECHO)))
+        return self._through(np.asarray(~binary_dilation(self.near_steps, iterations=_ECHO)))
 
     @cached_property
     def _bicubic(self) -> Any:
@@ -148,10 +140,6 @@ class HeightMap:
         along_x, across = (CubicHermiteSpline(x, *pair).c for pair in ((values, of_x), (of_y, twist)))
         coefficients: Any = CubicHermiteSpline(y, along_x, across, axis=2).c
         return NdPPoly(coefficients.transpose(2, 0, 3, 1), (x, y))
-
-    def _monotone(self, x: Array, y: Array) -> Array:
-        """Return the bicubic at points of the map, in the range of the four heights around each."""
-        return np.clip(self._bicubic(np.stack([x, y], axis=-1)), *self._range(x, y))
 
     def _range(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the smallest and the largest of the four heights around points of the map."""
@@ -275,10 +263,6 @@ def _place(x: float, y: float) -> str:
     return f"x = {x:.4g} m, y = {y:.4g} m"
 
 
-def _are_distinct(along: Array) -> bool:
-    return bool(len(along) > 1 and np.isfinite(along).all() and (np.diff(np.sort(along)) > 0.0).all())
-
-
 def in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
     """Return values in SI, converted from the attribute `units`; without it they are in SI."""
     units = str(values.attrs.get("units", dimension.unit))
@@ -327,7 +311,7 @@ def given_field(values: Any, rule: Rule, lattice: Lattice | None) -> FieldSource
             named = listed([str(coordinate) for coordinate in coordinates], "and")
             raise DeckError(f"{name}: expected coordinates x and y (m), not {named}")
         if coordinates["x"].ndim == coordinates["y"].ndim == 1:
-            return HeightMap.of(values, rule.key, rule.dimension, rule.degree)
+            return HeightMap.of(values, rule)
         values = values.copy(data=in_si(values, name, rule.dimension))
     reals(values, name)  # other values need another sentence
     if lattice is None:
@@ -338,33 +322,20 @@ def given_field(values: Any, rule: Rule, lattice: Lattice | None) -> FieldSource
     return shaped(values, lattice, name).copy()
 
 
-@dataclass(frozen=True)
 class PlaneField:
-    """A quantity over the plane, and the rule of its values."""
+    """A quantity over the plane, and the rule of its values.
 
-    source: FieldSource
-    rule: Rule
+    `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
+    the map, if it is one; `heights`: those (m) of both surfaces, none if only their sum is known.
+    """
 
-    @property
-    def at_nodes(self) -> bool:
-        """Whether it is an array over the nodes of one window."""
-        return isinstance(self.source, np.ndarray)
-
-    @property
-    def given(self) -> bool:
-        """Whether it was given in Python, not as two surfaces."""
-        return not isinstance(self.source, Separation)
-
-    @property
-    def map(self) -> HeightMap | None:
-        """The map, if it is one."""
-        return self.source if isinstance(self.source, HeightMap) else None
-
-    @property
-    def heights(self) -> tuple[Callable[[Array, Array], Array], ...]:
-        """Heights (m) of the surfaces of body 1 and body 2; empty if only their sum is known."""
-        known = self.source
-        return (known.surface_1.height, known.surface_2.height) if isinstance(known, Separation) else ()
+    def __init__(self, source: FieldSource, rule: Rule) -> None:
+        self.source, self.rule = source, rule
+        self.at_nodes, self.given = isinstance(source, np.ndarray), not isinstance(source, Separation)
+        self.map = source if isinstance(source, HeightMap) else None
+        self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
+        if isinstance(source, Separation):
+            self.heights = source.surface_1.height, source.surface_2.height
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
@@ -410,7 +381,7 @@ class PlaneField:
         self._refuse(values, bad, lattice.x, lattice.y)
         if self.rule is GAP and (abs(values[np.isfinite(values)]) > LARGEST).any():
             raise DeckError(f"{key}: expected lengths of at most {LARGEST:g} m, {_OR_OPEN}")
-        ours = isinstance(source, np.ndarray | HeightMap | Separation)
+        ours = self.at_nodes or self.map or not self.given
         return values if ours else values.copy()  # a function may keep, and change, its result
 
     def _refuse(self, values: Array, bad: Mask, x: Array, y: Array) -> None:
@@ -473,10 +444,8 @@ class FrictionField:
             # the longer half-axis ends at the limit, and the ellipse shrinks as a whole
             numbers["shear_limit"] = numbers.get("shear_limit", math.inf) * mean / max(mu.along, mu.across)
             mu = mean
-        self._numbers = numbers
-        self._coefficient = mu
+        self._numbers, self._coefficient, self.in_deck = numbers, mu, mu
         self.varies = isinstance(mu, NodalCoefficient)
-        self.in_deck = mu
         if isinstance(mu, NodalCoefficient):
             source: Any = mu.source
             if isinstance(source, Path):
@@ -506,7 +475,7 @@ def _read_map(path: Path) -> Any:
                 )
             # the values, their spline, and copies of both
             memory.require(8 * 8 * maps[0].size, f"the map {path}", "choose a coarser one")
-            return _of_few_points(HeightMap.of(maps[0].load(), _NAME, COEFFICIENT.dimension, 1))
+            return _of_few_points(HeightMap.of(maps[0].load(), COEFFICIENT))
     except FileNotFoundError:
         raise DeckError(f"{_NAME}: there is no file {path}") from None
     except DeckError as error:

@@ -165,7 +165,8 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         found["young_modulus"] = min(moduli)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
-    if (turning := _turning(case)) is not None:
+    slipping, turning, ring = _sheared(case)
+    if turning is not None:
         found |= {"turning_error": turning, "turning_steps": math.ceil(turning / _STEP_ERROR)}
     if known is None:
         return found
@@ -187,13 +188,13 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
             "holes_near_contact": case.holes_near(known),
         }
     if case.accuracy is None:
-        errors, needed = expected_lattice_errors(found["spacings"], _slipping(case), _LATTICE_ERROR)
+        errors, needed = expected_lattice_errors(found["spacings"], slipping, _LATTICE_ERROR)
         found |= {
             "lattice_error": float(errors.max()),
             "needed_spacings": math.ceil(needed),
             **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
         }
-    if (ring := _ring(case)) is not None and case.accuracy is None:
+    if ring is not None and case.accuracy is None:
         errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
         found |= {
             "ring_spacings": slip_ring(ring) * found["spacings"],
@@ -238,13 +239,14 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
 def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     """Return the words in the sentences of limits that are no numbers."""
     errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
+    steps = f"{found.get('growing_steps', 0.0):.2g}"
     worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
     return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
         "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
-        "growing_words": _even_steps(found.get("growing_steps", 0.0)),
+        "growing_words": "one step" if steps == "1" else f"{steps} even steps",
         "step_percent": percent(found.get("step_error", 0.0)),
         "turning_percent": percent(found.get("turning_error", 0.0)),
         "ring_percent": _at_most(found.get("ring_error", 0.0)),
@@ -306,12 +308,6 @@ def _counted(count: float, noun: str) -> str:
     return f"{words} {noun}{'s' * (words != '1')}"
 
 
-def _even_steps(count: float) -> str:
-    """Return a number of even steps in words."""
-    words = f"{count:.2g}"
-    return "one step" if words == "1" else f"{words} even steps"
-
-
 def limits() -> list[dict[str, Any]]:
     """Return the table of limits for programs, without infinite ones."""
     return [
@@ -331,42 +327,28 @@ def _load_ratio(case: Problem, step: LoadStep) -> float:
     return min(force / bound, 1.0)
 
 
-def _slipping(case: Problem) -> float:
-    """Return the largest Q/mu P; that of a wide ring if shear is due to pressing alone; 0 without shear."""
+def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
+    """Return the largest Q/mu P, and what follows from loads or motions along x, y and about z.
+
+    These are the error of the dissipated energy by loads that turn, None without slip or such steps, and the
+    largest Q/mu P of tangential loads that return, None if none is known to. Q/mu P is that of a wide ring if
+    shear is due to pressing alone, and 0 without shear.
+    """
     if not case.frictional or math.isinf(case.friction_coefficient):
-        return 0.0
-    ratio = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
-    return max(ratio, _NOTICED) if ratio else 0.8 * (abs(case.pair.beta) > _ALIKE)
-
-
-def _shear(case: Problem) -> np.ndarray[Any, Any] | None:
-    """Return loads or motions along x, y and about z over their largest; None if control changes."""
+        return 0.0, None, None
+    largest = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
+    slipping = max(largest, _NOTICED) if largest else 0.8 * (abs(case.pair.beta) > _ALIKE)
     targets = [(step.x, step.y, step.twist) for step in case.load_steps]
     if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
-        return None
+        return slipping, None, None
     values = np.array([[target.value for target in motions] for motions in targets])
-    largest = np.abs(values).max(axis=0)
-    largest[:2] = largest[:2].max()
-    return values / np.where(largest > 0.0, largest, 1.0)
-
-
-def _turning(case: Problem) -> float | None:
-    """Return the error of the dissipated energy by loads that turn; None without slip or such steps."""
-    if case.solver.algorithm != "incremental" or case.adaptive or _slipping(case) < _NOTICED:
-        return None
-    shear = _shear(case)
-    return None if shear is None else expected_turning_error(shear)
-
-
-def _ring(case: Problem) -> float | None:
-    """Return the largest Q/mu P of tangential loads that return; None if none is known to."""
-    if not case.frictional or math.isinf(case.friction_coefficient):
-        return None
-    largest, shear = max(_load_ratio(case, step) for step in case.load_steps), _shear(case)
-    if shear is None or not 0.0 < largest < _NOTICED:
-        return None
+    scale = np.abs(values).max(axis=0)
+    scale[:2] = scale[:2].max()
+    shear = values / np.where(scale > 0.0, scale, 1.0)
+    turns = case.solver.algorithm == "incremental" and not case.adaptive and slipping >= _NOTICED
     changes = np.diff(shear[:, :2], axis=0)
-    return largest if (np.sum(changes[1:] * changes[:-1], axis=1) < 0.0).any() else None
+    returns = 0.0 < largest < _NOTICED and (np.sum(changes[1:] * changes[:-1], axis=1) < 0.0).any()
+    return slipping, expected_turning_error(shear) if turns else None, largest if returns else None
 
 
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:

@@ -126,19 +126,29 @@ def _cells(lattice: Lattice) -> str:
 
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
     """Return the rows of an overview of a case."""
-    lattice, pair, bulk = case.lattice, case.pair, case.deck.bulk
+    lattice, pair, bulk, solver = case.lattice, case.pair, case.deck.bulk, case.solver
     # without the coordinates, for which the window may be too large
     width, height = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)
-    modulus, size = (
-        quantity(pair.effective_modulus, "Pa"),
-        f"{quantity(width, 'm')} x {quantity(height, 'm')}",
+    modulus = quantity(pair.effective_modulus, "Pa")
+    size = f"{quantity(width, 'm')} x {quantity(height, 'm')}"
+    last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
+    accuracy = case.accuracy and (
+        f"target {percent(case.accuracy.target)}: spacing and window are of the first lattice, the last "
+        f"has {' to '.join(quantity(one.lattice.spacing, 'm') for one in last)} "
+        f"({' to '.join(f'{one.lattice.size:,}' for one in last)} nodes)"
     )
+    interface = ""
+    if case.deck.interface:
+        coefficient, exponent, stiffness = case.interface
+        interface = f"p = c ψ^m under penetration ψ, m = {exponent:g}, c = {coefficient:.6g} Pa/m^"
+        interface += f"{exponent:g}" + (f", tangential springs of {stiffness:.6g} Pa/m" if stiffness else "")
+    iteration = ", iteration of the dissertation" * (solver.iteration == "dissertation")
     rows = [
         ("body 1", _body(case.body_1)),
         ("body 2", _body(case.body_2)),
         ("gap", str(case.height_map or "")),
         ("pair", f"E* = {modulus}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"),
-        ("interface", _interface(case) if case.deck.interface else ""),
+        ("interface", interface),
         ("friction", _friction(case)),
         ("contact", plausibility.row(case)),
         ("contact", "full, one unknown: p = P/A over all nodes" if case.full_contact else ""),
@@ -148,31 +158,15 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
             f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {size}, "
             f"{'fixed' if case.window_fixed else 'grows with the contact'}",
         ),
-        ("accuracy", _accuracy(case) if case.accuracy else ""),
+        ("accuracy", accuracy or ""),
         ("bulk stress", _bulk(bulk, case.load_steps) if bulk else ""),
         ("load steps", _history(case)),
         ("largest load", _largest(case)),
-        ("method", f"{_method(case, lattice)}, tolerance {case.solver.tolerance:g}"),
-        ("memory", _memory(case, memory) if memory else ""),
+        ("method", f"{case.method_for(lattice)}{iteration}, tolerance {solver.tolerance:g}"),
+        ("memory", " to ".join(quantity(memory(one, one.lattice), "B", 3) for one in last) if memory else ""),
         ("work", work(case)),
     ]
     return [row for row in rows if row[1]]
-
-
-def _memory(case: Problem, memory: Callable[[Problem, Lattice], int]) -> str:
-    last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
-    return " to ".join(quantity(memory(one, one.lattice), "B", 3) for one in last)
-
-
-def _accuracy(case: Problem) -> str:
-    """Describe the target, and the range of the last lattice of the refinement."""
-    assert case.accuracy is not None
-    last = [cases[-1].lattice for cases in least_and_most(case)]
-    spacings = [quantity(lattice.spacing, "m") for lattice in last]
-    return (
-        f"target {percent(case.accuracy.target)}: spacing and window are of the first lattice, the last "
-        f"has {' to '.join(spacings)} ({' to '.join(f'{lattice.size:,}' for lattice in last)} nodes)"
-    )
 
 
 def law_in_words(case: Problem) -> str:
@@ -182,12 +176,6 @@ def law_in_words(case: Problem) -> str:
         exponent = layer.friction_exponent or layer.exponent
         return f"limit {layer.friction_coefficient:.6g} Pa/m^{exponent:g} ψ^{exponent:g} of the interface"
     return str(friction)
-
-
-def _method(case: Problem, lattice: Lattice) -> str:
-    """Return the method, and whose iteration it is if not ours."""
-    written = case.solver.iteration == "dissertation"
-    return case.method_for(lattice) + ", iteration of the dissertation" * written
 
 
 def _friction(case: Problem) -> str:
@@ -211,14 +199,6 @@ def _bulk(bulk: Bulk, steps: Sequence[LoadStep]) -> str:
     return f"body {bulk.body}, {bulk.state}: {', '.join(parts) or 'none'}"
 
 
-def _interface(case: Problem) -> str:
-    coefficient, exponent, stiffness = case.interface
-    springs = f", tangential springs of {stiffness:.6g} Pa/m" if stiffness else ""
-    return (
-        f"p = c ψ^m under penetration ψ, m = {exponent:g}, c = {coefficient:.6g} Pa/m^{exponent:g}{springs}"
-    )
-
-
 def _history(case: Problem) -> str:
     segments = case.load_steps[-1].segment + 1
     gaps = "".join(
@@ -227,7 +207,7 @@ def _history(case: Problem) -> str:
         for key, count in rows.missing.items()
     )
     if case.adaptive:
-        chosen = _adaptive_segments(case)
+        chosen = sum(step.ramp is not None for step in case.load_steps)
         given = len(case.load_steps) - chosen
         where = f"{chosen} segment{'s' * (chosen > 1)}"
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
@@ -242,24 +222,19 @@ def _history(case: Problem) -> str:
 
 def _largest(case: Problem) -> str:
     """Describe the largest prescribed load along each direction."""
-    largest = largest_loads(case)
-    normal = quantity(largest["normal_load"], "N") if largest["normal_load"] else "follows from the approach"
-    along = [
-        f"{quantity(value, 'N')} along {axis}"
-        for axis in "xy"
-        if (value := largest[f"tangential_load_{axis}"])
-    ]
-    return ", ".join([normal, *along])
+    normal, *tangential = largest_loads(case).values()
+    words = quantity(normal, "N") if normal else "follows from the approach"
+    along = zip(tangential, "xy", strict=True)
+    return ", ".join([words, *(f"{quantity(load, 'N')} along {axis}" for load, axis in along if load)])
 
 
 def largest_loads(case: Problem) -> dict[str, float]:
     """Return the largest prescribed normal and tangential loads (N), 0 without one."""
-    largest = {}
-    for direction in ("z", "x", "y"):
-        targets = [getattr(step, direction) for step in case.load_steps]
-        name = LOADS[direction][0]
-        largest[name] = max((abs(t.value) for t in targets if t.control == "force"), default=0.0)
-    return largest
+    targets = {direction: [getattr(step, direction) for step in case.load_steps] for direction in "zxy"}
+    return {
+        LOADS[direction][0]: max((abs(t.value) for t in along if t.control == "force"), default=0.0)
+        for direction, along in targets.items()
+    }
 
 
 def _body(body: Body) -> str:
@@ -303,7 +278,8 @@ def operator_applications(case: Problem) -> float | None:
         entering = sum(after > before for before, after in pairwise(loads))
     share = entering / len(case.load_steps)
     worn = _WORN_COUPLED if case.coupled else _WORN
-    return each * (1.0 + (_INTERPOLATED - 1.0) * share) * _solutions(case) + worn * _worn_steps(case)
+    solutions, worn_steps = _solutions(case)
+    return each * (1.0 + (_INTERPOLATED - 1.0) * share) * solutions + worn * worn_steps
 
 
 def cycles(case: Problem) -> int:
@@ -316,21 +292,14 @@ def cycles(case: Problem) -> int:
     return math.ceil(wear.cycles / wear.jump) + 1
 
 
-def _worn_steps(case: Problem) -> int:
-    """Return the number of load steps in these cycles, with the ones onto the worn gap."""
-    return cycles(case) * (1 + len(case.cycle))
+def _solutions(case: Problem) -> tuple[int, int]:
+    """Return the number of solutions, a guess where steps are chosen, and that of load steps in cycles.
 
-
-def _adaptive_segments(case: Problem) -> int:
-    """Return the number of segments whose steps are chosen during the solution."""
-    return sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
-
-
-def _solutions(case: Problem) -> int:
-    """Return the number of solutions of a case; a guess for segments with chosen steps."""
-    adaptive = _adaptive_segments(case)
+    Each cycle begins with a step onto the worn gap.
+    """
+    adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
     each = _ADAPTIVE if case.coupled else _ADAPTIVE_SIMILAR
-    return len(case.load_steps) - adaptive + each * adaptive
+    return len(case.load_steps) + (each - 1) * adaptive, cycles(case) * (1 + len(case.cycle))
 
 
 def seconds(case: Problem) -> float | None:
@@ -339,17 +308,19 @@ def seconds(case: Problem) -> float | None:
     if applications is None:
         return None
     each = (_SECONDS if case.frictional else _SECONDS_FRICTIONLESS) * case.lattice.size
-    return applications * each + _SECONDS_LEAST * (_solutions(case) + _worn_steps(case))
+    return applications * each + _SECONDS_LEAST * sum(_solutions(case))
 
 
 def work(case: Problem) -> str:
     """Return the estimate in words: "about 1,800 operator applications, about 4 s on one core"."""
     runs = [[*cases] for cases in (least_and_most(case) if case.accuracy else ([case],))]
     found: Any = [[(operator_applications(one), seconds(one)) for one in cases] for cases in runs]
-    for estimates, finest in zip(found, (cases[-1] for cases in runs), strict=True):
-        for one in coarser(finest) if case.estimates_tables else []:  # counted on the finest lattice
+    below = (*case.deck.stress, *case.deck.fatigue)
+    estimates = any(table.estimate_error or case.accuracy for table in below)
+    for counted, finest in zip(found, (cases[-1] for cases in runs), strict=True):
+        for one in coarser(finest) if estimates else []:  # counted on the finest lattice
             number, share = operator_applications(one), one.lattice.size / finest.lattice.size
-            estimates.append((None if number is None else number * share, seconds(one)))
+            counted.append((None if number is None else number * share, seconds(one)))
     if any(None in estimate for run in found for estimate in run):
         return "LAPACK on the nodes in contact, not estimated"
     applications, times = zip(*(map(math.fsum, zip(*run, strict=True)) for run in found), strict=True)
@@ -372,9 +343,7 @@ def _rounded(number: float) -> int:
 
 
 def _duration(time: float) -> str:
-    if time < 1:
-        return "a second or less"
     for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if time >= 2 * size:
             return f"{_rounded(time / size)} {name}"
-    return f"{_rounded(time)} s"
+    return f"{_rounded(time)} s" if time >= 1 else "a second or less"

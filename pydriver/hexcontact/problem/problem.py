@@ -31,7 +31,7 @@ from . import window
 from .arguments import Body
 from .checks import checked
 from .loads import LoadStep, wearing_cycle
-from .plane_field import GAP, FieldSource, FrictionField, HeightMap, PlaneField
+from .plane_field import GAP, FieldSource, FrictionField, PlaneField
 from .window import Estimate, NoContactFound
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
@@ -135,9 +135,14 @@ class Problem:
         self._friction = FrictionField(deck.friction, deck.interface)
         self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
         self._gap = PlaneField(deck.body.separation if gap is None else gap, GAP)
+        # a gap that was measured on a grid; whether it was given in Python: the surfaces are unknown
+        self.height_map, self.gap_given = self._gap.map, self._gap.given
+        self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         self.pair = ElasticPair.from_materials(
             one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
         )
+        # whether pressure and shear are coupled
+        self.coupled = self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
         self.full_contact = gap is None and bool(deck.interface) and deck.body.separation.flat
         self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # if the window follows from it alone
@@ -178,25 +183,9 @@ class Problem:
         return whole, strain if bulk.body == 1 else -strain
 
     @property
-    def height_map(self) -> HeightMap | None:
-        """The heights of a gap that was measured on a grid."""
-        return self._gap.map
-
-    @property
-    def gap_given(self) -> bool:
-        """Whether the gap was given in Python, so that the surfaces of the bodies are unknown."""
-        return self._gap.given
-
-    @property
     def adaptive(self) -> bool:
         """Whether load steps are chosen during the solution: some are "auto", and have a history."""
         return self.solver.algorithm == "incremental" and any(s.ramp is not None for s in self.load_steps)
-
-    @property
-    def estimates_tables(self) -> bool:
-        """Whether tables [[stress]] and [[fatigue]] are computed on coarser lattices, too."""
-        tables = (*self.deck.stress, *self.deck.fatigue)
-        return any(table.estimate_error or self.accuracy for table in tables)
 
     @property
     def planned_steps(self) -> int:
@@ -222,16 +211,6 @@ class Problem:
             return pair
         share = _NO_ELASTICITY / max(1.0, 10.0**self._stiffest)
         return ElasticPair(share * pair.lambda_1, 0.0, share * pair.lambda_5)
-
-    @cached_property
-    def frictional(self) -> bool:
-        """Whether shear tractions are unknowns."""
-        return self.solver.algorithm != "frictionless"
-
-    @cached_property
-    def coupled(self) -> bool:
-        """Whether pressure and shear are coupled."""
-        return self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
 
     # --- data of the solvers --------------------------------------------------------------------------------
 
@@ -312,20 +291,7 @@ class Problem:
         )
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
-        """Return the same case with other values for some keys of its deck.
-
-        Parameters
-        ----------
-        changes : mapping
-            New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
-            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is computed
-            again, also if a `Lattice` was given; that of a gap over its nodes cannot change.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each fault.
-        """
+        """Return the same case with other values for some dotted keys of its deck; None removes one."""
         folder = self.deck_file.parent if self.deck_file else Path()
         lattice = self.lattice if self._gap.at_nodes else None
         given = assemble(plain(self._given.data), folder=folder, overrides=changes)
@@ -395,12 +361,13 @@ class Problem:
             return lattice
         try:
             self._check_interface(source)
-            estimate = self._largest_contact()
+            self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
         except NoContactFound as error:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
             raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
-        self.estimate = estimate
+        first, *second = self._estimates.values()  # by force, and by approach
+        self.estimate = estimate = first.joined(*second) if second else first
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
@@ -439,12 +406,6 @@ class Problem:
         except NoContactFound:
             return 0.0
         return math.log(large.radius / small.radius) / math.log(8.0)
-
-    def _largest_contact(self) -> Estimate:
-        """Estimate the contact at the largest load of the history, by force and by approach."""
-        self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
-        found = [*self._estimates.values()]
-        return found[0] if len(found) == 1 else found[0].joined(found[1])
 
     @property
     def largest_drives(self) -> list[dict[str, float]]:

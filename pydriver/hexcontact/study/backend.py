@@ -77,6 +77,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     An attempt `apart` writes to a file of its own first, since another attempt may still run.
     """
     from ..problem.problem import Problem
+    from ..result.journal import journal_of
     from ..result.store import Store
     from ..solve.run import listeners, metadata_of, solve_into, write_stresses
 
@@ -114,7 +115,12 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
             os.replace(own, target)
         list(write_stresses(target, case))
     except HexcontactError as error:
-        _rename_journal(own, target)
+        if (
+            own != target and journal_of(own).is_dir()
+        ):  # the journal of a failed attempt gets the name of the case
+            with contextlib.suppress(OSError):
+                shutil.rmtree(journal_of(target), ignore_errors=True)
+                os.replace(journal_of(own), journal_of(target))
         return ended(error, error.exit_code, str(error), began)
     except MemoryError as error:
         return ended(error, ResourceError.exit_code, "the machine has not enough memory for this", False)
@@ -143,29 +149,14 @@ def _interrupted(job: Job, case: Problem, stack: contextlib.ExitStack) -> Restar
 
     target = Path(job.path)
     attempts = target.parent.glob(f"{target.stem}.*.nc.d") if target.parent.is_dir() else ()
-    for journal in (journal_of(target), *sorted(attempts)):
-        if not journal.is_dir():
-            continue
-        with contextlib.ExitStack() as attempt:
-            try:
-                restart = attempt.enter_context(reopened(journal, case))
-            except (HexcontactError, OSError):
-                continue  # damaged, of another deck, or locked by another attempt
-            if restart is None or restart.warning:  # finished, or of another version: run from the start
-                continue
-            stack.push(attempt.pop_all())
-            return restart
+    for journal in filter(Path.is_dir, (journal_of(target), *sorted(attempts))):
+        # it may be damaged, of another deck, or locked by another attempt
+        with contextlib.suppress(HexcontactError, OSError), contextlib.ExitStack() as attempt:
+            restart = attempt.enter_context(reopened(journal, case))
+            if restart and not restart.warning:  # else finished, or of another version: run from the start
+                stack.push(attempt.pop_all())
+                return restart
     return None
-
-
-def _rename_journal(own: Path, target: Path) -> None:
-    """Give the journal of a failed attempt the name of the case."""
-    from ..result.journal import journal_of
-
-    if own != target and journal_of(own).is_dir():
-        with contextlib.suppress(OSError):
-            shutil.rmtree(journal_of(target), ignore_errors=True)
-            os.replace(journal_of(own), journal_of(target))
 
 
 T = TypeVar("T", bound=type)
@@ -179,14 +170,11 @@ KEYS: dict[str, Any] = {}
 _POLL = 0.2  # s between checks for cancellation
 
 
-@dataclass(frozen=True)
 class OptionTable(Kind):
     """A table whose keys belong to another program."""
 
-    example: str
-
-    def _expected(self) -> str:
-        return f"a table such as {self.example}"
+    def __init__(self, example: str) -> None:
+        self.expected = f"a table such as {example}"
 
     def _parse(self, value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):

@@ -11,7 +11,6 @@ import dataclasses
 import json
 import operator
 import os
-import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -153,14 +152,11 @@ class StudyFolder:
             self._write(f"{path.stem}.json", dataclasses.asdict(outcome))
             return
         path.with_suffix(".json").unlink(missing_ok=True)
-        pattern = re.compile(re.escape(path.stem) + r"\.[0-9a-f]{8}\.nc(\.d)?")
-        for name in os.listdir(self.folder):
-            if pattern.fullmatch(name):
-                left = self.folder / name
-                if left.is_dir():
-                    shutil.rmtree(left, ignore_errors=True)
-                else:
-                    left.unlink(missing_ok=True)
+        for left in self.folder.glob(f"{path.stem}.{'[0-9a-f]' * 8}.nc*"):
+            if left.suffix == ".d":
+                shutil.rmtree(left, ignore_errors=True)
+            elif left.suffix == ".nc":
+                left.unlink(missing_ok=True)
 
 
 DONE, FAILED, MISSING, INVALID = range(4)
@@ -196,17 +192,15 @@ def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, A
     present = {name for history in found for name in history}
     columns: dict[str, Any] = {}
     for name in (name for name in VARIABLES if name in present):
-        values = np.full((total, longest), np.nan)
-        last = np.full(total, np.nan)
+        values = np.full((total, longest if steps == "all" else 1), np.nan)
         for row, history in enumerate(found):
-            if name in history:
-                values[row, : len(history[name])] = history[name]
-                last[row] = history[name][-1]
+            kept = history.get(name, ())[0 if steps == "all" else -1 :]
+            values[row, : len(kept)] = kept
         about = {key: value for key, value in VARIABLES[name].attributes.items() if key[:4] != "flag"}
         if steps == "all":
             columns[name] = ((*dims, "step"), values.reshape(*shape, longest), about)
         else:
-            columns[name] = (dims, last.reshape(shape), about)
+            columns[name] = (dims, values.reshape(shape), about)
 
     def by_case(values: Any, dtype: Any, long_name: str, **more: Any) -> Any:
         return dims, np.array(list(values), dtype=dtype).reshape(shape), {"long_name": long_name, **more}
@@ -255,16 +249,12 @@ def _coordinate(axis: Axis, places: Any, settings: Sequence[Mapping[str, Any]]) 
     return axis.dims, np.array([str(value) for value in entries]).reshape(places.shape), attributes
 
 
-def is_study(path: Path) -> bool:
-    """Return whether a file is the result of a study."""
-    require_ordinary(path, "the result of a study")
-    return "study_version" in attributes(path)
-
-
 def refuse_foreign(path: Path) -> None:
     """Raise a DeckError if a file exists that is not the result of a study."""
-    if path.exists() and not is_study(path):
-        raise DeckError(f"{path} exists and is not the result of a study; choose another output")
+    if path.exists():
+        require_ordinary(path, "the result of a study")
+        if "study_version" not in attributes(path):
+            raise DeckError(f"{path} exists and is not the result of a study; choose another output")
 
 
 def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
@@ -358,11 +348,7 @@ def lines_of(study: xarray.Dataset) -> str:
     ]
     if len(table) > _MOST_ROWS:
         lines.append(f"... and {len(table) - _MOST_ROWS} more cases; hexcontact export --csv writes all")
-    return visible_lines([*lines, str(study.attrs["source"])])
-
-
-def visible_lines(lines: Sequence[str]) -> str:
-    """Return lines without control characters."""
+    lines.append(str(study.attrs["source"]))
     return "\n".join(visible(line) for text in lines for line in text.split("\n"))
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -39,55 +40,46 @@ from ..errors import DeckError, Fault
 from ..problem.checks import checked
 from ..problem.problem import Problem
 from ..text import shown
+from ..variables import VARIABLES
 from . import backends  # noqa: F401 (each registers its key)
 from .backend import KEYS, MOST_CASES, hash_of
 
 
-@dataclass(frozen=True)
 class Anything(Kind):
     """A value of any kind, which is checked with the deck."""
 
-    def _expected(self) -> str:
-        return "a value of that key"
-
-    def _parse(self, value: object) -> object:
-        return value
+    expected = "a value of that key"
 
 
-@dataclass(frozen=True)
 class VariableName(Text):
     """A name that a netCDF file can have for a variable."""
 
-    def _expected(self) -> str:
-        return "a name of letters, digits and _"
+    expected = "a name of letters, digits and _"
 
     def _parse(self, value: object) -> str:
         name = super()._parse(value)
         return name if re.fullmatch(r"\w(?:[\w .+-]*[\w.+-])?", name) else refuse(f"expected {self.expected}")
 
 
-@dataclass(frozen=True)
+_KEY = {"type": "string", "minLength": 1}
+
+
 class Keys(Kind):
     """One dotted key of a deck, or several that share one value."""
 
-    def _expected(self) -> str:
-        return 'a dotted key of the deck, or an array of them, such as "load.1.normal_load"'
+    expected = 'a dotted key of the deck, or an array of them, such as "load.1.normal_load"'
+    schema: ClassVar[Schema] = {"anyOf": [_KEY, {"type": "array", "items": _KEY, "minItems": 1}]}  # type: ignore[misc]
 
     def _parse(self, value: object) -> tuple[str, ...]:
         keys = tuple(value) if isinstance(value, list | tuple) else (value,)
         whole = keys and all(isinstance(key, str) and key.strip() for key in keys)
         return keys if whole else refuse(f"expected {self.expected}")
 
-    def _schema(self) -> Schema:
-        text = {"type": "string", "minLength": 1}
-        return {"anyOf": [text, {"type": "array", "items": text, "minItems": 1}]}
-
     def written(self, value: tuple[str, ...]) -> str | list[str]:
         """Return one key as text, several as a list."""
         return value[0] if len(value) == 1 else list(value)
 
 
-@dataclass(frozen=True)
 class Expression(Text):
     """A formula over parameters and keys of the deck."""
 
@@ -295,18 +287,14 @@ def _kind(info: Any, values: Sequence[Any] = ()) -> Kind | None:
     """Return the kind of a field; that of its numbers where all values are numbers."""
     kind = kind_of(info) if info else None
     if isinstance(kind, OrShare | FrictionKind):
-        more = Share | NodalCoefficient | TwoCoefficients
-        return kind if any(isinstance(_read(kind, value), more) for value in values) else kind.kind
+        for value in values:
+            with contextlib.suppress(PydanticCustomError):
+                if isinstance(kind.parse(value), Share | NodalCoefficient | TwoCoefficients):
+                    return kind
+        return kind.kind
     if isinstance(kind, WordOr) and isinstance(kind.kind, Quantity | Whole) and kind.word not in values:
         return kind.kind
     return kind
-
-
-def _read(kind: Kind, value: Any) -> Any:
-    try:
-        return kind.parse(value)
-    except PydanticCustomError:
-        return None
 
 
 def _unit(kind: Kind | None) -> str:
@@ -326,28 +314,15 @@ def axis_of(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
             raise wrong(study, key, f"expected a key with the unit of {entry.key[0]}")
     long_name = (info.description or "").partition(";")[0] if info else ""
     axis = Axis(entry.key, entry.label, units, long_name, kind, values)
-    if entry.expression is not None:
-        _require_number(axis, "an expression", study)
-        return replace(axis, formula=Formula(entry.expression))
-    if entry.range is None:
+    if entry.values is not None:
         return axis
-    axis = replace(axis, bounds=_bounds(axis, entry, study), scale=entry.scale)
-    parts = np.linspace(0.0, 1.0, 0 if combine == "lhs" else entry.count or 0).tolist()
-    return replace(axis, values=tuple(map(axis.at, parts)))
-
-
-def _require_number(axis: Axis, source: str, study: str) -> Kind:
-    if isinstance(axis.kind, Quantity | Whole):
-        return axis.kind
-    raise wrong(study, axis.key, f"{source} needs a key that is a number; expected values instead")
-
-
-def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
-    """Return the ends of a range in SI."""
-    assert entry.range is not None
-    kind = _require_number(axis, "a range", study)
+    if not isinstance(kind, Quantity | Whole):
+        source = "an expression" if entry.expression is not None else "a range"
+        raise wrong(study, axis.key, f"{source} needs a key that is a number; expected values instead")
+    if entry.expression is not None:
+        return replace(axis, formula=Formula(entry.expression))
     ends = []
-    for value in entry.range:
+    for value in entry.range or ():
         try:
             ends.append(float(kind.parse(value)))
         except PydanticCustomError as error:
@@ -357,7 +332,9 @@ def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
         raise wrong(study, axis.key, "expected two different, finite bounds", shown(entry.range))
     if entry.scale == "log" and not (low > 0 and high > 0):
         raise wrong(study, axis.key, "a logarithmic scale needs bounds above 0", shown(entry.range))
-    return low, high
+    axis = replace(axis, bounds=(low, high), scale=entry.scale)
+    parts = np.linspace(0.0, 1.0, 0 if combine == "lhs" else entry.count or 0).tolist()
+    return replace(axis, values=tuple(map(axis.at, parts)))
 
 
 def dimensions(
@@ -384,17 +361,20 @@ def dimensions(
                     raise wrong(study, axis.key, f"expression: {problem}")
                 used |= set(placed[source.name].dims if source else ())
             placed[axis.name] = replace(axis, dims=tuple(dim for dim in together if dim in used))
-    if file.combine == "lhs":
-        return tuple(placed[axis.name] for axis in axes), {"case": _latin_hypercube(file, together["case"])}
     dims = {}
     for dim, group in together.items():
-        rows = zip(*(axis.values for axis in group), strict=True)
-        dims[dim] = [_settings(group, row) for row in rows]
+        rows: Iterable[Sequence[Any]] = zip(*(axis.values for axis in group), strict=True)
+        if file.combine == "lhs":
+            from scipy.stats import qmc
+
+            # Later versions of scipy name it `rng` and still accept `seed`.
+            sampler = qmc.LatinHypercube(len(group), seed=np.random.default_rng(file.seed))
+            parts = sampler.random(file.samples or 1).tolist()
+            rows = [[axis.at(part) for axis, part in zip(group, row, strict=True)] for row in parts]
+        dims[dim] = [
+            {key: value for axis, value in zip(group, row, strict=True) for key in axis.keys} for row in rows
+        ]
     return tuple(placed[axis.name] for axis in axes), dims
-
-
-def _settings(axes: Sequence[Axis], values: Sequence[Any]) -> dict[str, Any]:
-    return {key: value for axis, value in zip(axes, values, strict=True) for key in axis.keys}
 
 
 def _key_of(name: str, axes: Sequence[Axis]) -> tuple[str, Axis | None]:
@@ -404,11 +384,10 @@ def _key_of(name: str, axes: Sequence[Axis]) -> tuple[str, Axis | None]:
 
 
 def _is_number(deck: Table, key: str) -> bool:
-    try:
+    with contextlib.suppress(StopIteration, LookupError, ValueError, AttributeError):
         info, value = _field(deck, key)
-    except (StopIteration, LookupError, ValueError, AttributeError):
-        return False
-    return value is not None and isinstance(_kind(info, (value,)), Quantity | Whole)
+        return value is not None and isinstance(_kind(info, (value,)), Quantity | Whole)
+    return False
 
 
 def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str, Any], study: str) -> Any:
@@ -434,38 +413,17 @@ def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str
     return axis.in_deck(found)
 
 
-def _latin_hypercube(file: StudyFile, axes: Sequence[Axis]) -> list[dict[str, Any]]:
-    from scipy.stats import qmc
-
-    # Later versions of scipy name it `rng` and still accept `seed`.
-    sampler = qmc.LatinHypercube(len(axes), seed=np.random.default_rng(file.seed))
-    rows = sampler.random(file.samples or 1).tolist()
-    return [_settings(axes, [axis.at(part) for axis, part in zip(axes, row, strict=True)]) for row in rows]
+_TAKEN = ("case", "step", "status", "exit_code", "message", "case_number", "case_seconds")  # in the result
 
 
-_TAKEN = ("case", "step", "status", "exit_code", "message", "case_number", "case_seconds")
-
-
-def refuse_namesakes(axes: Sequence[Axis], groups: Sequence[str | None], study: str) -> None:
+def _refuse_namesakes(axes: Sequence[Axis], groups: Sequence[str | None], study: str) -> None:
     """Refuse names that the result uses for other quantities."""
-    from ..variables import VARIABLES
-
     names = [axis.name for axis in axes]
     for axis, group in zip(axes, groups, strict=True):
         taken = [name for name in (axis.name, group) if name in VARIABLES or name in _TAKEN]
         taken += [axis.name] * (names.count(axis.name) > 1) + [str(group)] * (group in names)
         if taken:
             raise wrong(study, axis.key, f"the name {taken[0]} is taken; choose another with name")
-
-
-def refuse_twins(axes: Sequence[Axis], study: str) -> None:
-    """Refuse equal coordinates along a dimension of the result."""
-    for axis in axes:
-        if axis.dims != (axis.name,):
-            continue
-        entries = [axis.coordinate(value) for value in axis.values]
-        if twins := [value for value in entries if entries.count(value) > 1]:
-            raise wrong(study, axis.key, f"has the value {shown(twins[0])} twice")
 
 
 CheckLevel = Literal["windows", "decks", "nothing"]
@@ -537,7 +495,11 @@ def plan(
     marked, unless all are wrong.
     """
     tolerant = skip_invalid or check == "nothing"
-    base = {key: value for key, value in base.items() if key != "output"} | _output(base)
+    output = base.get("output")
+    if isinstance(output, Mapping):
+        output = {key: value for key, value in output.items() if key != "file"}
+    others = {} if output in (None, {}) else {"output": output}
+    base = {key: value for key, value in base.items() if key != "output"} | others
     keys = [key for parameter in file.parameter for key in parameter.key]
     mark = f"{study}: parameter "
     about = replace(source, overrides=frozenset(keys), of_override=mark)
@@ -549,7 +511,7 @@ def plan(
     names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
     deck = _first_deck(file, base, about, mark, tolerant, names)
     given = [axis_of(entry, deck, file.combine, study) for entry in file.parameter]
-    refuse_namesakes(given, [entry.group for entry in file.parameter], study)
+    _refuse_namesakes(given, [entry.group for entry in file.parameter], study)
     axes, dims = dimensions(file, given, deck, study)
     if (count := math.prod(map(len, dims.values()))) > MOST_CASES:
         raise DeckError(f"{study}: {count} cases; expected at most {MOST_CASES}")
@@ -580,7 +542,10 @@ def plan(
         more = f"... and {len(lines) - _MOST_LINES} more"
         shown_lines = [*lines.values()][:_MOST_LINES] + [more] * (len(lines) > _MOST_LINES)
         raise DeckError("\n".join(shown_lines))
-    refuse_twins(axes, study)
+    for axis in axes:
+        entries = [axis.coordinate(value) for value in axis.values if axis.dims == (axis.name,)]
+        if twins := [value for value in entries if entries.count(value) > 1]:
+            raise wrong(study, axis.key, f"has the value {shown(twins[0])} twice")
     return Plan(axes, tuple(cases), {name: len(choices) for name, choices in dims.items()})
 
 
@@ -604,14 +569,6 @@ def _first_deck(
             error = error or DeckError("\n".join(lines.values()), found.faults)
     assert error is not None
     raise error
-
-
-def _output(base: Mapping[str, Any]) -> dict[str, Any]:
-    output = base.get("output")
-    if not isinstance(output, Mapping):
-        return {} if output is None else {"output": output}
-    others = {key: value for key, value in output.items() if key != "file"}
-    return {"output": others} if others else {}
 
 
 def _merged(base: Mapping[str, Any], values: Mapping[str, Any], mark: str) -> dict[str, Any]:

@@ -281,22 +281,19 @@ class Study:
         by_hash = {case.hash: case for case in missing}
         with pool:
             for outcome in outcomes(pool, [self._job(case) for case in missing], cancel):
-                case = by_hash[outcome.hash]
+                case, level = by_hash[outcome.hash], logging.INFO
                 self.folder.note(case, outcome)
-                self._report(case, outcome, listener)
+                number = self.folder.number(case)
+                values: dict[str, Any] = {"parameters": str(case), "seconds": outcome.seconds}
+                ending = f"done in {quantity(outcome.seconds, 's', 3)}"
+                if outcome.exit_code:
+                    level, ending = logging.ERROR, f"failed: {outcome.message.splitlines()[0]}"
+                    values |= {"exit_code": outcome.exit_code, "reason": outcome.message}
+                text = f"case {number} ({case}): {ending}"
+                listener.said(f"case={number}/{len(self)}", text, level, **values)
 
     def _job(self, case: PlannedCase) -> Job:
         return Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
-
-    def _report(self, case: PlannedCase, outcome: Outcome, listener: Listener) -> None:
-        """Report the outcome of a case."""
-        number, level = self.folder.number(case), logging.INFO
-        values: dict[str, Any] = {"parameters": str(case), "seconds": outcome.seconds}
-        ending = f"done in {quantity(outcome.seconds, 's', 3)}"
-        if outcome.exit_code:
-            level, ending = logging.ERROR, f"failed: {outcome.message.splitlines()[0]}"
-            values |= {"exit_code": outcome.exit_code, "reason": outcome.message}
-        listener.said(f"case={number}/{len(self)}", f"case {number} ({case}): {ending}", level, **values)
 
     def backend(self, jobs: int | None = None, dask: str | None = None) -> tuple[type[Backend], Any]:
         """Return the backend that `run` would use, and its settings."""

@@ -71,7 +71,11 @@ class LocalPool(Backend):
         started, process = time.perf_counter(), 0
         try:
             if not hasattr(self._own, "pool"):
-                self._own.pool = self._new_process()
+                context = multiprocessing.get_context("spawn")
+                self._own.pool = ProcessPoolExecutor(
+                    1, context, initializer=prepare_worker, initargs=(self.threads,)
+                )
+                self._processes.append(self._own.pool)
             process = self._own.pool.submit(os.getpid).result()
             with self._mutex:
                 if self._stopped:
@@ -85,12 +89,6 @@ class LocalPool(Backend):
             return Outcome(job.hash, ResourceError.exit_code, words, time.perf_counter() - started, False)
         finally:
             self._busy.discard(process)
-
-    def _new_process(self) -> ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(1, context, initializer=prepare_worker, initargs=(self.threads,))
-        self._processes.append(pool)
-        return pool
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Kill the processes that run a case; finished load steps are on the disk."""

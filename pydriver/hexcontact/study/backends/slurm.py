@@ -7,7 +7,6 @@ import os
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,7 +28,6 @@ def _text(value: str) -> str | None:
     return f'"{value}"' if re.search(r"[\s'#]", value) else value
 
 
-@dataclass(frozen=True)
 class BatchOptions(OptionTable):
     """Options of sbatch, each a line of the script."""
 

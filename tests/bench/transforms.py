@@ -1,4 +1,4 @@
-"""Time whole solves of two builds side by side, such as those with FFTW and pocketfft.
+"""Time whole solves of two builds side by side: with FFTW and pocketfft, or for other processors.
 
     python tests/bench/transforms.py FOLDER FOLDER
 
@@ -22,7 +22,9 @@ TASKS = [
     (31, "without friction"),
     (128, "without friction"),
     (512, "without friction"),
+    (31, "10 steps with friction"),
     (128, "10 steps with friction"),
+    (512, "10 steps with friction"),
 ]
 TURNS = 7
 

@@ -72,10 +72,10 @@ def main() -> None:
                 )
                 times[which].append(answer["seconds"])
                 found[which] = answer["pressure"]
-        first, second = map(min, times)
+        first, second = (1e3 * min(turns) for turns in times)
         apart = max(abs(a - b) for a, b in zip(*found, strict=True))
         print(
-            f"| {side} × {side} | {kind} | {1e3 * first:.3g} | {1e3 * second:.3g} "
+            f"| {side} × {side} | {kind} | {float(f'{first:.3g}'):g} | {float(f'{second:.3g}'):g} "
             f"| {second / first:.2f} | {apart:.0e} |",
             flush=True,
         )

@@ -192,10 +192,12 @@ print_hints() {
 One of these lines installs it; then run make again.
 
   apt:      sudo apt-get update && sudo apt-get install -y $packages
-  dnf:      sudo dnf install -y gcc gcc-gfortran pkgconf-pkg-config openblas-devel fftw-devel python3-devel
+  dnf:      sudo dnf install -y gcc${cpp:+ gcc-c++} gcc-gfortran pkgconf-pkg-config openblas-devel fftw-devel python3-devel
   conda:    conda create -y -n hexcontact -c conda-forge python=3.12 make compilers pkg-config openblas fftw && conda activate hexcontact
   brew:     brew install gcc pkgconf openblas fftw python@3.12 && export PKG_CONFIG_PATH="\$(brew --prefix openblas)/lib/pkgconfig"
   modules:  module load gcc openblas fftw python     (names differ between sites: module avail)
+
+The compilers of conda and brew, and gcc of module systems, include C++. More: docs/install.md.
 END
 }
 

@@ -1,8 +1,9 @@
 """Build what is distributed, and use it where nothing else is: ``make package``.
 
-The source archive holds every file of the last commit; the wheel is built from it in isolation, installed
-into an empty environment and used by its command in a folder outside the checkout. Then the same with
-``pip install .``. Run by an interpreter that has meson-python; archive and wheel go to build/dist.
+The source archive holds every file of the last commit; the wheel is built from it without a network, with
+pocketfft, installed into an empty environment and used by its command in a folder outside the checkout. Then
+the same with ``pip install .``, in isolation and with FFTW. Run by an interpreter that has the build tools;
+archive and wheel go to build/dist.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import sys
 import tarfile
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+import commands
+from commands import ROOT
+
 DIST = ROOT / "build/dist"
 
 # A user's shell: no tools of .venv, nothing that points to this checkout.
@@ -24,6 +27,7 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("P
 ENVIRONMENT["PATH"] = os.pathsep.join(
     folder for folder in os.environ["PATH"].split(os.pathsep) if not Path(folder).is_relative_to(ROOT)
 )
+run = partial(commands.run, environment=ENVIRONMENT)
 
 SESSION = [  # words of the command, and a file that it leaves
     (["new", "sphere", "-o", "sphere.toml"], "sphere.toml"),
@@ -35,18 +39,6 @@ SESSION = [  # words of the command, and a file that it leaves
     (["run", "fretting.toml", "--quiet"], "fretting.nc"),
     (["verify", "spheres", "shear"], None),
 ]
-
-
-def run(*words: str | Path, folder: Path = ROOT, environment: Mapping[str, str] = ENVIRONMENT) -> str:
-    """Run a command and return what it prints; end with its output where it fails."""
-    line = " ".join(str(word) for word in words)
-    print("$", line, flush=True)
-    done = subprocess.run(
-        words, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
-    )
-    if done.returncode != 0:
-        sys.exit(f"{done.stdout}{done.stderr}\n{line}: exit code {done.returncode}")
-    return done.stdout
 
 
 def compare(what: str, found: set[str], expected: set[str]) -> None:
@@ -71,11 +63,21 @@ def source_archive() -> Path:
     return path
 
 
+def no_network() -> list[str]:
+    """Return a command that runs another one without a network."""
+    for words in (["unshare", "--net"], ["unshare", "--map-root-user", "--net"]):
+        if subprocess.run([*words, "true"], stderr=subprocess.DEVNULL).returncode == 0:
+            return words
+    sys.exit("unshare makes no network namespace here; run make package as root, or permit user namespaces")
+
+
 def wheel_from(archive: Path) -> Path:
-    """Return the wheel that pip builds from a source archive in isolation."""
+    """Return the wheel that pip builds from a source archive with the tools of .venv, without a network."""
     for old in DIST.glob("*.whl"):
         old.unlink()
-    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", DIST, archive)
+    pip = [*no_network(), sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps"]
+    settings = ["--no-build-isolation", "-Csetup-args=-Dfft=pocketfft", "--wheel-dir", DIST]
+    run(*pip, *settings, archive, environment=os.environ)
     [path] = DIST.glob("*.whl")
     tracked = run("git", "ls-tree", "-r", "--name-only", "HEAD", "pydriver/hexcontact").splitlines()
     with zipfile.ZipFile(path) as wheel:

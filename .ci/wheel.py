@@ -8,14 +8,15 @@ build/wheelhouse.
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from commands import ROOT, run
+
 WHEELHOUSE = ROOT / "build/wheelhouse"
 LARGEST = 15e6  # bytes
+PYTHON = (sys.executable, "-m")
 
 GCC = (
     "of GCC, under the GNU General Public License 3 with the GCC Runtime Library Exception 3.1, "
@@ -38,31 +39,11 @@ NOTICES = {
 """Where the libraries come from and their licences, by the beginning of the file's name."""
 
 
-def run(*words: str | Path, folder: Path = ROOT) -> str:
-    """Run a command and return what it prints; end with its output where it fails."""
-    print("$", *words, flush=True)
-    done = subprocess.run(words, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{done.stdout}{done.stderr}\n{words[0]}: exit code {done.returncode}")
-    return done.stdout
-
-
 def built(folder: str, scratch: Path) -> Path:
     """Return the wheel that pip builds from a build folder."""
     settings = [f"-Cbuild-dir={folder}"]
     settings += [f"-Csetup-args={word}" for word in ("-Dfft=pocketfft", "-Dopenmp=enabled", "-Dtests=true")]
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--no-build-isolation",
-        "--no-deps",
-        *settings,
-        "-w",
-        scratch,
-        ".",
-    )
+    run(*PYTHON, "pip", "wheel", "--no-build-isolation", "--no-deps", *settings, "-w", scratch, ".")
     [path] = scratch.glob("*.whl")
     return path
 
@@ -88,13 +69,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="hexcontact-") as name:
         scratch = Path(name)
         wheel = built(sys.argv[1], scratch)
-        run(sys.executable, "-m", "auditwheel", "repair", "--strip", "-w", scratch / "repaired", wheel)
+        run(*PYTHON, "auditwheel", "repair", "--strip", "-w", scratch / "repaired", wheel)
         [repaired] = (scratch / "repaired").glob("*.whl")
-        run(sys.executable, "-m", "wheel", "unpack", repaired, "-d", scratch / "unpacked")
+        run(*PYTHON, "wheel", "unpack", repaired, "-d", scratch / "unpacked")
         [unpacked] = (scratch / "unpacked").iterdir()
         with_notices(unpacked)
         WHEELHOUSE.mkdir(parents=True)
-        run(sys.executable, "-m", "wheel", "pack", unpacked, "-d", WHEELHOUSE)
+        run(*PYTHON, "wheel", "pack", unpacked, "-d", WHEELHOUSE)
     [path] = WHEELHOUSE.glob("*.whl")
     size = path.stat().st_size
     if size > LARGEST:

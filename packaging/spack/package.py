@@ -1,4 +1,8 @@
 # Spack: copy into <repository>/packages/py_hexcontact/, or `spack create --template python`.
+import os
+
+from spack_repo.builtin.build_systems.python import PythonPackage
+
 from spack.package import *
 
 
@@ -7,7 +11,8 @@ class PyHexcontact(PythonPackage):
 
     license("BSD-3-Clause")
 
-    # the source archive of `make package`, in the folder of the manual downloads
+    # the source archive of `make package`, in the folder where spack is called
+    url = f"file://{os.getcwd()}/hexcontact-0.5.0.tar.gz"
     manual_download = True
     version("0.5.0")
 

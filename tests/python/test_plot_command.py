@@ -24,6 +24,7 @@ from hexcontact.plotting.registry import entries
 from hexcontact.variables import MAPS
 
 CASE = Path(__file__).parents[2] / "cases" / "hertz_spheres.toml"
+pytestmark = pytest.mark.usefixtures("laid_out_once")
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
 

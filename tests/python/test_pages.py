@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shlex
 import sys
 import tomllib
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
+from hexcontact import plotting
 from hexcontact.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -76,7 +78,18 @@ def test_gallery_shows_every_deck() -> None:
     assert (DOCS / "gallery.md").read_text(encoding="utf-8") == MAKE["gallery"](), "docs/images/make.py"
 
 
-@pytest.mark.parametrize("name", MAKE["decks"]())
+def of_each_kind() -> list[str]:
+    """Return the first deck of the gallery for each kind of picture that no page above draws."""
+    kinds: dict[str, str] = {}
+    for name, (_, words) in MAKE["decks"]().items():
+        kind = re.search(r"--what (\w+)", words)
+        kinds.setdefault(kind[1] if kind else "overview", name)
+    assert kinds.keys() <= plotting.FIGURES.keys()
+    assert "--what fatigue" in (DOCS / "fatigue.md").read_text(encoding="utf-8")
+    return [name for kind, name in kinds.items() if kind != "fatigue"]
+
+
+@pytest.mark.parametrize("name", of_each_kind())
 def test_pictures_of_the_gallery_are_those_that_the_commands_draw(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +98,24 @@ def test_pictures_of_the_gallery_are_those_that_the_commands_draw(
     assert drawn.apart(drawn.pixels(picture), drawn.pixels(DOCS / f"images/cases/{name}.png")) < SAME
 
 
-def test_every_picture_of_the_pages_is_drawn_by_a_test() -> None:
+@pytest.mark.parametrize(
+    "name", [name for name in MAKE["decks"]() if name not in (*of_each_kind(), "fretting_fatigue")]
+)
+def test_other_decks_of_the_gallery_have_the_steps_that_are_drawn(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cases").symlink_to(ROOT / "cases")
+    run, plot = MAKE["commands"](name)
+    done = CliRunner().invoke(app, [*shlex.split(run)[1:], "--quiet"])
+    assert done.exit_code == 0, done.output
+    steps = re.search(r"--step ([\d,]+)", plot)
+    result = hexcontact.open_result(shlex.split(plot)[2])
+    assert result.complete
+    assert len(result) >= max(map(int, steps[1].split(",") if steps else ["1"]))
+
+
+def test_every_picture_is_shown_by_a_page() -> None:
     played_ones = {
         target for page in DOCS.glob("*.md") for target, _ in played.PICTURE.findall(page.read_text())
     }

@@ -37,7 +37,7 @@ pip := $(py) -m pip
 pip_build := $(pip) install --quiet --no-build-isolation
 # Files of tests go to one process each, so that what they share is made once.
 PYTEST_JOBS ?= $(if $(strip $(PYTEST_ARGS)),0,logical)
-pytest := -m pytest --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 --dist=loadscope $(PYTEST_ARGS)
+pytest := -m pytest --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 --dist=loadscope --no-loadscope-reorder $(PYTEST_ARGS)
 # A build of its own, installed beside that of .venv and not hidden by an editable one: site, build folder, settings.
 define build_apart
 @rm -rf $(1)

@@ -1,12 +1,17 @@
 """Decks of a sphere, the environment in which tests run commands on them, and how long tests wait."""
 
+import contextlib
 import os
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from typer.testing import CliRunner
+
 import hexcontact
+from hexcontact.cli.app import app
 
 DECK = """
 title = "A sphere"
@@ -35,6 +40,15 @@ ENVIRONMENT = {
 
 PATIENCE = 300.0  # seconds of a process that hangs, however busy the machine is
 T = TypeVar("T")
+
+
+def inside(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in a folder, in this process: a new one takes a second to begin."""
+    with contextlib.chdir(folder):
+        result = CliRunner().invoke(app, words)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return subprocess.CompletedProcess(words, result.exit_code, result.stdout, result.stderr)
 
 
 def wait_for(look: Callable[[], T]) -> T:

@@ -19,8 +19,18 @@ if int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) > 1:
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Files that take longest come first, so that no process waits for one of them at the end.
+LONGEST = ["pages", "resume", "memory_estimates", "developer_guide", "stress", "study", "fatigue"]
+LONGEST += ["plotting_friction", "fortran_library"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest before the others."""
+    ranks = {f"test_{name}": rank for rank, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
+
 
 @pytest.fixture
-def placed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Place the axes of pictures once: repetition takes half of their time, and pages show its effect."""
+def laid_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lay figures out as they are written only: for tests that do not look at the places of labels."""
     monkeypatch.setattr("hexcontact.plotting.registry.settle", lambda figure: None)

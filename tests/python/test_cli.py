@@ -1,6 +1,5 @@
 """The command, run as users run it: exit codes, messages, files; never a traceback."""
 
-import contextlib
 import re
 import signal
 import subprocess
@@ -14,7 +13,7 @@ import commands
 import drawn
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import inside
 
 import hexcontact
 from hexcontact import plotting
@@ -59,15 +58,6 @@ def hexcontact_(folder: Path, *arguments: str, **environment: str) -> subprocess
     process = start(folder, *arguments, **environment)
     out, error = process.communicate(timeout=commands.PATIENCE)
     return subprocess.CompletedProcess(arguments, process.returncode, out, error)
-
-
-def inside(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command in this process, which is quicker."""
-    with contextlib.chdir(folder):
-        result = CliRunner().invoke(app, arguments)
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return subprocess.CompletedProcess(arguments, result.exit_code, result.stdout, result.stderr)
 
 
 def refused(done: subprocess.CompletedProcess[str], code: int, pattern: str) -> None:
@@ -314,7 +304,7 @@ def test_info_tells_the_story(solved: Path) -> None:
         assert words in done.stdout
 
 
-@pytest.mark.usefixtures("placed_once")
+@pytest.mark.usefixtures("laid_out_once")
 def test_plot_draws_what_is_asked(solved: Path) -> None:
     done = inside(solved, "plot", "sphere.nc", "--what", "all", "--step", "1")
     assert done.returncode == 0, done.stderr

@@ -74,18 +74,18 @@ def run(*words: str | Path, root: Path) -> str:
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the sources with all additions, built without optimization to save time."""
+    """A copy of the sources with all additions, built without optimization, which is quick."""
     root = tmp_path_factory.mktemp("guide")
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "flat.py")
     for name in SOURCES:
         shutil.copytree(ROOT / name, root / name, ignore=unwanted)
     for path in [path for path in ROOT.iterdir() if path.is_file()]:
         shutil.copy2(path, root)
-    build = root / "build/guide"
-    run("meson", "setup", build, "-Dpython=true", "-Dtests=false", "-Doptimization=0", root=root)
     for text in sections().values():
         for file, old, new in changes_of(text):
             change(root, file, old, new)
+    build = root / "build/guide"
+    run("meson", "setup", build, "-Dpython=true", "-Dtests=false", "-Doptimization=0", root=root)
     [extension] = re.findall(r"^build (pydriver/_core\S+\.so):", (build / "build.ninja").read_text(), re.M)
     run("ninja", "-C", build, extension, root=root)
     for made in (build / extension, build / "pydriver/flat.py"):

@@ -295,6 +295,7 @@ def test_piped_help_ends_without_blanks() -> None:
     assert [line for line in lines if line != line.rstrip()] == []
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_written_files_have_the_names_that_were_given(folder: Path) -> None:
     (folder / "sub").mkdir()
     for given in ("sub/out.nc", str(folder / "sub/out.nc")):

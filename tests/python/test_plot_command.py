@@ -23,9 +23,8 @@ from hexcontact.plotting import registry
 from hexcontact.plotting.registry import entries
 from hexcontact.variables import MAPS
 
-pytestmark = pytest.mark.usefixtures("placed_once")
-
 CASE = Path(__file__).parents[2] / "cases" / "hertz_spheres.toml"
+pytestmark = pytest.mark.usefixtures("laid_out_once")
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
 

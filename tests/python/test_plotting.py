@@ -23,8 +23,6 @@ from hexcontact.plotting.style import new_figure, set_title
 from hexcontact.result.view import StepView
 from hexcontact.text import scaled, worded
 
-pytestmark = pytest.mark.usefixtures("placed_once")
-
 HEIGHT = np.sqrt(0.75)
 
 
@@ -206,6 +204,7 @@ def test_every_figure_is_painted_and_titled(name: str) -> None:
     drawn.assert_painted(figure)
 
 
+@pytest.mark.usefixtures("laid_out_once")
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
 @pytest.mark.parametrize("name", FRICTIONLESS)
 def test_lines_and_areas_are_in_every_kind_of_file(name: str, kind: str) -> None:

@@ -35,8 +35,6 @@ from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.step import Step
 from hexcontact.result.view import StepView
 
-pytestmark = pytest.mark.usefixtures("placed_once")
-
 MODULUS, GAMMA, MU, LOAD, RADIUS = 2.0, 0.4, 0.3, 0.8, 1.5
 HERTZ = analytic.hertz_sphere(MODULUS, RADIUS, normal_load=LOAD)
 MINDLIN = MindlinContact(MU, LOAD, HERTZ.contact_radius, 4.0 / MODULUS * (1.0 + GAMMA / 2.0))
@@ -427,6 +425,7 @@ def test_tractions_along_an_oblique_line_through_a_point() -> None:
     assert lower.get_xlabel() == "distance from (100, -200) mm along 20° (m)"
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_a_family_of_tractions() -> None:
     result = loop()
     steps = [3, 4, 5, 7]
@@ -540,6 +539,7 @@ def patch_area(patch: PathPatch, factor: float) -> float:
     return area([polygon * factor for polygon in patch.get_path().to_polygons(closed_only=False)])
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_zone_maps_fill_contact_and_stick_area() -> None:
     result = dissimilar()
     figure = plotting.zones(result, [2, 3, 4])
@@ -566,6 +566,7 @@ def test_places_without_a_map_stay_empty() -> None:
     assert [axes.get_visible() for axes in figure.axes] == [True] * 5 + [False]
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_zone_maps_of_steps_differ_as_their_zones_do() -> None:
     panels = drawn.visible(plotting.zones(cattaneo(), [2, 4]))
     for axes, step in zip(panels, (2, 4), strict=True):
@@ -595,6 +596,7 @@ def test_zone_map_shows_the_closed_stick_area() -> None:
     np.testing.assert_allclose(arrows.U, MINDLIN.traction(radius, 0.5 * SLIDING), rtol=1e-9)
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_zones_of_several_results() -> None:
     panels = drawn.visible(plotting.zones([cattaneo(), dissimilar()], [2, 4]))
     views = [StepView.of(result, step) for result in (cattaneo(), dissimilar()) for step in (2, 4)]
@@ -604,6 +606,7 @@ def test_zones_of_several_results() -> None:
         plotting.zones([cattaneo(), frictionless()])
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_outlines_of_stick_areas() -> None:
     result = dissimilar()
     axes = plotting.outlines(result, [2, 3]).axes[0]
@@ -645,6 +648,7 @@ def test_boundary_tells_sticking_nodes_apart() -> None:
 # ----------------------------------------------------------------------------------- maps
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_map_of_the_shear_traction() -> None:
     result = dissimilar()
     figure = plotting.FIGURES["traction"](result, 3)
@@ -665,6 +669,7 @@ def test_map_of_the_shear_traction() -> None:
     np.testing.assert_allclose(arrows.U, 0.5 * SLIDING * np.exp(-((x - 0.2) ** 2) - y**2), atol=1e-9)
 
 
+@pytest.mark.usefixtures("laid_out_once")
 @pytest.mark.parametrize(
     ("name", "label"),
     [
@@ -687,6 +692,7 @@ def test_signed_maps_are_white_at_zero() -> None:
     assert mesh.get_clim()[0] == 0.0
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_maps_of_several_steps_share_a_scale() -> None:
     figure = plotting.FIGURES["traction_x"](dissimilar(), [2, 3, 4])
     limits = [axes.collections[0].get_clim() for axes in figure.axes if axes.get_title()]
@@ -703,6 +709,7 @@ def test_maps_of_several_steps_share_a_scale() -> None:
         assert (values > 0.0).sum() == (view.contact & (view.data["traction_x"].values > 0.0)).sum()
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_map_of_the_slip() -> None:
     result = cattaneo()
     figure = plotting.FIGURES["slip_increment"](result, 4)
@@ -736,6 +743,7 @@ def test_history_leaves_out_what_stays_zero() -> None:
     assert ("tangential_load_x",) not in panels(torsion())
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_every_panel_of_a_history_shows_its_quantities() -> None:
     result = cattaneo()
     shown = drawn.visible(plotting.history(result))
@@ -749,6 +757,7 @@ def test_every_panel_of_a_history_shows_its_quantities() -> None:
             np.testing.assert_allclose(found, [0.0, *result[name].values], rtol=1e-12, err_msg=name)
 
 
+@pytest.mark.usefixtures("laid_out_once")
 @pytest.mark.parametrize("over", ["step", "tangential_load_x"])
 def test_history_shows_areas_over_steps_or_load(over: str) -> None:
     result = cattaneo()
@@ -815,6 +824,7 @@ def test_a_loop_names_only_lines_that_are_seen(most: float) -> None:
     assert all(low < float(y) < high for line in lines for y in np.asarray(line.get_ydata()))
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_many_maps_have_no_arrows() -> None:
     result = made([PRESSED, sheared(0.5 * SLIDING)])
     for count, arrows in ((9, True), (10, False)):
@@ -856,6 +866,7 @@ def test_initial_compliance() -> None:
 # ----------------------------------------------------------------------------------- all of them
 
 
+@pytest.mark.usefixtures("laid_out_once")
 def test_overview_shows_maps_zones_section_and_history() -> None:
     result = cattaneo()
     view = StepView.of(result, 3)
@@ -942,6 +953,7 @@ def test_every_figure_is_painted(name: str) -> None:
     drawn.assert_painted(figure)
 
 
+@pytest.mark.usefixtures("laid_out_once")
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
 @pytest.mark.parametrize("name", ["tractions", "zones", "outlines", "loop", "torsion"])
 def test_lines_and_areas_are_in_every_kind_of_file(name: str, kind: str) -> None:

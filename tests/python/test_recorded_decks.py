@@ -1,14 +1,12 @@
 """Results whose deck another version has written, or a script: nothing is left out without a word."""
 
 import ast
-import subprocess
-import sys
 from pathlib import Path
 
 import netCDF4
 import numpy as np
 import pytest
-from commands import ENVIRONMENT
+from commands import inside
 
 from hexcontact import Case, open_result
 from hexcontact.errors import DeckError
@@ -37,11 +35,6 @@ file = "out.nc"
 """
 
 
-def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    call = [sys.executable, "-m", "hexcontact", *arguments]
-    return subprocess.run(call, cwd=folder, env=ENVIRONMENT, text=True, capture_output=True, check=False)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("results") / "out.nc"
@@ -63,7 +56,7 @@ def test_tables_with_an_unknown_key_are_refused_before_anything_is_written(
 ) -> None:
     file = later(finished, tmp_path, "[[stress]]")
     for given in (("export", file, "--vtk", "-o", tmp_path / "vtk"), ("report", file)):
-        done = command(tmp_path, *map(str, given))
+        done = inside(tmp_path, *map(str, given))
         assert done.returncode == 2
         assert "deck of the result:" in done.stderr
         assert "stress.1.fineness: unknown key" in done.stderr
@@ -73,7 +66,7 @@ def test_tables_with_an_unknown_key_are_refused_before_anything_is_written(
 
 def test_an_unknown_key_elsewhere_does_not_matter(finished: Path, tmp_path: Path) -> None:
     file = later(finished, tmp_path, "[solver]")
-    assert command(tmp_path, "export", str(file), "--vtk").returncode == 0
+    assert inside(tmp_path, "export", str(file), "--vtk").returncode == 0
     assert (tmp_path / "later_export/later_axis.pvd").is_file()
 
 
@@ -82,10 +75,10 @@ def test_unknown_keys_of_bodies(finished: Path, tmp_path: Path) -> None:
     file = later(finished, tmp_path, "[body.1]")
     with pytest.raises(DeckError, match="body.1.fineness: unknown key"):
         open_result(file).stress(points=[[0.0, 0.0, 1e-5]])
-    shown = command(tmp_path, "info", str(file))
+    shown = inside(tmp_path, "info", str(file))
     assert shown.returncode == 0
     assert "note: not compared with Hertz: deck of the result:" in shown.stdout
-    assert "Against Hertz" in command(tmp_path, "info", str(finished)).stdout
+    assert "Against Hertz" in inside(tmp_path, "info", str(finished)).stdout
 
 
 def test_stress_of_a_result_whose_gap_is_from_python() -> None:

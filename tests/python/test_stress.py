@@ -4,12 +4,12 @@ import base64
 import csv
 import os
 import subprocess
-import sys
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
+import commands
 import drawn
 import numpy as np
 import pytest
@@ -432,14 +432,9 @@ steps = 2
 """
 
 
-def command(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    call = [sys.executable, "-m", "hexcontact", *words]
-    return subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-
-
 def checked(tmp_path: Path, *lines: Sequence[str]) -> subprocess.CompletedProcess[str]:
     (tmp_path / "deck.toml").write_text(DECK + "[[stress]]\n" + "\n".join(lines))
-    return command(tmp_path, "check", "deck.toml")
+    return commands.inside(tmp_path, "check", "deck.toml")
 
 
 def test_tables_of_a_deck(tmp_path: Path) -> None:
@@ -454,7 +449,7 @@ components = ["von_mises_stress", "displacement_z"]
 depths = ["0 um", "0.1 mm"]
 """
     (tmp_path / "deck.toml").write_text(DECK + tables)
-    done = command(tmp_path, "run", "deck.toml", "--quiet")
+    done = commands.inside(tmp_path, "run", "deck.toml", "--quiet")
     assert done.returncode == 0, done.stderr
     with xarray.open_dataset(tmp_path / "deck_axis.nc") as axis:
         assert axis["von_mises_stress"].sizes == {"step": 2, "distance": 21}
@@ -464,10 +459,10 @@ depths = ["0 um", "0.1 mm"]
     with xarray.open_dataset(tmp_path / "deck_stress_2.nc") as box:
         assert box["stress_zz"].dims == ("step", "depth", "row", "col")
         assert box["depth"].values.tolist() == [0.0, 1e-4]
-    assert command(tmp_path, "export", "deck.nc", "--vtk").returncode == 0
+    assert commands.inside(tmp_path, "export", "deck.nc", "--vtk").returncode == 0
     assert (tmp_path / "deck_export" / "deck_axis.pvd").is_file()
     check_volume(tmp_path)
-    done = command(tmp_path, "export", "deck.nc", "--csv")
+    done = commands.inside(tmp_path, "export", "deck.nc", "--csv")
     assert done.stdout.split()[1::2] == [f"deck_export/deck_{n}.csv" for n in ("history", "axis", "stress_2")]
     rows = (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines()
     assert rows[0].startswith(
@@ -476,9 +471,9 @@ depths = ["0 um", "0.1 mm"]
     assert [row.split(",")[0] for row in rows[1:]] == ["1"] * 21 + ["2"] * 21
     (tmp_path / "deck_axis.nc").unlink()  # then it is computed anew
     (tmp_path / "deck_export/deck_axis.csv").unlink()
-    assert command(tmp_path, "export", "deck.nc", "--csv").returncode == 0
+    assert commands.inside(tmp_path, "export", "deck.nc", "--csv").returncode == 0
     assert (tmp_path / "deck_export/deck_axis.csv").read_text().splitlines() == rows
-    assert command(tmp_path, "report", "deck.nc").returncode == 0
+    assert commands.inside(tmp_path, "report", "deck.nc").returncode == 0
     page = (tmp_path / "deck.html").read_text()
     assert page.count('<figure class="picture">') == 1
     picture = base64.b64decode(page.split("data:image/png;base64,")[1].split('"')[0])
@@ -560,8 +555,8 @@ steps = [1, 2]
 components = ["displacement_z", "von_mises_stress"]
 """
     (tmp_path / "deck.toml").write_text(DECK + tables)
-    assert command(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
-    assert command(tmp_path, "plot", "deck.nc", "--what", "lines").returncode == 0
+    assert commands.inside(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
+    assert commands.inside(tmp_path, "plot", "deck.nc", "--what", "lines").returncode == 0
     result = open_result(tmp_path / "deck.nc")
     canvas = plotting.lines(result)
     drawn.assert_painted(canvas)
@@ -592,8 +587,8 @@ components = ["displacement_z", "von_mises_stress"]
 def test_a_table_with_the_name_of_another_export_is_refused(tmp_path: Path) -> None:
     table = '[[stress]]\nname = "history"\npoints = [[0, 0, 0]]\n'
     (tmp_path / "deck.toml").write_text(DECK + table)
-    assert command(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
-    done = command(tmp_path, "export", "deck.nc", "--csv")
+    assert commands.inside(tmp_path, "run", "deck.toml", "--quiet").returncode == 0
+    done = commands.inside(tmp_path, "export", "deck.nc", "--csv")
     assert done.returncode == 2 and "the table history would be written to" in done.stderr
     assert not (tmp_path / "deck_export").exists()
 
@@ -637,7 +632,7 @@ def test_a_run_that_was_killed_before_its_stresses_gets_them(tmp_path: Path) -> 
     left = tmp_path / f"deck_stress_1.nc.{(1 << 22) + 1}.tmp"  # no process has such a number
     left.write_text("")
     os.utime(left, (0.0, 0.0))
-    assert command(tmp_path, "resume", "deck.nc").returncode == 0
+    assert commands.inside(tmp_path, "resume", "deck.nc").returncode == 0
     assert not left.exists()
     with xarray.open_dataset(target) as found:
         assert found.identical(expected)

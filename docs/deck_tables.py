@@ -62,7 +62,9 @@ def default_of(info: Any) -> str:
         return "required"
     if info.default in (None, "", (), {}) or info.default_factory is not None:
         return ""
-    return f"`{shown(info.default)}`" if info.default != 0.0 or info.default is False else "0"
+    kind = kind_of(info)
+    default = kind.written(info.default) if isinstance(kind, Quantity) else info.default
+    return f"`{shown(default)}`" if info.default != 0.0 or info.default is False else "0"
 
 
 def innermost(kind: Kind | None) -> Kind | None:

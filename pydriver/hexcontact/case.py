@@ -13,6 +13,7 @@ from .core.lattice import Lattice
 from .deck.keys import FINENESS, Grid, Solver
 from .deck.read import Assembled, assemble
 from .deck.toml import plain, refuse_deep, with_overrides
+from .deck.units import angle_text
 from .errors import DeckError, PlausibilityWarning, warn
 from .problem import plausibility
 from .problem.arguments import Body, known_keywords, middle_of, refuse_unknown, with_radians
@@ -167,7 +168,7 @@ class Case(Problem):
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            cell_ratio, cell_angle = lattice.cell_ratio, f"{lattice.cell_angle!r} rad"
+            cell_ratio, cell_angle = lattice.cell_ratio, angle_text(lattice.cell_angle)
             if not callable(own_gap):  # the deck of the case leads to the same window
                 center = middle_of(lattice)
         arguments = locals()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hexcontact.deck import units
 from hexcontact.deck.keys import WEAR_COEFFICIENT as COEFFICIENT
-from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, to_si
+from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, angle_text, to_si
 
 
 @pytest.mark.parametrize(
@@ -149,3 +149,12 @@ def test_pint_is_imported_only_for_unusual_units() -> None:
         "to_si('3 inch', LENGTH); assert 'pint' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_written_angles_are_read_to_the_same_bits() -> None:
+    """In degrees where these are exact: the angle of the equilateral lattice is 60 deg."""
+    assert angle_text(math.pi / 3) == "60 deg"
+    assert angle_text(-0.3).endswith("rad")
+    for degrees in range(-360, 361):
+        for angle in (math.radians(degrees), degrees * 0.01234567890123):
+            assert to_si(angle_text(angle), ANGLE) == angle

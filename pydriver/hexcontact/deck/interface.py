@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 from ..text import quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .table_base import Table, meaning
-from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, to_si
+from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, angle_text, to_si
 
 FROM_PYTHON = "python"  # in the deck of a case with a coefficient from Python
 _GRID = ("x", "y", "values")
@@ -66,7 +66,7 @@ class FrictionKind(Kind):
     def written(self, value: float | NodalCoefficient | TwoCoefficients) -> Any:
         """Return the number, text or table of a deck."""
         if isinstance(value, TwoCoefficients):
-            return {"along": value.along, "across": value.across, "angle": f"{value.angle!r} rad"}
+            return {"along": value.along, "across": value.across, "angle": angle_text(value.angle)}
         return value.in_deck if isinstance(value, NodalCoefficient) else value
 
     def _parse(self, value: object) -> float | NodalCoefficient | TwoCoefficients:

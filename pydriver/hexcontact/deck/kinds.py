@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from ..arrays import Array
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
-from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, spelled, to_si
+from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, angle_text, spelled, to_si
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "tanh")
@@ -211,7 +211,7 @@ class Quantity(Kind):
 
     def written(self, value: float) -> float | str:
         """Return a number in SI, with its unit if the dimension requires one."""
-        return f"{value!r} rad" if self.dimension is ANGLE else value
+        return angle_text(value) if self.dimension is ANGLE else value
 
     def _parse(self, value: object) -> float:
         try:

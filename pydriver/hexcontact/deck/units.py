@@ -113,6 +113,12 @@ def _plain(unit: str, dimension: Dimension) -> str:
     return _BRACKETS.sub(product, _BRACKETS.sub(product, unit))
 
 
+def angle_text(value: float) -> str:
+    """Write an angle (rad) in degrees if they are read as the same angle, else in radians."""
+    degrees = f"{math.degrees(value):.12g}"
+    return f"{degrees} deg" if float(degrees) * _ANGLES["deg"] == value else f"{value!r} rad"
+
+
 def _from_text(text: str, dimension: Dimension) -> float:
     match = _QUANTITY.fullmatch(spelled(text.strip())) if len(text) <= LONGEST else None
     if match is None:

@@ -22,7 +22,7 @@ module hc_wear_path
   use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
   use hc_field_space, only: space_over
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_load, n_motion, normal, &
                               separated
@@ -89,8 +89,8 @@ module hc_wear_path
     real(wp) :: cycle_tolerance = 3.0e-4_wp
     !> The window grows: a load step that reaches its rim is solved again on a larger one
     logical :: grows = .false.
-    !> Elastic constants by which nodes are indented, (V6); not allocated: those of the problem
-    type(elastic_pair_t), allocatable :: pair
+    !> Medium that nodes indent, (V6); not allocated before a cycle: that of the problem
+    class(elastic_medium_t), allocatable :: medium
     !> Last solved cycle
     type(wear_cycle_t), allocatable :: cycle
     !> Worn volume [m^3], largest worn depth and bound on its error [m]
@@ -192,6 +192,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     self%verdict = pending
+    if (.not. allocated(self%medium)) allocate (self%medium, source=solver%problem%medium)
     if (self%place == 0) call self%begin_cycle(solver, error, cache)
     if (.not. allocated(error)) call self%solve_step(solver, error)
     if (.not. allocated(error) .and. self%verdict == pending .and. self%place > size(self%steps)) then
@@ -427,7 +428,7 @@ contains
     jumps%both = jumps%first
     jumps%cycles = 1.0_wp
     allocate (slower, mold=jumps%first)
-    call jump_change(problem%lattice, indented_pair(self, problem), law, jumps, maxval(self%cycle%state%pressure), slower, change)
+    call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
     ! the first step of a segment is `most_growth` times as large
     self%control%first = 0.5_wp*min(1.0_wp, 1.0_wp/max(change%added*self%cycles, 1.0e-300_wp))
   end subroutine close_cycle
@@ -455,10 +456,8 @@ contains
     allocate (slower, self%next%ahead, mold=jumps%first)
     law%coefficient = self%coefficient
     law%friction = self%friction
-    associate (pair => indented_pair(self, problem))
-      call jump_change(problem%lattice, pair, law, jumps, maxval(self%cycle%state%pressure), slower, change)
-      call energy_of_second_jump(problem%lattice, pair, law, jumps, self%next%path, self%next%ahead)
-    end associate
+    call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
+    call energy_of_second_jump(problem%lattice, self%medium, law, jumps, self%next%path, self%next%ahead)
     self%next%change = self%next%change + slower
     if (self%jump > 0.0_wp) return
     call self%control%decide(self%attempt, .true., change, self%tolerance, verdict)
@@ -492,7 +491,7 @@ contains
     if (allocated(error)) return
     now = worn_cycle_t(cycle%energy, cycle%path, cycle%state%pressure, merge(cycle%state%gap, 0.0_wp, problem%candidate), &
                        problem%candidate, self%friction, self%steps(1)%target%control(normal) == force_control)
-    call new_normal_problem(pressed, problem%lattice, problem%pair, now%gap, problem%candidate, error, problem%normal_law)
+    call new_normal_problem(pressed, problem%lattice, problem%medium, now%gap, problem%candidate, error, problem%normal_law)
     if (allocated(error)) return
     allocate (energy, mold=cycle%energy)
     call energy_ahead(now, pressed, cycles*self%coefficient, self%cycle_tolerance, energy, error, cache)
@@ -508,16 +507,6 @@ contains
     self%deepest = maxval(self%cycle%worn)
     self%depth_error = depth_safety*maxval(abs(self%cycle%change)) + self%left*self%deepest
   end subroutine measure
-
-  !> Return the elastic constants by which nodes are indented.
-  pure type(elastic_pair_t) function indented_pair(self, problem) result(pair)
-    class(wear_path_t), intent(in) :: self
-    !> The problem
-    type(friction_problem_t), intent(in) :: problem
-
-    pair = problem%pair
-    if (allocated(self%pair)) pair = self%pair
-  end function indented_pair
 
   !> Return the coefficient of friction of each node: its bound under a pressure of 1.
   pure function nodal_coefficients(problem) result(coefficient)

@@ -286,7 +286,9 @@ contains
     system%matrix = 0.0_wp
     do i = 1, 5
       system%matrix(i, i) = 1.0_wp + i
-      if (i > 1) system%matrix(i, i - 1) = -4.0_wp
+    end do
+    do i = 2, 5
+      system%matrix(i, i - 1) = -4.0_wp
     end do
     call new_active_set(nodes, [(.true., i=1, 5)], system%space)
     do i = 1, 2

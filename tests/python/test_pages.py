@@ -2,7 +2,6 @@
 
 import re
 import runpy
-import shlex
 import sys
 import tomllib
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import plotting
 from hexcontact.cli.app import app
 
 ROOT = Path(__file__).parents[2]

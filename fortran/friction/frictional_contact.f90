@@ -11,7 +11,7 @@ module hc_frictional_contact
   use hc_options, only: newton_options_t
   use hc_field_space, only: space_over
   use hc_scratch, only: scratch_t
-  use hc_hierarchy, only: level_count, build_levels, restrict_gap
+  use hc_hierarchy, only: level_count
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
@@ -64,7 +64,10 @@ contains
     self%problem = problem
     n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
-    call build_levels(self%problem, self%coarse)
+    if (n_level > 1) call self%problem%coarsen(self%coarse(2))
+    do l = 3, n_level
+      call self%coarse(l - 1)%coarsen(self%coarse(l))
+    end do
     ! transforms of all lattices take turns
     scratch => null()
     if (present(shared)) scratch => shared
@@ -93,9 +96,13 @@ contains
   subroutine set_gap(self, gap)
     class(frictional_contact_t), intent(inout) :: self
     real(wp), intent(in) :: gap(:, :)
+    integer :: l
 
     self%problem%initial_gap = gap
-    call restrict_gap(self%problem, self%coarse)
+    if (size(self%coarse) > 0) call self%problem%coarsen_gap(self%coarse(2))
+    do l = 3, ubound(self%coarse, 1)
+      call self%coarse(l - 1)%coarsen_gap(self%coarse(l))
+    end do
   end subroutine set_gap
 
   !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.

@@ -11,7 +11,7 @@ module hc_normal_contact
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
-  use hc_hierarchy, only: level_count, build_levels
+  use hc_hierarchy, only: level_count
   use hc_elastic_medium, only: elastic_medium_t
   use hc_fftw, only: good_size
   use hc_fft_layout_single, only: convolution_memory
@@ -97,7 +97,9 @@ contains
     self%level(1)%options = self%options
     call new_normal_problem(self%level(1), lattice, medium, initial_gap, candidate, error, law)
     if (allocated(error)) return
-    call build_levels(self%level(1), self%level(2:))
+    do l = 2, size(self%level)
+      call self%level(l - 1)%coarsen(self%level(l))
+    end do
     do l = 1, size(self%level)
       ! operators for iterations on the finest lattice are set up on demand: a part of it may be enough
       call self%level(l)%prepare(self%kernel, l == 1, l > 1, space_of(self, self%level(l)%lattice), error, self%cache)

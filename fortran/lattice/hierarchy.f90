@@ -9,7 +9,7 @@ module hc_hierarchy
   implicit none
   private
 
-  public :: level_t, level_count, build_levels, restrict_gap
+  public :: level_t, level_count
 
   !> Contact problem on one lattice.
   type, abstract :: level_t
@@ -24,6 +24,8 @@ module hc_hierarchy
   contains
     !> The same problem on the lattice of every second node
     procedure :: coarsen
+    !> Gap of the problem there, set again
+    procedure :: coarsen_gap
     !> The same problem on a part of its window
     procedure :: extract_part
     !> Bodies, laws and tuning numbers, from the same problem on another lattice
@@ -59,36 +61,6 @@ contains
     end do
   end function level_count
 
-  !> Set up the problem on all coarser lattices.
-  subroutine build_levels(finest, coarse)
-    !> The problem on the finest lattice
-    class(level_t), intent(in) :: finest
-    !> The same on the coarser ones, finer ones first
-    class(level_t), intent(inout) :: coarse(:)
-    integer :: l
-
-    if (size(coarse) == 0) return
-    call finest%coarsen(coarse(1))
-    do l = 2, size(coarse)
-      call coarse(l - 1)%coarsen(coarse(l))
-    end do
-  end subroutine build_levels
-
-  !> Set the gap on all coarser lattices again.
-  subroutine restrict_gap(finest, coarse)
-    !> The problem on the finest lattice
-    class(level_t), intent(in) :: finest
-    !> The same on the coarser ones, finer ones first
-    class(level_t), intent(inout) :: coarse(:)
-    integer :: l
-
-    if (size(coarse) == 0) return
-    coarse(1)%initial_gap = restrict_field(finest%lattice, finest%initial_gap, coarse(1)%lattice)
-    do l = 2, size(coarse)
-      coarse(l)%initial_gap = restrict_field(coarse(l - 1)%lattice, coarse(l - 1)%initial_gap, coarse(l)%lattice)
-    end do
-  end subroutine restrict_gap
-
   !> Set up the same problem on the lattice of every second node.
   subroutine coarsen(self, coarse)
     class(level_t), intent(in) :: self
@@ -96,11 +68,20 @@ contains
     class(level_t), intent(inout) :: coarse
 
     coarse%lattice = self%lattice%coarsened()
-    coarse%initial_gap = restrict_field(self%lattice, self%initial_gap, coarse%lattice)
+    call self%coarsen_gap(coarse)
     coarse%candidate = restrict_mask(self%lattice, self%candidate, coarse%lattice)
     coarse%space = self%space
     call coarse%inherit(self)
   end subroutine coarsen
+
+  !> Set the gap of the problem on the lattice of every second node again.
+  subroutine coarsen_gap(self, coarse)
+    class(level_t), intent(in) :: self
+    !> The problem there
+    class(level_t), intent(inout) :: coarse
+
+    coarse%initial_gap = restrict_field(self%lattice, self%initial_gap, coarse%lattice)
+  end subroutine coarsen_gap
 
   !> Set up the same problem on the part of its window between some columns and rows.
   subroutine extract_part(self, low, high, part)

@@ -1,7 +1,6 @@
 !> What no public procedure may take: each is answered by an error, none by a solution or a loop without end.
 module test_arguments
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
-  use hc_build_options, only: perturb_convolution
   use hc_precision, only: wp
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
@@ -404,8 +403,8 @@ contains
   !> A tolerance that rounding errors exceed: the iteration ends, with a solution that is as good as it gets.
   subroutine test_any_tolerance(error)
     type(error_t), allocatable, intent(out) :: error
-    ! on perturbed products the iteration ends earlier: 8e-9 measured
-    real(wp), parameter :: as_good = merge(1.0e-7_wp, 1.0e-12_wp, perturb_convolution)
+    ! a tolerance below rounding errors is never met: residuals of the last of 60 iterations are 1e-16 to 8e-9, by compiler and FFT
+    real(wp), parameter :: as_good = 1.0e-7_wp
     type(lattice_t) :: lattice
     type(normal_contact_t) :: contact
     type(contact_state_t) :: state

@@ -210,7 +210,7 @@ def test_history_and_fields_as_tables(folder: Path, tmp_path: Path) -> None:
     code, out, _ = export(folder / "sheared.nc", "--csv", "-s", "4", "--source", "nodes", "-o", tmp_path)
     assert code == 0 and len(out.splitlines()) == 2
     own = open_result(folder / "sheared.nc")
-    history = pd.read_csv(tmp_path / "sheared_history.csv", index_col="step")
+    history = pd.read_csv(tmp_path / "sheared_history.csv", index_col="step", float_precision="round_trip")
     np.testing.assert_array_equal(history["approach [m]"], own.approach)
     with (tmp_path / "sheared_0004.csv").open() as file:
         rows = list(csv.DictReader(file))

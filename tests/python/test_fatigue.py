@@ -423,12 +423,13 @@ def test_tables_are_exported_as_csv(finished: Path) -> None:
         for _ in range(2):  # over what was exported before, too
             code, text = command(finished, "export", *words, "--csv")
             assert code == 0, text
-        table = pandas.read_csv(finished / folder / "deck_line.csv")
+        table = pandas.read_csv(finished / folder / "deck_line.csv", float_precision="round_trip")
         with xarray.open_dataset(finished / "deck_line.nc") as found:
             assert table.columns[:5].tolist() == [*("x [m]", "y [m]", "depth [m]", "distance [m]", "life")]
             for name in ("x", "y", "depth", "distance", "findley"):
                 np.testing.assert_array_equal(table.filter(regex=rf"^{name} \["), found[name].values[:, None])
-    surface = pandas.read_csv(finished / "deck_export/deck_fatigue_1.csv")
+    path = finished / "deck_export/deck_fatigue_1.csv"
+    surface = pandas.read_csv(path, float_precision="round_trip")
     with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
         assert len(surface) == found["x"].size
         for name in ("x [m]", "y [m]", "life", "ruiz_f2 [Pa2 m]"):

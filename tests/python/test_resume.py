@@ -542,7 +542,7 @@ def test_a_signal_ends_the_run_and_resume_goes_on(
         r"to resume: hexcontact resume '.*a sphere\.nc'\n$",
         told,
     )
-    assert match
+    assert match, told
     assert int(match[1]) >= 3
     done = hexcontact_(tmp_path, "resume", "a sphere.nc")
     assert done.returncode == 0

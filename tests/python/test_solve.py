@@ -286,6 +286,14 @@ def test_progress_in_a_log_is_a_line_by_step() -> None:
         assert word in second
 
 
+def test_progress_ends_with_the_run() -> None:
+    lines = Lines(io.StringIO())
+    with pytest.raises(KeyboardInterrupt), lines.following("sphere", 2):
+        raise KeyboardInterrupt
+    lines.said("step", "of a thread that still solves")
+    assert lines.stream.getvalue() == "sphere: 2 load steps\n"  # type: ignore[attr-defined]
+
+
 def test_the_bar_moves_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

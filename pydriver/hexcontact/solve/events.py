@@ -93,11 +93,11 @@ class Lines(Listener):
     def __init__(self, stream: IO[str]) -> None:
         self.stream = stream
         self.steps = 0
-        self._shifted = False
+        self._shifted = self._over = False
 
     def begun(self, title: str, steps: int) -> None:
         """Print the title and the number of steps."""
-        self.steps = steps
+        self.steps, self._over = steps, False
         count = f"{steps} load step{'s' * (steps != 1)}" if steps else "steps that are chosen on the way"
         self._print(f"{title or 'case'}: {count}")
 
@@ -121,7 +121,13 @@ class Lines(Listener):
             number = f"{step.number:>3} ({step.done:4.0%})"
         self._print(f"step {number}  {describe(step.history)}")
 
+    def ended(self, error: BaseException | None) -> None:
+        """Print nothing more: after a signal the solving thread may finish its step."""
+        self._over = True
+
     def _print(self, line: str) -> None:
+        if self._over:
+            return
         with contextlib.suppress(OSError):  # the reader has closed; the run continues
             print(visible(line), file=self.stream, flush=True)
 

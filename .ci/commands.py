@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def run(*words: str | Path, folder: Path = ROOT, environment: Mapping[str, str] | None = None) -> str:
-    """Run a command and return what it prints; end with its output where it fails."""
+    """Run a command and return its output; on failure exit with that output."""
     line = " ".join(str(word) for word in words)
     print("$", line, flush=True)
     done = subprocess.run(

@@ -385,8 +385,8 @@ contains
     call self%measure(solver%problem%lattice%cell_area())
   end subroutine end_cycle
 
-  !> Decide whether the unworn cycle is closed, (V9), and choose the first jump: each half wears off as much as the largest
-  !> pressure indents a node.
+  !> Decide whether the unworn cycle is closed, (V9), and choose the first pair of jumps: the wear of each is the indentation of a
+  !> node by the largest pressure.
   subroutine close_cycle(self, problem, error)
     class(wear_path_t), intent(inout) :: self
     !> The problem
@@ -421,11 +421,11 @@ contains
     self%closed = self%left <= self%tolerance .or. self%unworn >= self%most_unworn
     if (.not. self%closed) return
     self%verdict = accepted
-    law%coefficient = self%coefficient
-    law%friction = self%friction
+    law = wear_law_t(self%coefficient, self%friction)
     jumps%second = self%cycle%energy
-    jumps%first = 0.0_wp*jumps%second
-    jumps%both = jumps%first
+    allocate (jumps%first, jumps%both, mold=jumps%second)
+    jumps%first = 0.0_wp
+    jumps%both = 0.0_wp
     jumps%cycles = 1.0_wp
     allocate (slower, mold=jumps%first)
     call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
@@ -454,8 +454,7 @@ contains
     jumps%first = self%first
     jumps%both = self%both
     allocate (slower, self%next%ahead, mold=jumps%first)
-    law%coefficient = self%coefficient
-    law%friction = self%friction
+    law = wear_law_t(self%coefficient, self%friction)
     call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
     call energy_of_second_jump(problem%lattice, self%medium, law, jumps, self%next%path, self%next%ahead)
     self%next%change = self%next%change + slower
@@ -573,7 +572,7 @@ contains
     end associate
   end subroutine remember
 
-  !> Go on with the solver of a larger window, at the present load step.
+  !> Continue on the solver of a larger window, at the present load step.
   subroutine carry(self, solver, lattice, error)
     class(wear_path_t), intent(inout) :: self
     !> Method on the larger window

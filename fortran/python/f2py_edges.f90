@@ -93,7 +93,7 @@ contains
     end if
   end function distances_of
 
-  !> Set up the tractions between the nodes as arrays: 5, or as many as a field with a law of friction has.
+  !> Set up the tractions between the nodes as arrays: 5, or `n_part` with a law of friction.
   subroutine field_of(lattice, fields, zones, traction, friction, parts)
     type(lattice_t), intent(in) :: lattice
     real(wp), intent(in) :: fields(:, :, :)

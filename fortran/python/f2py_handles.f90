@@ -227,6 +227,19 @@ contains
     end if
   end subroutine hold
 
+  !> Return the slot of a handle, which other threads may use; null if it is stale.
+  function slot_of(handle) result(slot)
+    integer(c_int64_t), intent(in) :: handle
+    type(slot_t), pointer :: slot
+    integer :: place
+
+    slot => null()
+    call lock(handle_table)
+    place = place_of(handle)
+    if (place > 0) slot => entries(place)%slot
+    call unlock(handle_table)
+  end function slot_of
+
   !> Return the state of a handle.
   subroutine find_state(handle, extent, state, error)
     !> Its handle
@@ -237,13 +250,11 @@ contains
     type(contact_state_t), pointer, intent(out) :: state
     !> Allocated if the handle is stale, or the state is that of another window
     type(error_t), allocatable, intent(out) :: error
-    integer :: place
+    type(slot_t), pointer :: slot
 
     state => null()
-    call lock(handle_table)
-    place = place_of(handle)
-    if (place > 0) state => entries(place)%slot%state
-    call unlock(handle_table)
+    slot => slot_of(handle)
+    if (associated(slot)) state => slot%state
     if (associated(state)) then
       if (all(shape(state%pressure) == extent)) return
     end if
@@ -276,13 +287,11 @@ contains
     type(wear_path_t), pointer, intent(out) :: path
     !> Allocated if the handle is stale
     type(error_t), allocatable, intent(out) :: error
-    integer :: place
+    type(slot_t), pointer :: slot
 
     path => null()
-    call lock(handle_table)
-    place = place_of(handle)
-    if (place > 0) path => entries(place)%slot%wear
-    call unlock(handle_table)
+    slot => slot_of(handle)
+    if (associated(slot)) path => slot%wear
     if (.not. associated(path)) call raise(error, status%bad_handle, 'the handle is stale: its path has been freed')
   end subroutine find_wear
 

@@ -470,7 +470,7 @@ contains
     call execute_command_line('rm -r '//folder)
   end subroutine test_files
 
-  !> A medium refuses what it cannot be.
+  !> Elastic constants of no body are refused.
   subroutine test_refused(error)
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: raised

@@ -103,7 +103,7 @@ contains
                     'bound on the error')
   end subroutine test_wear_path
 
-  !> Press a sphere, shear it to and fro, and wear it; the window grows if the path allows.
+  !> Solve the wear of a sphere under an alternating shear load; the window grows if the path allows it.
   subroutine wear_sphere(contact, path, n_grown, error)
     type(frictional_contact_t), intent(inout) :: contact
     type(wear_path_t), intent(inout) :: path

@@ -444,7 +444,7 @@ def test_after_a_full_disk_the_run_goes_on(
 
 @pytest.mark.parametrize(("seed", "words"), [(7, []), (3, ["wear"])])
 def test_runs_killed_at_random_moments_go_on(tmp_path: Path, seed: int, words: list[str]) -> None:
-    """4 runs, each killed up to three times, in the course of its time or of what it does to the disk.
+    """4 runs, each killed up to three times, at random times or at random writes to the disk.
 
     Each of some 16 processes has a minute, however busy the machine is; all together have half an hour.
     """

@@ -99,14 +99,17 @@ class Pressed:
 _SHAPES: dict[str, Callable[[Any, float], Pressed]] = {  # by surface and effective modulus (Pa)
     "cone": lambda s, e: Pressed("Sneddon", s.offset, lambda p: cone(e, s.slope, normal_load=p), 1.0 / 3.0),
     "power": lambda s, e: Pressed(
-        *("Sneddon", s.offset, lambda p: power_law(e, s.coefficient, s.exponent, normal_load=p)),
+        "Sneddon",
+        s.offset,
+        lambda p: power_law(e, s.coefficient, s.exponent, normal_load=p),
         s.exponent / (2.0 * s.exponent + 1.0),  # P ~ approach^(1 + 1/n)
     ),
     "punch": lambda s, e: Pressed(
         "Sneddon", s.offset, lambda p: flat_punch(e, s.radius, normal_load=p), 0.5, rim=True
     ),
     "rounded_punch": lambda s, e: Pressed(
-        *("Sneddon, Galin", s.offset),
+        "Sneddon, Galin",
+        s.offset,
         lambda p: rounded_punch(e, s.flat_radius, s.edge_radius, normal_load=p),
         0.0,
     ),

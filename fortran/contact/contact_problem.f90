@@ -348,7 +348,7 @@ contains
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
                            state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
-    state%clipped = touches_rim(state)
+    state%clipped = touches_rim(state) .and. .not. any(self%lattice%periodic)
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
   end subroutine complete_state

@@ -25,7 +25,7 @@ module hc_spectrum
 
   !> Everything that the numbers of a spectrum depend on, to the bit.
   type :: kernel_key_t
-    !> Kind, columns and rows of the window, basis over its spacing, words of the medium, compliance of springs over its unit;
+    !> Kind, columns and rows of the window, less than zero where it repeats, basis over its spacing, words of the medium, compliance of springs over its unit;
     !> of stress and displacement, instead of the last ones, depth over spacing and Poisson's ratio
     integer(int64) :: word(key_length) = 0
   contains
@@ -66,7 +66,7 @@ contains
 
     call medium%reduce(lattice%spacing(), reduced)
     key%word(1) = kind
-    key%word(2:3) = lattice%extent
+    key%word(2:3) = merge(-lattice%extent, lattice%extent, lattice%periodic)
     key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
     key%word(8:7 + n_word) = reduced%key_words(normal=kind /= inverse_of_shear, &
                                                tangential=kind == of_all_tractions .or. kind == inverse_of_shear)

@@ -15,7 +15,7 @@ module hc_elastic_medium
   implicit none
   private
 
-  public :: elastic_medium_t, influence_t, n_block, block_index, n_word
+  public :: elastic_medium_t, influence_t, block_symbols_t, n_block, block_index, n_word
 
   !> The operator has six different blocks: normal, xx, xy, yy, which are even in the
   !> distance of two nodes, and normal-x, normal-y, which are odd.
@@ -35,6 +35,13 @@ module hc_elastic_medium
     procedure(influence_is), deferred :: is_hexagonal
   end type influence_t
 
+  !> Transform of the displacements by a pyramid on a window that repeats.
+  type, abstract :: block_symbols_t
+  contains
+    !> Blocks at all frequencies of a column
+    procedure(symbols_column), deferred :: column
+  end type block_symbols_t
+
   !> Two bodies.
   type, abstract :: elastic_medium_t
   contains
@@ -46,8 +53,9 @@ module hc_elastic_medium
     procedure(medium_reduce), deferred :: reduce
     !> Displacements by a pyramid of a lattice
     procedure(medium_influence), deferred :: new_influence
-    !> Their transform on a periodic grid
+    !> Their transform on a periodic grid, to the accuracy of a preconditioner; to rounding errors
     procedure(medium_symbols), deferred :: find_symbols
+    procedure(medium_block_symbols), deferred :: new_block_symbols
     !> Words that tell the reduced medium from all others, for the keys of spectra
     procedure(medium_words), deferred :: key_words
     !> Coupling of normal and tangential displacements over the normal ones: Dundurs' beta for half-spaces
@@ -94,6 +102,30 @@ module hc_elastic_medium
       import :: influence_t
       class(influence_t), intent(in) :: self
     end function influence_is
+
+    !> Compute the blocks at all frequencies with the same first index, those of odd blocks over i.
+    pure subroutine symbols_column(self, f, block)
+      import :: block_symbols_t, wp
+      class(block_symbols_t), intent(in) :: self
+      !> First index, from 0 to half the number of columns
+      integer, intent(in) :: f
+      !> That of the pressure or all (0:number of rows - 1, 1 or n_block); 0 at frequency zero: from the mean plane [m/Pa]
+      real(wp), intent(out), contiguous :: block(0:, :)
+    end subroutine symbols_column
+
+    !> Set up the transform of the displacements by a pyramid, on a window that repeats.
+    subroutine medium_block_symbols(self, basis, length, n, symbols)
+      import :: elastic_medium_t, block_symbols_t, wp
+      class(elastic_medium_t), intent(in) :: self
+      !> Basis vectors of the lattice as columns [m]
+      real(wp), intent(in) :: basis(2, 2)
+      !> Number of columns and rows of the window
+      integer, intent(in) :: length(2)
+      !> Blocks that are wanted: 1, that of the pressure, or all
+      integer, intent(in) :: n
+      !> The transform, without that of springs
+      class(block_symbols_t), allocatable, intent(out) :: symbols
+    end subroutine medium_block_symbols
 
     !> Refuse constants that no two elastic bodies have.
     pure subroutine medium_check(self, error)

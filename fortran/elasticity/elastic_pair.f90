@@ -20,9 +20,10 @@ module hc_elastic_pair
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
-  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_word
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_word, n_block
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy, k_x, k_y
   use hc_lattice_symbol, only: lattice_symbols, symbol_1, symbol_xx, symbol_xy
+  use hc_periodic_symbol, only: periodic_symbols_t, new_periodic_symbols, n_symbol
   implicit none
   private
 
@@ -59,7 +60,7 @@ module hc_elastic_pair
     procedure :: gamma => tangential_gamma
     procedure :: check => check_pair
     procedure :: unit => unit_of_pair
-    procedure :: reduce, new_influence, find_symbols, key_words
+    procedure :: reduce, new_influence, find_symbols, new_block_symbols, key_words
     procedure :: coupling => dundurs_beta
     procedure :: shear_ratio
     procedure :: normal_point => normal_compliance
@@ -75,6 +76,15 @@ module hc_elastic_pair
   contains
     procedure :: blocks, closing, is_hexagonal
   end type pair_influence_t
+
+  !> Transform of the displacements on two half-spaces, on a window that repeats.
+  type, extends(block_symbols_t) :: pair_symbols_t
+    private
+    type(elastic_pair_t) :: pair
+    type(periodic_symbols_t) :: kernels
+  contains
+    procedure :: column
+  end type pair_symbols_t
 
 contains
 
@@ -279,17 +289,56 @@ contains
     class(pair_influence_t), intent(in) :: self
     real(wp), intent(in), contiguous :: x(:), y(:)
     real(wp), intent(out), contiguous :: block(:, :)
-    real(wp) :: k(5)
     integer :: i
 
-    associate (lambda_1 => self%pair%lambda_1, lambda_2 => self%pair%lambda_2, lambda_5 => self%pair%lambda_5)
-      do i = 1, size(x)
-        k = self%pyramid%kernels(x(i), y(i))
-        block(:, i) = [lambda_1*k(k_1), lambda_1*k(k_1) + lambda_5*k(k_xx), lambda_5*k(k_xy), &
-                       (lambda_1 + lambda_5)*k(k_1) - lambda_5*k(k_xx), lambda_2*k(k_x), lambda_2*k(k_y)]
-      end do
-    end associate
+    do i = 1, size(x)
+      block(:, i) = blocks_of(self%pair, self%pyramid%kernels(x(i), y(i)))
+    end do
   end subroutine blocks
+
+  !> Compute the six blocks from the five kernels, or from their transforms.
+  pure function blocks_of(pair, k) result(block)
+    type(elastic_pair_t), intent(in) :: pair
+    real(wp), intent(in) :: k(n_symbol)
+    real(wp) :: block(n_block)
+
+    associate (lambda_1 => pair%lambda_1, lambda_2 => pair%lambda_2, lambda_5 => pair%lambda_5)
+      block = [lambda_1*k(k_1), lambda_1*k(k_1) + lambda_5*k(k_xx), lambda_5*k(k_xy), &
+               (lambda_1 + lambda_5)*k(k_1) - lambda_5*k(k_xx), lambda_2*k(k_x), lambda_2*k(k_y)]
+    end associate
+  end function blocks_of
+
+  !> Set up the transforms of the kernels on a window that repeats.
+  subroutine new_block_symbols(self, basis, length, n, symbols)
+    class(elastic_pair_t), intent(in) :: self
+    real(wp), intent(in) :: basis(2, 2)
+    integer, intent(in) :: length(2), n
+    class(block_symbols_t), allocatable, intent(out) :: symbols
+    type(pair_symbols_t), allocatable :: made
+
+    allocate (made)
+    made%pair = self
+    call new_periodic_symbols(made%kernels, basis, length, merge(1, n_symbol, n == 1))
+    call move_alloc(made, symbols)
+  end subroutine new_block_symbols
+
+  !> Compute the blocks at all frequencies of a column, from the transforms of the kernels.
+  pure subroutine column(self, f, block)
+    class(pair_symbols_t), intent(in) :: self
+    integer, intent(in) :: f
+    real(wp), intent(out), contiguous :: block(0:, :)
+    real(wp) :: symbol(0:size(block, 1) - 1, merge(1, n_symbol, size(block, 2) == 1))
+    integer :: g
+
+    call self%kernels%column(f, symbol)
+    if (size(block, 2) == 1) then
+      block = self%pair%lambda_1*symbol
+      return
+    end if
+    do g = 0, size(block, 1) - 1
+      block(g, :) = blocks_of(self%pair, symbol(g, :))
+    end do
+  end subroutine column
 
   !> Compute lambda_1 K1.
   pure subroutine closing(self, x, y, displacement)

@@ -62,7 +62,7 @@ contains
     call check_operator(problem%lattice, problem%medium, error, n_threads)
     if (allocated(error)) return
     self%problem = problem
-    n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
+    n_level = level_count(problem%lattice, problem%options%multilevel%smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
     if (n_level > 1) call self%problem%coarsen(self%coarse(2))
     do l = 3, n_level

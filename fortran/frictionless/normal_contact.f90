@@ -92,7 +92,7 @@ contains
     if (present(options)) self%options = options
     call check_operator(lattice, medium, error, n_threads)
     if (allocated(error)) return
-    allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
+    allocate (self%level(level_count(lattice, self%options%multilevel%smallest_side)))
     allocate (self%scratch)
     self%level(1)%options = self%options
     call new_normal_problem(self%level(1), lattice, medium, initial_gap, candidate, error, law)

@@ -9,7 +9,7 @@ module hc_normal_lattice
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_flexibility, only: normal
-  use hc_fftw, only: good_size
+  use hc_flexibility, only: transform_length
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
@@ -75,7 +75,8 @@ contains
     integer :: block
 
     self%space = space
-    if (exact .and. .not. self%exact) then
+    ! on a window that repeats, single precision is rounded from the spectrum of the other
+    if ((exact .or. all(self%lattice%periodic)) .and. .not. self%exact) then
       call new_fft_flexibility(self%flexibility, self%lattice, self%medium, error, normal_only=.true., space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
@@ -86,7 +87,7 @@ contains
     call new_symbol_preconditioner(preconditioner, self%lattice, self%medium, space, self%options%preconditioner, error, cache)
     if (allocated(error)) return
     call move_alloc(preconditioner, self%preconditioner)
-    call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, space, error)
+    call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), 1, 1, space, error)
     if (allocated(error)) return
     if (self%exact) then
       ! copied as fast as it would be found

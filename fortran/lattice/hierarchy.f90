@@ -46,16 +46,20 @@ module hc_hierarchy
 contains
 
   !> Count the lattices, the given one included, as long as no window gets too small.
-  pure integer function level_count(extent, smallest_side)
-    !> Number of columns and rows of the finest window
-    integer, intent(in) :: extent(2)
+  pure integer function level_count(lattice, smallest_side)
+    !> The finest lattice and window
+    type(lattice_t), intent(in) :: lattice
     !> Nodes that a side should have at least
     integer, intent(in) :: smallest_side
-    integer :: side
+    integer :: side, extent(2)
 
     level_count = 1
+    extent = lattice%extent
     side = minval(extent)
     do while (side >= 2*smallest_side)
+      ! every second node of a window that repeats is one that repeats
+      if (any(lattice%periodic) .and. any(modulo(extent, [8, 2]) /= 0)) exit
+      extent = extent/2
       side = side/2
       level_count = level_count + 1
     end do

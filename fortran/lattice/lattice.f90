@@ -110,6 +110,8 @@ contains
     else if (.not. lattice%cell_area() > 1.0e-3_wp*lattice%spacing()**2) then
       call raise(error, status%invalid_input, &
                  'the lattice basis is degenerate: two vectors in counter-clockwise order expected')
+    else if (any(lattice%periodic) .and. .not. (all(lattice%periodic) .and. modulo(lattice%extent(1), 4) == 0)) then
+      call raise(error, status%invalid_input, 'a window that repeats: both ways, and a multiple of four columns expected')
     end if
   end subroutine check_lattice
 
@@ -381,13 +383,13 @@ contains
     end do
   end subroutine enclose
 
-  !> Return whether the part is so much smaller than the window that separate operators pay.
+  !> Return whether the part is so much smaller than the window that separate operators pay; no part repeats with the window.
   pure logical function is_worth_parting(self, low, high, options)
     class(lattice_t), intent(in) :: self
     !> First and last column and row of the part
     integer, intent(in) :: low(2), high(2)
     type(multilevel_options_t), intent(in) :: options
-    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size()
+    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size() .and. .not. any(self%periodic)
   end function is_worth_parting
 
   !> Return lattice and window of a part.

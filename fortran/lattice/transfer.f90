@@ -54,7 +54,7 @@ contains
     !$omp end parallel do
   end subroutine prolong
 
-  !> Take a row of a coarse field, continued beyond its window.
+  !> Take a row of a coarse field, continued beyond its window, where a window that repeats goes on.
   pure subroutine take_row(lattice, field, row, held, first, values)
     !> Coarse lattice and window, and field (n_col, n_row)
     type(lattice_t), intent(in) :: lattice
@@ -69,6 +69,12 @@ contains
 
     r = row - lattice%first(2) + 1
     associate (start => lattice%first(1), n => shape(field))
+      if (all(lattice%periodic)) then
+        do c = first, ubound(values, 1)
+          values(c) = field(modulo(c - start, n(1)) + 1, modulo(r - 1, n(2)) + 1)
+        end do
+        return
+      end if
       if (held) then
         do c = first, ubound(values, 1)
           values(c) = field(min(max(c - start + 1, 1), n(1)), min(max(r, 1), n(2)))
@@ -111,12 +117,14 @@ contains
       ! only nodes with a neighbor under pressure are continued to
       around = 0.0_wp
       do k = 1, size(neighbors, 2)
-        associate (c => neighbors(1, k), r => row + neighbors(2, k))
-          if (r < 1 .or. r > size(coarse, 2)) cycle
+        near = coarse_lattice%neighbor([1 + max(0, -neighbors(1, k)), row], k)
+        if (near(1) == 0) cycle
+        associate (c => neighbors(1, k), r => near(2))
           around(max(1, 1 - c):min(last, last - c)) = max(around(max(1, 1 - c):min(last, last - c)), &
                                                           coarse(max(1, 1 + c):min(last, last + c), r))
         end associate
       end do
+      if (all(coarse_lattice%periodic)) around([1, last]) = 1.0_wp
       do col = 1, last
         if (coarse(col, row) > 0.0_wp .or. .not. around(col) > 0.0_wp) cycle
         beyond = 0.0_wp

@@ -12,10 +12,11 @@ module hc_flexibility
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: most_threads
   use hc_elastic_medium, only: elastic_medium_t
+  use hc_fftw, only: good_size
   implicit none
   private
 
-  public :: flexibility_t, check_operator, normal, along_x, along_y
+  public :: flexibility_t, check_operator, transform_length, normal, along_x, along_y
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
@@ -76,6 +77,16 @@ contains
       call raise(error, status%invalid_input, 'the number of threads: 0 (as many as OpenMP would take) to 1024 expected')
     end if
   end subroutine check_operator
+
+  !> Return the lengths of transforms over a window: its own where it repeats, else with room for what wraps around.
+  pure function transform_length(lattice) result(length)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    integer :: length(2)
+
+    length = lattice%extent
+    if (.not. all(lattice%periodic)) length = good_size(2*lattice%extent - 1)
+  end function transform_length
 
   !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)

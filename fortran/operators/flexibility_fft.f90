@@ -6,8 +6,8 @@ module hc_flexibility_fft
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
-  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
-  use hc_flexibility, only: flexibility_t, check_operator, normal
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_block, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, transform_length, normal
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
   use hc_fft_passes, only: complement
@@ -99,15 +99,17 @@ contains
     ! the odd blocks of like materials vanish
     if (.not. medium%couples()) n_kernel = min(n_kernel, first_odd - 1)
     operator%at_once = components_at_once(n_kernel, first_odd)
-    call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), n_kernel, &
-                         operator%at_once, shared, error, first_odd=first_odd)
+    call new_convolution(operator%convolution, lattice%extent, transform_length(lattice), n_kernel, operator%at_once, &
+                         shared, error, first_odd=first_odd)
     if (allocated(error)) return
     operator%convolution%factor = medium%unit(lattice%spacing())
     operator%convolution%whole = medium%trace()
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, medium)
     call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
-    if (only_normal .and. present(kernel)) then
+    if (all(lattice%periodic)) then
+      call set_periodic_spectra(operator%convolution, lattice, medium, source%transformed)
+    else if (only_normal .and. present(kernel)) then
       call kernel%cover(lattice, medium, shared)
       call operator%convolution%transform_kernels(kernel, error)
     else if (only_normal) then
@@ -121,6 +123,41 @@ contains
     end if
     if (.not. allocated(error)) call operator%convolution%store_spectra(cache, key)
   end subroutine new_fft_flexibility
+
+  !> Compute the spectra on a window that repeats, from the symbols of the blocks.
+  subroutine set_periodic_spectra(convolution, lattice, medium, transformed)
+    !> Convolution with spectra that are zero
+    type(convolution_t), intent(inout) :: convolution
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> The two bodies
+    class(elastic_medium_t), intent(in) :: medium
+    !> Blocks that may have spectra
+    integer, intent(in) :: transformed(:)
+    class(elastic_medium_t), allocatable :: reduced
+    class(block_symbols_t), allocatable :: symbols
+    real(wp), allocatable :: block(:, :)
+    integer :: b, column, f, n_block_wanted, n_kernel
+
+    n_kernel = size(convolution%spectrum, 3)
+    n_block_wanted = merge(1, n_block, n_kernel == 1)
+    call medium%reduce(lattice%spacing(), reduced)
+    call reduced%new_block_symbols(lattice%unit_basis(), lattice%extent, n_block_wanted, symbols)
+    associate (n => lattice%extent, width => convolution%width)
+      !$omp parallel do schedule(dynamic) num_threads(convolution%space%threads) private(column, f, block)
+      do b = 1, convolution%n_block
+        allocate (block(n(2), n_block_wanted))
+        do column = 1, width
+          f = (b - 1)*width + column - 1
+          if (f > n(1)/2) exit
+          call symbols%column(f, block)
+          convolution%spectrum((column - 1)*n(2) + 1:column*n(2), b, :) = block(:, transformed(:n_kernel))/product(real(n, wp))
+        end do
+        deallocate (block)
+      end do
+      !$omp end parallel do
+    end associate
+  end subroutine set_periodic_spectra
 
   !> Count the bytes that the operator takes, for a window of the given size; bodies without a trace have a spectrum more.
   pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)

@@ -12,6 +12,7 @@ module hc_inverse_symbol
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t, influence_t
+  use hc_flexibility, only: transform_length
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution
   use hc_fft_layout_single, only: convolution_memory
@@ -44,6 +45,8 @@ module hc_inverse_symbol
     logical, private :: tangential = .false.
     !> Columns, rows and components of the fields
     integer, private :: shape(3) = 0
+    !> Lengths of the transforms
+    integer, private :: length(2) = 0
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
     !> On springs along the normal: the inverse symbol; the share of a displacement that each node passes on to it, and the
@@ -94,6 +97,8 @@ contains
     n_component = merge(2, 1, self%tangential)
     self%shape = [lattice%extent, n_component]
     length = good_size(lattice%extent)
+    if (all(lattice%periodic)) length = lattice%extent
+    self%length = length
     call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
                          space, error)
     if (allocated(error)) return
@@ -103,7 +108,7 @@ contains
     call influence%closing([0.0_wp], [0.0_wp], own)
     ! to three decimals: a preconditioner needs no more
     self%self_compliance = self%unit*(anint(1.0e3_wp*own(1))/1.0e3_wp)
-    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    self%cost = single_cost*n_component*product(real(length, wp))/product(real(transform_length(lattice), wp))/3.0_wp
     key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, medium)
     call self%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
@@ -216,7 +221,7 @@ contains
     if (.not. any(active .and. compliance > 0.0_wp)) return
     if (.not. allocated(self%sprung)) then
       allocate (self%sprung, self%share(size(compliance)), self%stiffness(size(compliance)))
-      call new_convolution(self%sprung, self%shape(:2), good_size(self%shape(:2)), 1, 1, self%convolution%space, error)
+      call new_convolution(self%sprung, self%shape(:2), self%length, 1, 1, self%convolution%space, error)
       if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
       if (allocated(error)) then
         ! without memory for it: the symbol without springs still is a preconditioner
@@ -229,7 +234,7 @@ contains
     self%loose = max(self%self_compliance, (1.0_wp + negligible)*stiffest)
     self%height = real(self%self_compliance/(self%self_compliance + stiffest), sp)
     ! the spectrum is the inverse of the symbol over the number of frequencies
-    stretch = real(stiffest/self%unit*product(real(good_size(self%shape(:2)), wp)), sp)
+    stretch = real(stiffest/self%unit*product(real(self%length, wp)), sp)
     !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
     do block = 1, self%sprung%n_block
       associate (stiffness => self%convolution%spectrum(:, block, 1))

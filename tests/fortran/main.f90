@@ -29,6 +29,7 @@ program tester
   use test_direct_friction, only: collect_direct_friction
   use test_edges, only: collect_edges
   use test_steps, only: collect_steps
+  use test_periodic, only: collect_periodic
   use test_analytic, only: collect_analytic
   use test_fatigue, only: collect_fatigue
   implicit none
@@ -62,6 +63,7 @@ program tester
     new_suite('direct_friction', collect_direct_friction), &
     new_suite('edges', collect_edges), &
     new_suite('steps', collect_steps), &
+    new_suite('periodic', collect_periodic), &
     new_suite('analytic', collect_analytic), &
     new_suite('fatigue', collect_fatigue) &
   ]

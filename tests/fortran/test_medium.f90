@@ -7,7 +7,7 @@ module test_medium
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, n_word
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_block, n_word
   use hc_elastic_pair, only: elastic_pair_t
   use hc_field_space, only: field_space_t
   use hc_pressure_kernel, only: normal_kernel_t
@@ -39,7 +39,8 @@ module test_medium
     real(wp) :: factor = 1.0_wp, excess = 0.0_wp, length = 1.0_wp
   contains
     procedure :: check => check_scaled
-    procedure :: unit, reduce, new_influence, find_symbols, key_words, coupling, shear_ratio, normal_point, shear_point
+    procedure :: unit, reduce, new_influence, find_symbols, new_block_symbols, key_words, coupling, shear_ratio, normal_point, &
+                 shear_point
   end type scaled_medium_t
 
   !> Displacements by one pyramid.
@@ -148,6 +149,16 @@ contains
     call self%pair%find_symbols(basis, length, frequency, symbol)
     symbol = self%factor*symbol
   end subroutine find_symbols
+
+  !> Those of the half-spaces: no window of the tests repeats.
+  subroutine new_block_symbols(self, basis, length, n, symbols)
+    class(scaled_medium_t), intent(in) :: self
+    real(wp), intent(in) :: basis(2, 2)
+    integer, intent(in) :: length(2), n
+    class(block_symbols_t), allocatable, intent(out) :: symbols
+
+    call self%pair%new_block_symbols(basis, length, n, symbols)
+  end subroutine new_block_symbols
 
   pure function key_words(self, normal, tangential) result(word)
     class(scaled_medium_t), intent(in) :: self

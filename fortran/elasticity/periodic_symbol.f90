@@ -1,0 +1,226 @@
+!> Fourier symbols of the five kernels on a window that repeats, to 4e-11 of that of K1 on equilateral cells.
+!>
+!> A pyramid repeats with the window, and its displacements with it. Their transform is the alias sum over reciprocal vectors
+!> G = (i, j) of the product of three sinc functions with that of the kernel, as in hc_lattice_symbol. With half phases
+!> h1 = theta1/2 + pi i, h2 = theta2/2 + pi j and h3 = h2 - h1 the signs of the sines cancel:
+!>
+!>     symbol = sum over G of s1 s2 s3/(h1 h2 h3) F(h1, h2), s_q = sin(theta_q/2).
+!>
+!> The terms fall off like |G|^-4 only, but those of large G change little with the phases. Few terms are summed at each
+!> frequency. The sum of all others is s1 s2 s3 times a smooth function of the phases, but on the lines of G where a factor
+!> 1/h_q becomes large; their sums have that factor for themselves. Each of these functions is a Chebyshev interpolant. Its
+!> values are sums over hexagons |i|, |j| <= 3 k + 1, |i + j| <= 5 k + 2, extrapolated to all G in powers of 1/(k + 1/2). Their
+!> sides cross the lines at right angles in the index, where terms of large 1/h_q cancel in pairs, and k is odd: were it any
+!> number, the last row across the line h3 would hold points now on it, now beside it.
+!>
+!> The mean of all displacements is infinite under a mean traction. Displacements are those from the mean planes: the symbols
+!> at zero vanish.
+!>
+!> Equations: docs/theory/periodic.md, (B1) to (B4).
+module hc_periodic_symbol
+  use hc_precision, only: wp, pi
+  implicit none
+  private
+
+  public :: periodic_symbols_t, new_periodic_symbols, n_symbol
+
+  !> Symbols of K1, K_xx, K_xy, and those of K_x and K_y over i.
+  integer, parameter :: n_symbol = 5
+  !> Lines of G where a half phase may vanish: its number, and its shift in half turns.
+  integer, parameter :: line(2, 4) = reshape([1, 0, 2, 0, 3, 0, 3, 1], [2, 4]), n_line = size(line, 2)
+  !> Degree of the interpolants, in each phase.
+  integer, parameter :: degree = 13
+  !> Numbers k of the hexagons.
+  integer, parameter :: hexagon(7) = [1, 3, 5, 7, 9, 11, 13]
+
+  !> Symbols on one window.
+  type :: periodic_symbols_t
+    private
+    !> Basis vectors as columns [m], area of a cell [m^2]
+    real(wp) :: basis(2, 2) = 0.0_wp, area = 0.0_wp
+    !> Columns and rows of the window, and the largest |i| and |j| of the terms that are summed
+    integer :: length(2) = 0, near(2) = 0
+    !> Chebyshev coefficients (theta1, theta2, none or line, symbol, sign of theta2)
+    real(wp), allocatable :: coefficient(:, :, :, :, :)
+  contains
+    !> Symbols at all frequencies of a column
+    procedure :: column
+  end type periodic_symbols_t
+
+contains
+
+  !> Set up the symbols on a window.
+  pure subroutine new_periodic_symbols(self, basis, length, n)
+    !> Symbols to be set up
+    type(periodic_symbols_t), intent(out) :: self
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: length(2)
+    !> How many of them
+    integer, intent(in) :: n
+    real(wp), dimension(0:degree, 0:degree) :: wave, value
+    real(wp) :: node(0:degree), side(2), rest(0:n_line, n), weight(size(hexagon)), x(size(hexagon))
+    real(wp), allocatable :: at_nodes(:, :, :, :, :)
+    integer :: a, b, half, k, m, stretch
+
+    self%basis = basis
+    self%area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
+    self%length = length
+    side = norm2(basis, dim=1)
+    self%near = max(1, ceiling(1.5_wp*side/side(2:1:-1)))
+    ! as much larger as the cells are longer one way
+    stretch = ceiling(maxval(side)/minval(side) - 0.01_wp)
+    x = 1.0_wp/(stretch*hexagon + 0.5_wp)
+    weight = [(product(x/(x - x(m)), mask=[(k /= m, k=1, size(x))]), m=1, size(x))]
+    node = [(cos(pi*(a + 0.5_wp)/(degree + 1)), a=0, degree)]
+    do a = 0, degree
+      wave(a, :) = cos(a*pi*([(real(b, wp), b=0, degree)] + 0.5_wp)/(degree + 1))*merge(1.0_wp, 2.0_wp, a == 0)/(degree + 1)
+    end do
+    allocate (at_nodes(0:degree, 0:degree, 0:n_line, n, 2))
+    allocate (self%coefficient(0:degree, 0:degree, 0:n_line, n, 2))
+    do half = 1, 2
+      do b = 0, degree
+        do a = 0, degree
+          call sum_beyond(self, 0.5_wp*pi*[1.0_wp + node(a), node(b) + merge(1.0_wp, -1.0_wp, half == 1)], stretch*hexagon, &
+                          weight, rest)
+          at_nodes(a, b, :, :, half) = rest
+        end do
+      end do
+    end do
+    do half = 1, 2
+      do m = 1, n
+        do k = 0, n_line
+          value = at_nodes(:, :, k, m, half)
+          self%coefficient(:, :, k, m, half) = matmul(matmul(wave, value), transpose(wave))
+        end do
+      end do
+    end do
+  end subroutine new_periodic_symbols
+
+  !> Sum the terms that are not summed at each frequency, without sines and without the factors that lines have for themselves.
+  pure subroutine sum_beyond(self, theta, hexagons, weight, total)
+    type(periodic_symbols_t), intent(in) :: self
+    !> Phases
+    real(wp), intent(in) :: theta(2)
+    !> Hexagons, and the weights of their sums
+    integer, intent(in) :: hexagons(:)
+    real(wp), intent(in) :: weight(:)
+    !> Sums: off the lines and on each (0:n_line, symbol)
+    real(wp), intent(out) :: total(0:, :)
+    real(wp) :: part(0:n_line, size(total, 2), size(hexagons)), half(3)
+    integer :: i, j, k, m, last, shift(3)
+
+    part = 0.0_wp
+    last = 3*hexagons(size(hexagons)) + 1
+    do j = -last, last
+      do i = -last, last
+        if (abs(i) <= self%near(1) .and. abs(j) <= self%near(2)) cycle
+        ! the first of the hexagons that this term lies in
+        m = findloc(3*hexagons + 1 >= max(abs(i), abs(j)) .and. 5*hexagons + 2 >= abs(i + j), .true., dim=1)
+        if (m == 0) cycle
+        shift = [i, j, j - i]
+        half = 0.5_wp*[theta(1), theta(2), theta(2) - theta(1)] + pi*shift
+        do k = n_line, 1, -1
+          if (shift(line(1, k)) == line(2, k)) exit
+        end do
+        if (k > 0) half(line(1, k)) = 1.0_wp
+        part(k, :, m) = part(k, :, m) + response(self, 0.5_wp*theta(1) + pi*i, 0.5_wp*theta(2) + pi*j, size(total, 2)) &
+                        /product(half)
+      end do
+    end do
+    total = 0.0_wp
+    do m = 1, size(hexagons)
+      total = total + sum(weight(m:))*part(:, :, m)
+    end do
+  end subroutine sum_beyond
+
+  !> Compute the transforms F of the kernels at a wave vector.
+  pure function response(self, h1, h2, n) result(f)
+    type(periodic_symbols_t), intent(in) :: self
+    !> Half phases
+    real(wp), intent(in) :: h1, h2
+    !> How many
+    integer, intent(in) :: n
+    real(wp) :: f(n), square, root, d(2)
+
+    ! the wave vector times half the area of a cell
+    d = [h1*self%basis(2, 2) - h2*self%basis(2, 1), h2*self%basis(1, 1) - h1*self%basis(1, 2)]
+    square = dot_product(d, d)
+    root = pi*self%area/sqrt(square)
+    f(1) = root
+    if (n > 1) f(2:) = [root*d(2)**2/square, -root*d(1)*d(2)/square, -pi*self%area*d(1)/square, -pi*self%area*d(2)/square]
+  end function response
+
+  !> Compute the symbols at all frequencies with the same first index.
+  pure subroutine column(self, f, symbol)
+    class(periodic_symbols_t), intent(in) :: self
+    !> First index, from 0 to half the number of columns
+    integer, intent(in) :: f
+    !> Symbols by the second index (0:number of rows - 1, symbol); K1, K_xx, K_xy, those of K_x and K_y over i [m]
+    real(wp), intent(out) :: symbol(0:, :)
+    real(wp) :: row(0:degree, 0:n_line, size(symbol, 2), 2), wave(0:degree), half(3), sine(3), factor(0:n_line)
+    integer :: g, i, j, k, m, side
+
+    half(1) = pi*f/self%length(1)
+    wave = chebyshev(4.0_wp*f/self%length(1) - 1.0_wp)
+    do side = 1, 2
+      do m = 1, size(symbol, 2)
+        do k = 0, n_line
+          row(:, k, m, side) = matmul(wave, self%coefficient(:, :, k, m, side))
+        end do
+      end do
+    end do
+    do g = 0, self%length(2) - 1
+      symbol(g, :) = 0.0_wp
+      if (f == 0 .and. g == 0) cycle
+      side = merge(1, 2, 2*g <= self%length(2))
+      half(2) = pi*(g - merge(0, self%length(2), side == 1))/self%length(2)
+      half(3) = half(2) - half(1)
+      wave = chebyshev(4.0_wp*half(2)/pi - merge(1.0_wp, -1.0_wp, side == 1))
+      sine = sin(half)
+      factor(0) = product(sine)
+      do k = 1, n_line
+        associate (q => line(1, k), shift => line(2, k))
+          factor(k) = product(sine, mask=[1, 2, 3] /= q)*sinc(half(q) + pi*shift)*(1 - 2*modulo(shift, 2))
+        end associate
+      end do
+      do m = 1, size(symbol, 2)
+        symbol(g, m) = dot_product(factor, matmul(wave, row(:, :, m, side)))
+      end do
+      do j = -self%near(2), self%near(2)
+        do i = -self%near(1), self%near(1)
+          symbol(g, :) = symbol(g, :) + sinc(half(1) + pi*i)*sinc(half(2) + pi*j)*sinc(half(3) + pi*(j - i)) &
+                         *response(self, half(1) + pi*i, half(2) + pi*j, size(symbol, 2))
+        end do
+      end do
+      ! a frequency that is its own opposite: the odd symbols vanish
+      if (modulo(2*f, self%length(1)) == 0 .and. modulo(2*g, self%length(2)) == 0) symbol(g, 4:) = 0.0_wp
+    end do
+  end subroutine column
+
+  !> Compute the Chebyshev polynomials of all degrees.
+  pure function chebyshev(x) result(t)
+    real(wp), intent(in) :: x
+    real(wp) :: t(0:degree)
+    integer :: k
+
+    t(0) = 1.0_wp
+    t(1) = x
+    do k = 2, degree
+      t(k) = 2.0_wp*x*t(k - 1) - t(k - 2)
+    end do
+  end function chebyshev
+
+  !> Compute sin(x)/x.
+  elemental real(wp) function sinc(x)
+    real(wp), intent(in) :: x
+
+    if (abs(x) < 1.0e-8_wp) then
+      sinc = 1.0_wp
+    else
+      sinc = sin(x)/x
+    end if
+  end function sinc
+
+end module hc_periodic_symbol

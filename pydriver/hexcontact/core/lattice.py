@@ -64,6 +64,8 @@ class Lattice:
         Length of the second basis vector over that of the first.
     cell_angle
         Angle of the second basis vector from x [rad].
+    periodic
+        Whether the window repeats along columns and rows.
     """
 
     spacing: float
@@ -74,6 +76,7 @@ class Lattice:
     origin: tuple[float, float] = (0.0, 0.0)
     cell_ratio: float = 1.0
     cell_angle: float = math.pi / 3
+    periodic: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:

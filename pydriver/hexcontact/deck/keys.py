@@ -43,6 +43,14 @@ ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
 ITERATIONS = ("newton", "dissertation")
 FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
+BOUNDARIES = ("free", "periodic")
+# Loads of a window that repeats, and the load or motion that each of them is.
+MEANS = {
+    "mean_pressure": "normal_load",
+    "mean_gap": "approach",
+    "mean_traction_x": "tangential_load_x",
+    "mean_traction_y": "tangential_load_y",
+}
 
 YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
@@ -148,9 +156,27 @@ class Grid(Table):
     cell_ratio: Annotated[float, Quantity(NUMBER, at_least=0.25, at_most=4.0)] = meaning(
         1.0, "distance of nodes along the second basis vector of the lattice over the spacing", "0.5"
     )
-    cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] = meaning(
-        math.pi / 3, "angle of the second basis vector from x; 60 deg: the equilateral lattice", '"90 deg"'
+    cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] | None = meaning(
+        None,
+        "angle of the second basis vector from x; 60 deg, the equilateral lattice, if absent, and 90 deg where "
+        "the window repeats",
+        '"90 deg"',
     )
+    boundary: Annotated[str, Word(BOUNDARIES)] = meaning(
+        "free",
+        "free: nothing acts beyond the window; periodic: the window repeats along both basis vectors, and "
+        "`extent` has the lengths of the period",
+    )
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the window repeats."""
+        return self.boundary == "periodic"
+
+    @property
+    def angle(self) -> float:
+        """Angle of the second basis vector (rad)."""
+        return self.cell_angle or (math.pi / 2 if self.periodic else math.pi / 3)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -165,6 +191,11 @@ class Grid(Table):
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:
             yield "window", "expected window or nodes_across, not both"
+        if data.get("boundary") == "periodic":
+            if "nodes_in_radius" in data:
+                yield "nodes_in_radius", "expected spacing or nodes_across, since the window repeats"
+            if data.get("extent", "auto") == "auto" and "window" not in data:
+                yield "extent", 'expected the lengths of the period, such as ["1 mm", "1 mm"], since it repeats'
 
 
 class Solver(Table):
@@ -244,6 +275,18 @@ class Segment(_Driven):
         "allOf": [{"not": {"required": list(pair)}} for pair in LOADS.values()]
     }
 
+    mean_pressure: Annotated[float, Quantity(PRESSURE, at_least=0)] | None = meaning(
+        None, "normal load over the area of a window that repeats, instead of normal_load"
+    )
+    mean_gap: Annotated[float, Quantity(LENGTH, above=0)] | None = meaning(
+        None, "mean of the gap over a window that repeats, instead of normal_load", '"0.2 um"'
+    )
+    mean_traction_x: Annotated[float, Quantity(PRESSURE)] | None = meaning(
+        None, "tangential load along x over the area of a window that repeats"
+    )
+    mean_traction_y: Annotated[float, Quantity(PRESSURE)] | None = meaning(
+        None, "tangential load along y over the area of a window that repeats"
+    )
     steps: Annotated[int | str, WordOr("auto", Whole(1, MOST_STEPS))] | None = meaning(
         None,
         "number of load steps; auto: chosen by `solver.step_tolerance`; "
@@ -266,12 +309,14 @@ class Segment(_Driven):
         whole = "path" in data or "series" in data
         known = cls.known_keys()
         # an unknown key may be that of the load
-        if not whole and not any(key in DRIVEN or (key not in known and not cls.meant(key)) for key in data):
+        if not whole and not any(key in DRIVEN or key in MEANS or (key not in known and not cls.meant(key)) for key in data):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():
-            if force in data and displacement in data:
-                yield displacement, f"expected {force} or {displacement}, not both"
-        if data.get("ramp") == "cubic" and "normal_load" not in data:
+            meant = [name for name, load in MEANS.items() if load in (force, displacement)]
+            first, *others = [*(key for key in (force, displacement, *meant) if key in data), ""]
+            if others and others[0]:
+                yield others[0], f"expected {first} or {others[0]}, not both"
+        if data.get("ramp") == "cubic" and not {"normal_load", "mean_pressure"} & data.keys():
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
         if "values" in data and data.get("ramp", "linear") != "linear":
             yield "ramp", "expected ramp or values, not both"

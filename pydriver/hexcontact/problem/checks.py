@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
-from ..deck.keys import Deck, Solver
+from ..deck.keys import MEANS, Deck, Solver
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
+from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, LOADS, WORN
-from .loads import MOTIONS, LoadStep, cycle_entries, load_steps
+from . import window
+from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
+from .plane_field import GAP, FieldSource, PlaneField
 
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
@@ -24,8 +27,10 @@ Found = Iterator[tuple[tuple[str | int, ...], str]]
 """Key and sentence of each mistake; the value is that of the key."""
 
 
-def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[LoadStep]]:
-    """Check a deck, table by table and as a whole."""
+def checked(
+    given: Assembled, gap: FieldSource | None
+) -> tuple[Deck, Solver, Sequence[LoadStep], Repeating | None]:
+    """Check a deck, table by table and as a whole; the last value is the window, if it repeats."""
     found = list(given.problems)
     tables, of_tables = Deck.checked(given.data)
     blamed = {problem.key for problem in found}
@@ -36,6 +41,10 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[L
         tables.pop("friction", None)  # which may have the unknown key
     solver: Any = tables.get("solver")
     steps: tuple[LoadStep, ...] = ()
+    repeating = None
+    if {"grid", "body"} <= tables.keys() and tables["grid"].periodic:
+        repeating, against = _repeating(tables, gap)
+        found += against
     if {"friction", "interface", "solver", "bulk"} <= tables.keys():
         mu = coulomb(tables["friction"], tables["interface"])
         algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
@@ -43,8 +52,10 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[L
         found += _mistakes(tables, _law_problems(tables, mu, algorithm))
         if "load" in tables:
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
-            steps, against = load_steps(tables["load"], known, tables.get("bulk"))
+            steps, against = load_steps(tables["load"], known, tables.get("bulk"), repeating and repeating.period)
             found += against
+            if {"grid", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
+                found += _mistakes(tables, _period_problems(tables, steps))
         if {"output", "wear"} <= tables.keys():
             found += _mistakes(tables, _field_problems(tables, algorithm))
     if steps and tables.get("wear"):
@@ -52,10 +63,50 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[L
     if {"stress", "fatigue", "body", "output"} <= tables.keys():
         found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
-        found += _mistakes(tables, _body_problems(tables, steps, gap_given))
+        found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
     if found:
         raise deck_error(found, given.source)
-    return Deck.model_construct(**tables), solver, steps
+    return Deck.model_construct(**tables), solver, steps, repeating
+
+
+class Repeating(NamedTuple):
+    """The window of a case that repeats, with what its loads refer to."""
+
+    lattice: Lattice
+    period: Period
+
+
+def _repeating(
+    tables: Mapping[str, Any], gap: FieldSource | None
+) -> tuple[Repeating | None, list[Mistake]]:
+    """Return the window that repeats, and faults of it and of the gap over it."""
+    lattice, faults = window.repeating(tables["grid"])
+    if faults:
+        return None, faults
+    heights = PlaneField(tables["body"].separation if gap is None else gap, GAP).over(lattice)
+    if fault := window.seam_fault(lattice, heights):
+        return None, [Mistake(("grid", "boundary"), "periodic", fault)]
+    return Repeating(lattice, Period(lattice.size * lattice.cell_area, float(heights.mean()))), []
+
+
+def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
+    """Yield what a window that repeats does not have, and means without one."""
+    if not tables["grid"].periodic:
+        for place, load in enumerate(tables["load"]):
+            for name in MEANS:
+                if any(getattr(part, name) is not None for part in (load, *(load.path or ()))):
+                    yield ("load", place, name), 'expected a window that repeats: grid.boundary = "periodic"'
+        return
+    whole = "beside a window that repeats"
+    if any(step.twist.value or step.twist.control == "force" for step in steps):
+        yield ("load",), f"expected no torque and no twist {whole}: a rotation does not repeat"
+    if tables.get("bulk"):
+        yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
+    if tables["solver"].method == "direct":
+        yield ("solver", "method"), f'expected "fft" {whole}'
+    for name in ("wear", "accuracy", "stress", "fatigue"):
+        if tables[name]:
+            yield (name,), f"is not available yet {whole}"
 
 
 def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
@@ -211,6 +262,8 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
     bodies = tables["body"]
     if (bulk := tables.get("bulk")) and (bodies.body_1, bodies.body_2)[bulk.body - 1].rigid:
         yield ("bulk", "body"), f"expected an elastic body; body {bulk.body} is rigid"
+    if (grid := tables.get("grid")) is None or grid.periodic:
+        return
     if not gap_given and bodies.separation.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:
@@ -244,8 +297,8 @@ def _touching_problems(gap: Separation) -> Found:
     elif larger == 0:
         sentence = (
             "the two surfaces touch everywhere, so the contact has no end and one unknown, its mean "
-            'pressure; expected a shape that bounds it, or [interface] with law = "power"; a periodic '
-            "boundary, the way with no layer, is not available yet"
+            'pressure; expected a shape that bounds it, [interface] with law = "power", or a window that repeats, '
+            'grid.boundary = "periodic"'
         )
     yield ("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), sentence
 

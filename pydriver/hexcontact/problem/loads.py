@@ -13,7 +13,7 @@ from itertools import takewhile
 from typing import Any, Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
-from ..deck.keys import Bulk, Load, Segment
+from ..deck.keys import MEANS, Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
 from ..deck.series import MOST_STEPS
 from ..variables import BULK_STRESS, LOADS
@@ -117,6 +117,22 @@ class LoadStep:
         )
 
 
+class Period(NamedTuple):
+    """The window of a case that repeats."""
+
+    area: float  # m^2
+    mean_height: float  # mean of the gap before loading (m)
+
+    def driven(self, segment: Segment) -> dict[str, float]:
+        """Return the loads (N) and the approach (m) of the means of a segment."""
+        given = {name: getattr(segment, name) for name in MEANS}
+        return {
+            MEANS[name]: self.mean_height - value if name == "mean_gap" else value * self.area
+            for name, value in given.items()
+            if value is not None
+        }
+
+
 class _Stretch(NamedTuple):
     """A segment with its key in the deck, its label, and whether it continues the segment before it."""
 
@@ -146,11 +162,13 @@ class History:
     unknowns. `steps` are incomplete if they are more than `MOST_STEPS`.
     """
 
-    def __init__(self, friction_coefficient: float | None, bulk: Bulk | None = None) -> None:
+    def __init__(
+        self, friction_coefficient: float | None, bulk: Bulk | None = None, period: Period | None = None
+    ) -> None:
         self.steps: list[LoadStep] = []
         self._mu = friction_coefficient
         self._overloaded: tuple[str | int, ...] = ()  # segment whose load friction cannot carry
-        self._bulk = bulk
+        self._bulk, self._period = bulk, period
         self._entries: list[Load] = []
         self._count = 0
         self._segments = 0
@@ -170,6 +188,8 @@ class History:
     def _run(self, stretch: _Stretch) -> None:
         """Append the load steps of a segment."""
         key, segment, label, carries_on = stretch
+        if self._period:
+            segment = segment.model_copy(update=self._period.driven(segment))
         ramp = Ramp(segment, self._now, not self._segments, self._now["bulk"])
         self._segments += not carries_on
         if segment.ramp == "cubic" and self._now["z"].control != "force":
@@ -251,10 +271,13 @@ class History:
 
 
 def load_steps(
-    loads: Sequence[Load], friction_coefficient: float | None, bulk: Bulk | None = None
+    loads: Sequence[Load],
+    friction_coefficient: float | None,
+    bulk: Bulk | None = None,
+    period: Period | None = None,
 ) -> tuple[tuple[LoadStep, ...], list[Mistake]]:
     """Return the load steps of a whole `History`, and its faults."""
-    history = History(friction_coefficient, bulk)
+    history = History(friction_coefficient, bulk, period)
     for load in loads:
         history.append(load)
     return tuple(history.steps), history.problems
@@ -318,7 +341,7 @@ def _overload(
     bound = mu * step.z.value if step.z.value > 0 else 0.0
     force = math.hypot(loads["x"], loads["y"])
     if force > bound * (1 + 1e-12) or (bound == 0 and loads["twist"] != 0):
-        blamed = ("tangential_load_x", "tangential_load_y", "torque", "normal_load")
+        blamed = ("tangential_load_x", "tangential_load_y", "torque", "normal_load", *reversed(MEANS))
         name = next((name for name in blamed if getattr(segment, name) is not None), "steps")
         given = getattr(segment, name)
         given = str(given) if isinstance(given, Share) else given

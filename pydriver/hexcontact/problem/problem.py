@@ -126,7 +126,8 @@ class Problem:
 
     def _set_up(self, given: Assembled, gap: FieldSource | None, lattice: Lattice | None) -> None:
         self._given, self.judged = given, {}
-        self.deck, self.solver, self.load_steps = checked(given, gap is not None)
+        self.deck, self.solver, self.load_steps, repeating = checked(given, gap)
+        self.period = repeating and repeating.period  # None: the window does not repeat
         deck = self.deck
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
         one, two = (Body.model_construct(**dict(body)) for body in (deck.body.body_1, deck.body.body_2))
@@ -143,11 +144,13 @@ class Problem:
         )
         # whether pressure and shear are coupled
         self.coupled = self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
-        self.full_contact = gap is None and bool(deck.interface) and deck.body.separation.flat
+        self.full_contact = (
+            gap is None and bool(deck.interface) and deck.body.separation.flat and not deck.grid.periodic
+        )
         self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # if the window follows from it alone
         self.estimate: Estimate | None = None  # None for an array of gaps
-        self.lattice = self._size(deck.grid, given.source, lattice)
+        self.lattice = repeating.lattice if repeating else self._size(deck.grid, given.source, lattice)
         if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
             self.friction_law(self.lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -287,7 +288,57 @@ def is_fixed(grid: Grid) -> bool:
 
 def pattern_of(grid: Grid) -> Pattern:
     """Return the lattice of a deck but for its spacing."""
-    return Pattern(grid.origin, grid.cell_ratio, grid.cell_angle)
+    return Pattern(grid.origin, grid.cell_ratio, grid.angle)
+
+
+def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
+    """Return the window of a deck that repeats, about the center, and its faults."""
+    pattern, center = pattern_of(grid), grid.center or (0.0, 0.0)
+    if isinstance(grid.extent, str):
+        assert grid.spacing is not None
+        assert grid.window is not None  # checked, one of the two is given
+        spacing, (n_row, n_col) = grid.spacing, grid.window
+        key, value = "window", grid.window
+    else:
+        n_col, n_row = (
+            grid.nodes_across or max(round(length / (size * (grid.spacing or 1.0))), 1)
+            for length, size in zip(grid.extent, (1.0, grid.cell_ratio), strict=True)
+        )
+        # the period is exact, and the cells follow from it
+        spacing = grid.extent[0] / n_col
+        pattern = pattern._replace(cell_ratio=grid.extent[1] / n_row / spacing)
+        key = "nodes_across" if grid.nodes_across else "spacing"
+        value = getattr(grid, key)
+    problems = []
+    if n_col % 4:
+        fitting = max(4 * round(n_col / 4), 4)
+        sentence = f"expected a multiple of four columns in a window that repeats, such as {fitting}, not {n_col}"
+        if key == "spacing":
+            sentence += f': a spacing of "{readable(spacing * n_col / fitting)}"'
+        problems.append(Mistake(("grid", key), value, sentence))
+    if max(n_row, n_col) > MOST_NODES_PER_SIDE:
+        sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(n_row, n_col)}"
+        problems.append(Mistake(("grid", key), value, sentence))
+    return replace(centered(spacing, center, (n_row, n_col), pattern), periodic=True), problems
+
+
+def seam_fault(lattice: Lattice, gap: Array) -> str:
+    """Return the fault of a gap (m) that does not go on beyond a window that repeats; empty if there is none.
+
+    Across the seam it may change by as much as between neighboring columns, or rows, elsewhere.
+    """
+    for axis, name in ((1, "columns"), (0, "rows")):
+        steps = np.abs(np.diff(gap, axis=axis))
+        first, last = np.take(gap, [0], axis=axis), np.take(gap, [-1], axis=axis)
+        seam, most = float(np.abs(first - last).max()), float(steps.max(initial=0.0))
+        if not np.isfinite(gap).all() or seam > 1.001 * most + 1e-9 * float(np.ptp(gap)):
+            return (
+                f"the gap does not repeat with the window: between its opposite ends it steps by "
+                f"{readable(seam)}, between neighboring {name} by {readable(most)} at most"
+                if np.isfinite(gap).all()
+                else "the gap of a window that repeats has nodes that cannot touch; expected heights everywhere"
+            )
+    return ""
 
 
 def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Lattice:

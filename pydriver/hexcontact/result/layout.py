@@ -35,6 +35,7 @@ _STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin", "lattice_cell_ratio", "lattice_cell_angle"),
+    "lattice_periodic",
     *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
 )
 
@@ -162,6 +163,7 @@ class Layout:
             "lattice_origin": np.asarray(window.origin, dtype=float),
             "lattice_cell_ratio": float(window.cell_ratio),
             "lattice_cell_angle": float(window.cell_angle),
+            **({"lattice_periodic": np.int32(1)} if window.periodic else {}),
             **self.metadata.attributes(),
         }
 
@@ -238,7 +240,8 @@ def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[A
     cells = (f"lattice_{name}" for name in ("cell_ratio", "cell_angle"))  # older files have none
     pattern = Pattern((x0, y0), *(float(attributes[name]) for name in cells if name in attributes))
     spacing = float(attributes["lattice_spacing"])
-    return pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
+    found = pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
+    return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
 
 
 def lattice_of(dataset: xarray.Dataset) -> Lattice:

@@ -103,6 +103,7 @@ _ATTRIBUTES: dict[str, Fits] = {
 }
 _LATER = {
     "lattice_cell_ratio": _is_positive,
+    "lattice_periodic": lambda value: value in (0, 1),
     "lattice_cell_angle": lambda value: _is_number(value) and 0 < value < math.pi,
     INTERFACE[0]: _is_positive,
     INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs

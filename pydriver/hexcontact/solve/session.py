@@ -374,7 +374,7 @@ class Session:
         history, self._history = self._history, None  # until all steps of the entry are solved
         if history is None:
             mu = self.case.friction_coefficient if self.case.frictional else None
-            history = History(mu, self.case.deck.bulk)
+            history = History(mu, self.case.deck.bulk, self.case.period)
             for load in before:
                 history.append(Load.model_validate(load))
         history.append(new)

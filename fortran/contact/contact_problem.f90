@@ -274,6 +274,7 @@ contains
     !$omp end parallel do
     load = 0.0_wp
     load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
+    if (any(self%lattice%periodic)) load(about_z) = 0.0_wp                     ! a torque does not repeat
   end function resultants
 
   !> Compute r = kappa/(2 pi lambda a) for a contact of n nodes, a its radius, (F8) [Pa/m].

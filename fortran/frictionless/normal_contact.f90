@@ -19,7 +19,7 @@ module hc_normal_contact
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal, force_control
   use hc_contact_solver, only: contact_solver_t
   use hc_normal_law, only: normal_law_t, tangent_t
   use hc_normal_problem, only: new_normal_problem
@@ -181,6 +181,10 @@ contains
           call prolong_pressure(self%level(l + 1), coarse, level, state%pressure)
         else
           where (level%candidate) state%pressure = 1.0_wp
+          ! the same pressure everywhere would move no surface from its mean plane
+          if (any(level%lattice%periodic) .and. goal%control(normal) /= force_control) then
+            state%pressure = max(goal%value(normal) - level%initial_gap, 0.0_wp)
+          end if
         end if
         if (l > 1) then
           call solve_on_normal_lattice(level, passing, goal, max(tolerance, coarse_tolerance), max_sweeps, state, error)

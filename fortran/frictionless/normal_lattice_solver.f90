@@ -89,8 +89,9 @@ contains
         now%pressures = now%target/level%lattice%cell_area()
         call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
-        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-        call iterate(level, now, level%candidate .and. level%initial_gap < now%target, tolerance, max_sweeps, state%sweeps, error)
+        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from the mean plane it closes it
+        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. any(level%lattice%periodic)), &
+                     tolerance, max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return

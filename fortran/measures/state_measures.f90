@@ -218,13 +218,19 @@ contains
       end do
     end if
     zone = state%zone == stick
+    found%max_traction = space%max(norm2(state%traction, dim=3))
+    found%stick_center = ieee_value(1.0_wp, ieee_quiet_nan)
+    found%stick_lower = found%stick_center
+    found%stick_upper = found%stick_center
+    if (any(lattice%periodic)) then
+      found%stick = cells_of(lattice, space%count(zone))
+      return
+    end if
     found%stick = size_of(lattice, space%count(zone), edges%stick_edge(zone, reserve))
     deallocate (reserve)                                                       ! before the coordinates, which take more
     allocate (x, y, mold=initial_gap)
     call lattice%coordinates(x, y)
     call zone_extent(x, y, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
-    deallocate (x, y)
-    found%max_traction = space%max(norm2(state%traction, dim=3))
   end function measure_state
 
   !> Measure the area of contact, the pressure and its energy.
@@ -245,17 +251,36 @@ contains
     type(contact_edges_t), intent(out) :: edges
     real(wp), allocatable :: x(:, :), y(:, :)
 
-    allocate (x, y, mold=initial_gap)
-    call lattice%coordinates(x, y)
-    found%pressure_center = pressure_center(x, y, state%pressure)
-    deallocate (x, y)                                                          ! before the edges, which take as much
+    found%max_pressure = space%max(state%pressure)
     associate (contact => state%zone /= separated)
+      found%elastic_energy = normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, state%motion(normal))
+      if (any(lattice%periodic)) then
+        ! a contact across the end of the window has its edge on the other side, and there is no center
+        found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
+        found%contact = cells_of(lattice, space%count(contact))
+        return
+      end if
+      allocate (x, y, mold=initial_gap)
+      call lattice%coordinates(x, y)
+      found%pressure_center = pressure_center(x, y, state%pressure)
+      deallocate (x, y)                                                        ! before the edges, which take as much
       call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
       found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
-      found%elastic_energy = normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, state%motion(normal))
     end associate
-    found%max_pressure = space%max(state%pressure)
   end subroutine measure_contact
+
+  !> Measure the cells of a zone alone; its edge stays unknown.
+  pure type(zone_measures_t) function cells_of(lattice, n_node) result(found)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes of the zone
+    integer, intent(in) :: n_node
+    real(wp) :: unknown
+
+    unknown = ieee_value(1.0_wp, ieee_quiet_nan)
+    found = zone_measures_t(lattice%cell_area()*n_node, area_radius(n_node, lattice%cell_area()), unknown, unknown, unknown, &
+                            unknown)
+  end function cells_of
 
   !> Measure a zone with this edge.
   pure type(zone_measures_t) function size_of(lattice, n_node, edge) result(found)

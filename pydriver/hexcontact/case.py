@@ -67,7 +67,9 @@ class Case(Problem):
         a contact is an error. The approach counts from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
-    spacing, nodes_across, nodes_in_radius, extent, window, center, origin, cell_ratio, cell_angle : optional
+    spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
+        Keys of [grid].
+    cell_ratio, cell_angle, boundary : optional
         Keys of [grid]; `cell_angle` carries its unit: "90 deg".
     normal_load, approach : float, optional
         The only load (N) or motion (m), in one step or in `steps`.
@@ -138,6 +140,7 @@ class Case(Problem):
         origin: Sequence[float | str] | None = None,
         cell_ratio: float | None = None,
         cell_angle: str | None = None,
+        boundary: str | None = None,
         normal_load: float | str | None = None,
         approach: float | str | None = None,
         steps: int | str | None = None,
@@ -164,11 +167,12 @@ class Case(Problem):
         own_gap = None if gap is None else given_field(gap, GAP, lattice)
         if lattice is not None:
             given = {"spacing": spacing, "window": window, "origin": origin, "cell_ratio": cell_ratio}
-            for key, value in {**given, "cell_angle": cell_angle}.items():
+            for key, value in {**given, "cell_angle": cell_angle, "boundary": boundary}.items():
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
             cell_ratio, cell_angle = lattice.cell_ratio, angle_text(lattice.cell_angle)
+            boundary = "periodic" if lattice.periodic else None
             if not callable(own_gap):  # the deck of the case leads to the same window
                 center = middle_of(lattice)
         arguments = locals()

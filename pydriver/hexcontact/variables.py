@@ -187,6 +187,12 @@ VARIABLES: dict[str, Variable] = {
         )
         for axes in ("xx", "yy", "xy")
     },
+    "mean_pressure": _scalar(
+        "Pa", "normal load over the area of the window, which repeats", title="Mean pressure", summary=7, **_FROM_0
+    ),
+    "mean_gap": _scalar(
+        "m", "mean of the gap over the window, which repeats", title="Mean gap", summary=8, **_FROM_0
+    ),
     "bulk_body": _work(
         "1", "body that carries the bulk stress", dtype="i4", flags={1: "body_1", 2: "body_2"}
     ),

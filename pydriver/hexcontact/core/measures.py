@@ -127,9 +127,12 @@ def measures(
     given = initial_gap, candidate, solution
     if isinstance(solution, ContactState):
         found: dict[str, float] = flat.measure_friction(lattice, friction, *given)._asdict()
-        return found
-    found = flat.measure_pressure(lattice, *given)._asdict()
-    return {name: value for name, value in found.items() if not VARIABLES[name].frictional}
+    else:
+        found = flat.measure_pressure(lattice, *given)._asdict()
+        found = {name: value for name, value in found.items() if not VARIABLES[name].frictional}
+    if lattice.periodic:  # no edges, and no place of a zone
+        found = {name: value for name, value in found.items() if VARIABLES[name].required or value == value}
+    return found
 
 
 def turning_points(values: Array) -> list[int]:

@@ -28,7 +28,7 @@ Found = Iterator[tuple[tuple[str | int, ...], str]]
 
 
 def checked(
-    given: Assembled, gap: FieldSource | None
+    given: Assembled, gap: FieldSource | None, lattice: Lattice | None
 ) -> tuple[Deck, Solver, Sequence[LoadStep], Repeating | None]:
     """Check a deck, table by table and as a whole; the last value is the window, if it repeats."""
     found = list(given.problems)
@@ -43,7 +43,7 @@ def checked(
     steps: tuple[LoadStep, ...] = ()
     repeating = None
     if {"grid", "body"} <= tables.keys() and tables["grid"].periodic:
-        repeating, against = _repeating(tables, gap)
+        repeating, against = _repeating(tables, gap, lattice)
         found += against
     if {"friction", "interface", "solver", "bulk"} <= tables.keys():
         mu = coulomb(tables["friction"], tables["interface"])
@@ -52,7 +52,8 @@ def checked(
         found += _mistakes(tables, _law_problems(tables, mu, algorithm))
         if "load" in tables:
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
-            steps, against = load_steps(tables["load"], known, tables.get("bulk"), repeating and repeating.period)
+            period = repeating.period if repeating else _SOME_PERIOD
+            steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
             found += against
             if {"grid", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
                 found += _mistakes(tables, _period_problems(tables, steps))
@@ -69,6 +70,9 @@ def checked(
     return Deck.model_construct(**tables), solver, steps, repeating
 
 
+_SOME_PERIOD = Period(1.0, math.inf)  # for means in a deck that is refused anyway
+
+
 class Repeating(NamedTuple):
     """The window of a case that repeats, with what its loads refer to."""
 
@@ -77,12 +81,13 @@ class Repeating(NamedTuple):
 
 
 def _repeating(
-    tables: Mapping[str, Any], gap: FieldSource | None
+    tables: Mapping[str, Any], gap: FieldSource | None, lattice: Lattice | None
 ) -> tuple[Repeating | None, list[Mistake]]:
     """Return the window that repeats, and faults of it and of the gap over it."""
-    lattice, faults = window.repeating(tables["grid"])
-    if faults:
-        return None, faults
+    if lattice is None:
+        lattice, faults = window.repeating(tables["grid"])
+        if faults:
+            return None, faults
     heights = PlaneField(tables["body"].separation if gap is None else gap, GAP).over(lattice)
     if fault := window.seam_fault(lattice, heights):
         return None, [Mistake(("grid", "boundary"), "periodic", fault)]

@@ -126,7 +126,7 @@ class Problem:
 
     def _set_up(self, given: Assembled, gap: FieldSource | None, lattice: Lattice | None) -> None:
         self._given, self.judged = given, {}
-        self.deck, self.solver, self.load_steps, repeating = checked(given, gap)
+        self.deck, self.solver, self.load_steps, repeating = checked(given, gap, lattice)
         self.period = repeating and repeating.period  # None: the window does not repeat
         deck = self.deck
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output

@@ -327,16 +327,16 @@ def seam_fault(lattice: Lattice, gap: Array) -> str:
 
     Across the seam it may change by as much as between neighboring columns, or rows, elsewhere.
     """
+    if not np.isfinite(gap).all():
+        return "the gap of a window that repeats has nodes that cannot touch; expected heights everywhere"
     for axis, name in ((1, "columns"), (0, "rows")):
         steps = np.abs(np.diff(gap, axis=axis))
         first, last = np.take(gap, [0], axis=axis), np.take(gap, [-1], axis=axis)
         seam, most = float(np.abs(first - last).max()), float(steps.max(initial=0.0))
-        if not np.isfinite(gap).all() or seam > 1.001 * most + 1e-9 * float(np.ptp(gap)):
+        if seam > 1.001 * most + 1e-9 * float(np.ptp(gap)):
             return (
                 f"the gap does not repeat with the window: between its opposite ends it steps by "
                 f"{readable(seam)}, between neighboring {name} by {readable(most)} at most"
-                if np.isfinite(gap).all()
-                else "the gap of a window that repeats has nodes that cannot touch; expected heights everywhere"
             )
     return ""
 

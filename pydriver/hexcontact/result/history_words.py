@@ -228,7 +228,8 @@ def _stick(history: History) -> str:
     center = [float(history[f"stick_center_{axis}"]) for axis in "xy"]
     near = 1e-6 * history["contact_radius"]  # rounding errors
     place = ", ".join(quantity(0.0 if abs(value) < near else value, "m") for value in center)
-    return f"{stick_share(history)} of the contact area, about ({place})"
+    where = "" if math.isnan(center[0]) else f", about ({place})"  # of a window that repeats
+    return f"{stick_share(history)} of the contact area{where}"
 
 
 def _work(history: History) -> str:

@@ -101,7 +101,7 @@ class NodalStep:
         if source == "edges" and not self.sharp:
             raise NotInResult(
                 "source = 'edges': expected nodes; the edges need the gap, and there are none with a "
-                "compliant interface"
+                "compliant interface or in a window that repeats"
             )
         zero, at = np.zeros(self.lattice.shape), (self.lattice.basis, self.lattice.start)
         tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
@@ -156,7 +156,7 @@ def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
         lattice,
         {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
         friction=friction_of(known),
-        sharp=not is_compliant(known),
+        sharp=not (is_compliant(known) or lattice.periodic),
         shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
     )
 
@@ -359,7 +359,7 @@ class Step(NodalStep):
     friction : float
         Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
     sharp : bool
-        Whether the bodies touch without a compliant layer, so that the contact has a sharp edge.
+        Whether the bodies touch without a compliant layer in a window that ends: the edge of the contact is known.
     shear_limit : float
         Bound of the shear traction, Pa; inf: none.
     """

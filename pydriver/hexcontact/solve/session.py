@@ -214,6 +214,10 @@ class Session:
         bulk_stress_xx: float | str | None = None,
         bulk_stress_yy: float | str | None = None,
         bulk_stress_xy: float | str | None = None,
+        mean_pressure: float | str | None = None,
+        mean_gap: float | str | None = None,
+        mean_traction_x: float | str | None = None,
+        mean_traction_y: float | str | None = None,
         steps: int = 1,
         label: str = "",
     ) -> Step:
@@ -229,6 +233,8 @@ class Session:
             Torque (N m), or twist (rad).
         bulk_stress_xx, bulk_stress_yy, bulk_stress_xy : float, optional
             Bulk stress (Pa) of the body that [bulk] names.
+        mean_pressure, mean_gap, mean_traction_x, mean_traction_y : float, optional
+            Loads over the area (Pa), or mean of the gap (m), of a window that repeats.
         steps : int
             Number of equal increments.
         label : str
@@ -389,7 +395,9 @@ class Session:
         # the same nodes, whatever the largest load is
         grid = {key: value for key, value in tables["grid"].items() if key not in _FINENESS}
         grid |= {"spacing": lattice.spacing, "origin": list(lattice.origin)}
-        if self.case.window_fixed:
+        if self.case.period:
+            grid = dict(tables["grid"])
+        elif self.case.window_fixed:
             grid = {key: value for key, value in grid.items() if key != "extent"}
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
         # on this lattice only

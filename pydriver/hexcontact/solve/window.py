@@ -130,7 +130,7 @@ class Window(ABC, Generic[S]):
             ramp_done=target.fraction,
             bodies=(self.case.body_1, self.case.body_2),
             friction=self.case.friction_coefficient,
-            sharp=self.case.deck.interface is None,
+            sharp=self.case.deck.interface is None and self.case.period is None,
             shear_limit=self.friction.shear_limit,
         )
 
@@ -155,6 +155,9 @@ class Window(ABC, Generic[S]):
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
         gap = self.initial_gap if self.worn is None else self.initial_gap + self.worn
+        if self.case.period:
+            given["mean_pressure"] = solution.normal_load / self.case.period.area
+            given["mean_gap"] = float(solution.gap.mean())
         return given | measures(self.lattice, self.friction, gap, self.candidate, solution)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:

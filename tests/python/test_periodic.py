@@ -1,0 +1,149 @@
+"""Windows that repeat: waves, asperities far apart, loads by their means, and what is refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexcontact import Case, DeckError, Lattice, open_result
+
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+E_STAR = 210e9 / (2 * (1 - 0.3**2))
+WAVE, HEIGHT = 1e-3, 1e-6
+FULL = math.sqrt(2) * math.pi * E_STAR * HEIGHT / WAVE  # mean pressure of complete contact
+WAVES = f"{HEIGHT}*(1 - cos(2*pi*x/{WAVE})*cos(2*pi*y/{WAVE}))"
+
+
+def waves(nodes: int = 64, expression: str = WAVES, **arguments) -> Case:
+    """Two cosines on a square."""
+    body = {**STEEL, "surface": {"shape": "formula", "expression": expression}}
+    grid = {"extent": ["1 mm", "1 mm"], "nodes_across": nodes, "boundary": "periodic"}
+    return Case(**({"body_1": body, "body_2": STEEL} | grid | arguments))
+
+
+@pytest.mark.parametrize(("share", "mean_gap"), [(0.03, 0.66068), (0.3, 0.124881), (0.7, 0.011131)])
+def test_waves_between_their_limits(share: float, mean_gap: float) -> None:
+    """Mean gaps of a spectral program on 512 x 512 nodes."""
+    pressed = waves(loads={"mean_pressure": share * FULL}).run().dataset.isel(step=-1)
+    assert float(pressed["mean_gap"]) / HEIGHT == pytest.approx(mean_gap, abs=1e-3)
+    assert float(pressed["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-12)
+    assert float(pressed["approach"]) == pytest.approx(HEIGHT - float(pressed["mean_gap"]), rel=1e-9)
+    assert float(pressed["operator_applications"]) < 7
+    by_gap = waves(loads={"mean_gap": float(pressed["mean_gap"])}).run().dataset.isel(step=-1)
+    assert float(by_gap["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-6)
+
+
+def test_an_asperity_far_from_the_next_is_alone() -> None:
+    """In cells of 8 and 16 contact radii: the influence of the others falls like the third power."""
+    radius, a, spacings = 10e-3, 0.1e-3, 12
+    load = 4 * E_STAR * a**3 / (3 * radius)
+
+    def center(cells: int, periodic: bool) -> tuple[np.ndarray, float]:
+        n = cells * spacings
+        lattice = Lattice(
+            a / spacings, -n // 2, -n // 2, n, n, cell_angle=math.pi / 2, periodic=periodic
+        )
+        case = Case(
+            body_1=STEEL,
+            body_2=STEEL,
+            gap=lambda x, y: (x * x + y * y) / (2 * radius),
+            lattice=lattice,
+            normal_load=load,
+            tolerance=1e-10,
+        )
+        pressure = case.run().dataset["pressure"].values[-1]
+        middle = slice(n // 2 - 16, n // 2 + 16)
+        return pressure[middle, middle], float(pressure.max())
+
+    alone, largest = center(8, periodic=False)
+    apart = {cells: center(cells, periodic=True) for cells in (8, 16)}
+    change = {cells: abs(field - alone).max() / largest for cells, (field, _) in apart.items()}
+    assert change[16] < 2e-3
+    assert change[8] / change[16] == pytest.approx(8, rel=0.1)
+    assert apart[16][1] == pytest.approx(largest, rel=4e-4)
+
+
+def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
+    """Loads by their means, a file, and what a window that repeats does not have."""
+    case = waves(
+        body_2={"rigid": True},
+        friction_coefficient=0.3,
+        loads=[{"mean_pressure": 0.2 * FULL, "steps": 2}, {"mean_traction_x": 0.03 * FULL, "steps": 2}],
+    )
+    assert not case.lattice.x.min() + case.lattice.x.max() > 0.0  # about the origin
+    result = case.run(tmp_path / "waves.nc")
+    last = result.dataset.isel(step=-1)
+    assert float(last["tangential_load_x"]) == pytest.approx(0.03 * FULL * WAVE**2, rel=1e-12)
+    assert 0.0 < float(last["stick_area"]) < float(last["contact_area"])
+    assert float(last["dissipated_energy"]) > 0.0
+    assert float(last["torque"]) == 0.0
+    # the same in every direction of the square, since the waves are
+    other = case.changed({"load.2.mean_traction_x": None, "load.2.mean_traction_y": 0.03 * FULL}).run()
+    assert float(other.dataset["shift_y"][-1]) == pytest.approx(float(last["shift_x"]), rel=1e-6)
+    assert "contact_radius_fit" not in result.dataset
+    read = open_result(tmp_path / "waves.nc")
+    assert read.lattice == case.lattice
+    assert read.lattice.periodic
+    assert read.traction_field().source == "nodes"
+    with pytest.raises(DeckError, match="stress below a window that repeats is not available yet"):
+        read.stress()
+    assert Case.from_text(read.deck).lattice == case.lattice
+
+
+def test_steps_one_by_one() -> None:
+    case = waves(friction_coefficient=0.3, loads=[{"mean_pressure": 0.1 * FULL}, {"mean_traction_x": 1e6}])
+    with case.start() as session:
+        session.advance(mean_pressure=0.1 * FULL)
+        step = session.advance(mean_traction_x=1e6)
+    assert step.history["shift_x"] == case.run().dataset["shift_x"][-1]
+
+
+def test_flat_on_flat_has_one_unknown() -> None:
+    flat = waves(expression="0*x", friction_coefficient=0.5, loads={"mean_pressure": 1e6})
+    assert np.allclose(flat.run().dataset["pressure"], 1e6, rtol=1e-12)
+    planes = flat.changed({"body.1.surface": None, "load": [{"mean_pressure": 1e6}, {"mean_traction_x": 4e5}]})
+    last = planes.run().dataset.isel(step=-1)
+    assert np.allclose(last["traction_x"], 4e5, rtol=1e-9)
+    assert float(last["shift_x"]) == 0.0
+
+
+def test_the_period_is_exact_and_has_whole_cells() -> None:
+    case = waves(nodes_across=None, spacing="10 um", extent=["1 mm", "0.7 mm"], loads={"mean_pressure": 1e6})
+    assert case.lattice.shape == (70, 100)
+    assert case.lattice.basis.tolist() == [[1e-5, 0.0], [pytest.approx(0.0, abs=1e-20), pytest.approx(1e-5)]]
+    rhombus = waves(cell_angle="60 deg", extent=["1 mm", "1 mm"], loads={"mean_pressure": 1e6}, expression="0*x")
+    assert rhombus.lattice.cell_angle == pytest.approx(math.pi / 3)
+
+
+BAD = {
+    "nodes_across": ({"nodes_across": 62}, "expected a multiple of four columns .* such as 64, not 62"),
+    "nodes_in_radius": (
+        {"nodes_across": None, "nodes_in_radius": 20},
+        "nodes_in_radius = 20: expected spacing or nodes_across, since the window repeats",
+    ),
+    "extent": ({"extent": None}, "grid.extent: expected the lengths of the period"),
+    "boundary": ({"boundary": None}, "mean_pressure = 1000000.0: expected a window that repeats"),
+    "seam": ({"expression": "1e-6*(1 - cos(6*x/1e-3 + 1))"}, "grid.boundary .*: the gap does not repeat"),
+    "punch": ({"body_1": {**STEEL, "surface": {"shape": "punch", "radius": 1e-4}}}, "nodes that cannot touch"),
+    "torque": ({"loads": [{"mean_pressure": 1e6}, {"torque": 1.0}]}, "a rotation does not repeat"),
+    "both": ({"loads": {"mean_pressure": 1e6, "mean_gap": 1e-7}}, "mean_pressure or mean_gap, not both"),
+    "mean_gap": ({"loads": {"mean_gap": 0.0}}, "mean_gap = 0.0: expected a length above 0"),
+    "sliding": ({"loads": {"mean_pressure": 1e6, "mean_traction_x": 4e5}}, "gross sliding"),
+    "direct": ({"method": "direct"}, 'solver.method = "direct": expected "fft"'),
+    "accuracy": ({"accuracy": 0.02}, "accuracy: is not available yet beside a window that repeats"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_wrong_decks_are_told(name: str) -> None:
+    arguments, sentence = BAD[name]
+    with pytest.raises(DeckError, match=sentence):
+        waves(**({"friction_coefficient": 0.3, "loads": {"mean_pressure": 1e6}} | arguments))
+
+
+def test_lattices_of_python_repeat_too() -> None:
+    with pytest.raises(DeckError, match="a multiple of four columns expected"):
+        gap = lambda x, y: 0 * x  # noqa: E731
+        lattice = Lattice(1e-5, 0, 0, 10, 10, cell_angle=math.pi / 2, periodic=True)
+        Case(body_1=STEEL, body_2=STEEL, gap=gap, lattice=lattice, loads={"mean_pressure": 1e6}).run()

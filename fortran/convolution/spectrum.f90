@@ -25,7 +25,8 @@ module hc_spectrum
 
   !> Everything that the numbers of a spectrum depend on, to the bit.
   type :: kernel_key_t
-    !> Kind, columns and rows of the window, less than zero where it repeats, basis over its spacing, words of the medium, compliance of springs over its unit;
+    !> Kind, columns and rows of the window, below zero where it repeats, basis over its spacing, words of the medium, compliance of
+    !> springs over its unit;
     !> of stress and displacement, instead of the last ones, depth over spacing and Poisson's ratio
     integer(int64) :: word(key_length) = 0
   contains

@@ -16,7 +16,7 @@
 !> The mean of all displacements is infinite under a mean traction. Displacements are those from the mean planes: the symbols
 !> at zero vanish.
 !>
-!> Equations: docs/theory/periodic.md, (B1) to (B4).
+!> Equations: docs/theory/periodic.md, (G1) to (G4).
 module hc_periodic_symbol
   use hc_precision, only: wp, pi
   implicit none

@@ -89,7 +89,7 @@ contains
         now%pressures = now%target/level%lattice%cell_area()
         call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
-        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from the mean plane it closes it
+        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; it closes it from mean planes
         call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. any(level%lattice%periodic)), &
                      tolerance, max_sweeps, state%sweeps, error)
       end if

@@ -378,7 +378,7 @@ contains
     call contact%solve_step(before, reference, target, 1.0e-11_wp, 500, after, error)
     if (allocated(error)) return
     call check(error, largest(after%traction(:, :, 1) - mu*(pressed%pressure - less%pressure)), 0.0_wp, &
-               1.0e-8_wp*maxval(pressed%pressure), 'shear traction')
+               1.0e-9_wp*maxval(pressed%pressure), 'shear traction')
     call check(error, largest(after%traction(:, :, 2)), 0.0_wp, 1.0e-8_wp*maxval(pressed%pressure), 'across')
     call check(error, after%motion(2), mu*(pressed%motion(1) - less%motion(1)), 1.0e-8_wp, 'shift')
   end subroutine test_superposition

@@ -474,7 +474,7 @@ def test_every_default_is_written(folder: Path) -> None:
     solver = {"method": "auto", "tolerance": 1e-8, "coupling": "full", "entry": "implicit"}
     assert tables["solver"] == {**solver, "iteration": "newton", "step_tolerance": 0.01}
     assert tables["output"] == {"every": 1}
-    cells = {"cell_ratio": 1.0, "cell_angle": "60 deg"}
+    cells = {"cell_ratio": 1.0, "boundary": "free"}
     assert tables["grid"] == {"nodes_in_radius": 8.0, "extent": "auto", "origin": [0.0, 0.0], **cells}
     assert tables["load"] == [{"normal_load": 10.0, "ramp": "linear", "label": ""}]
     assert tables["title"] == "Ball"

@@ -253,7 +253,7 @@ def test_full_contact_is_said(caplog: pytest.LogCaptureFixture) -> None:
     [
         (
             {"interface": None},
-            "touch everywhere.*a periodic boundary, .* is not available yet",
+            "touch everywhere.*or a window that repeats, grid.boundary",
         ),
         ({"grid": {"spacing": 0.1}}, "grid: flat on flat has one unknown: expected spacing and window"),
         ({"load": [{"normal_load": 1.0, "twist": "1 deg"}]}, "load: .*: expected no torque and no twist"),

@@ -41,9 +41,7 @@ def test_an_asperity_far_from_the_next_is_alone() -> None:
 
     def center(cells: int, periodic: bool) -> tuple[np.ndarray, float]:
         n = cells * spacings
-        lattice = Lattice(
-            a / spacings, -n // 2, -n // 2, n, n, cell_angle=math.pi / 2, periodic=periodic
-        )
+        lattice = Lattice(a / spacings, -n // 2, -n // 2, n, n, cell_angle=math.pi / 2, periodic=periodic)
         case = Case(
             body_1=STEEL,
             body_2=STEEL,
@@ -102,7 +100,9 @@ def test_steps_one_by_one() -> None:
 def test_flat_on_flat_has_one_unknown() -> None:
     flat = waves(expression="0*x", friction_coefficient=0.5, loads={"mean_pressure": 1e6})
     assert np.allclose(flat.run().dataset["pressure"], 1e6, rtol=1e-12)
-    planes = flat.changed({"body.1.surface": None, "load": [{"mean_pressure": 1e6}, {"mean_traction_x": 4e5}]})
+    planes = flat.changed(
+        {"body.1.surface": None, "load": [{"mean_pressure": 1e6}, {"mean_traction_x": 4e5}]}
+    )
     last = planes.run().dataset.isel(step=-1)
     assert np.allclose(last["traction_x"], 4e5, rtol=1e-9)
     assert float(last["shift_x"]) == 0.0
@@ -112,7 +112,9 @@ def test_the_period_is_exact_and_has_whole_cells() -> None:
     case = waves(nodes_across=None, spacing="10 um", extent=["1 mm", "0.7 mm"], loads={"mean_pressure": 1e6})
     assert case.lattice.shape == (70, 100)
     assert case.lattice.basis.tolist() == [[1e-5, 0.0], [pytest.approx(0.0, abs=1e-20), pytest.approx(1e-5)]]
-    rhombus = waves(cell_angle="60 deg", extent=["1 mm", "1 mm"], loads={"mean_pressure": 1e6}, expression="0*x")
+    rhombus = waves(
+        cell_angle="60 deg", extent=["1 mm", "1 mm"], loads={"mean_pressure": 1e6}, expression="0*x"
+    )
     assert rhombus.lattice.cell_angle == pytest.approx(math.pi / 3)
 
 
@@ -125,7 +127,10 @@ BAD = {
     "extent": ({"extent": None}, "grid.extent: expected the lengths of the period"),
     "boundary": ({"boundary": None}, "mean_pressure = 1000000.0: expected a window that repeats"),
     "seam": ({"expression": "1e-6*(1 - cos(6*x/1e-3 + 1))"}, "grid.boundary .*: the gap does not repeat"),
-    "punch": ({"body_1": {**STEEL, "surface": {"shape": "punch", "radius": 1e-4}}}, "nodes that cannot touch"),
+    "punch": (
+        {"body_1": {**STEEL, "surface": {"shape": "punch", "radius": 1e-4}}},
+        "nodes that cannot touch",
+    ),
     "torque": ({"loads": [{"mean_pressure": 1e6}, {"torque": 1.0}]}, "a rotation does not repeat"),
     "both": ({"loads": {"mean_pressure": 1e6, "mean_gap": 1e-7}}, "mean_pressure or mean_gap, not both"),
     "mean_gap": ({"loads": {"mean_gap": 0.0}}, "mean_gap = 0.0: expected a length above 0"),

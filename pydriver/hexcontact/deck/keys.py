@@ -195,7 +195,10 @@ class Grid(Table):
             if "nodes_in_radius" in data:
                 yield "nodes_in_radius", "expected spacing or nodes_across, since the window repeats"
             if data.get("extent", "auto") == "auto" and "window" not in data:
-                yield "extent", 'expected the lengths of the period, such as ["1 mm", "1 mm"], since it repeats'
+                yield (
+                    "extent",
+                    'expected the lengths of the period, such as ["1 mm", "1 mm"], since it repeats',
+                )
 
 
 class Solver(Table):
@@ -309,7 +312,9 @@ class Segment(_Driven):
         whole = "path" in data or "series" in data
         known = cls.known_keys()
         # an unknown key may be that of the load
-        if not whole and not any(key in DRIVEN or key in MEANS or (key not in known and not cls.meant(key)) for key in data):
+        if not whole and not any(
+            key in DRIVEN or key in MEANS or (key not in known and not cls.meant(key)) for key in data
+        ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():
             meant = [name for name, load in MEANS.items() if load in (force, displacement)]

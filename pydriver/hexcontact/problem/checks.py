@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ..core.lattice import Lattice
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
 from ..deck.keys import MEANS, Deck, Solver
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
-from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, LOADS, WORN
@@ -267,7 +267,7 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
     bodies = tables["body"]
     if (bulk := tables.get("bulk")) and (bodies.body_1, bodies.body_2)[bulk.body - 1].rigid:
         yield ("bulk", "body"), f"expected an elastic body; body {bulk.body} is rigid"
-    if (grid := tables.get("grid")) is None or grid.periodic:
+    if (grid := tables.get("grid")) and grid.periodic:
         return
     if not gap_given and bodies.separation.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)

@@ -312,7 +312,9 @@ def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     problems = []
     if n_col % 4:
         fitting = max(4 * round(n_col / 4), 4)
-        sentence = f"expected a multiple of four columns in a window that repeats, such as {fitting}, not {n_col}"
+        sentence = (
+            f"expected a multiple of four columns in a window that repeats, such as {fitting}, not {n_col}"
+        )
         if key == "spacing":
             sentence += f': a spacing of "{readable(spacing * n_col / fitting)}"'
         problems.append(Mistake(("grid", key), value, sentence))

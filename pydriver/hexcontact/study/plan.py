@@ -530,7 +530,7 @@ def plan(
             if check == "windows":
                 Problem._made(assemble(merged, source=about))
             elif check == "decks":
-                checked(assemble(merged, source=about), False)
+                checked(assemble(merged, source=about), None, None)
         except DeckError as error:
             faults = _shared_by_segments(error)
             of_case = _lines(faults, keys, PlannedCase(position, values, "", names=names))

@@ -188,7 +188,8 @@ VARIABLES: dict[str, Variable] = {
         for axes in ("xx", "yy", "xy")
     },
     "mean_pressure": _work(
-        "Pa", "normal load over the area of the window, which repeats", title="Mean pressure", summary=7, **_FROM_0
+        "Pa", "normal load over the area of the window, which repeats",
+        title="Mean pressure", summary=7, **_FROM_0,
     ),
     "mean_gap": _work(
         "m", "mean of the gap over the window, which repeats", title="Mean gap", summary=8, **_FROM_0

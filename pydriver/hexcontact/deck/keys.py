@@ -158,8 +158,8 @@ class Grid(Table):
     )
     cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] | None = meaning(
         None,
-        "angle of the second basis vector from x; 60 deg, the equilateral lattice, if absent, and 90 deg where "
-        "the window repeats",
+        "angle of the second basis vector from x; if absent 60 deg, the equilateral lattice, and 90 deg "
+        "where the window repeats",
         '"90 deg"',
     )
     boundary: Annotated[str, Word(BOUNDARIES)] = meaning(
@@ -195,10 +195,7 @@ class Grid(Table):
             if "nodes_in_radius" in data:
                 yield "nodes_in_radius", "expected spacing or nodes_across, since the window repeats"
             if data.get("extent", "auto") == "auto" and "window" not in data:
-                yield (
-                    "extent",
-                    'expected the lengths of the period, such as ["1 mm", "1 mm"], since it repeats',
-                )
+                yield "extent", 'expected the lengths of the period, such as ["1 mm", "1 mm"]'
 
 
 class Solver(Table):
@@ -318,9 +315,9 @@ class Segment(_Driven):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():
             meant = [name for name, load in MEANS.items() if load in (force, displacement)]
-            first, *others = [*(key for key in (force, displacement, *meant) if key in data), ""]
-            if others and others[0]:
-                yield others[0], f"expected {first} or {others[0]}, not both"
+            found = [key for key in (force, displacement, *meant) if key in data]
+            if found[1:]:
+                yield found[1], f"expected {found[0]} or {found[1]}, not both"
         if data.get("ramp") == "cubic" and not {"normal_load", "mean_pressure"} & data.keys():
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
         if "values" in data and data.get("ramp", "linear") != "linear":

@@ -302,8 +302,8 @@ def _touching_problems(gap: Separation) -> Found:
     elif larger == 0:
         sentence = (
             "the two surfaces touch everywhere, so the contact has no end and one unknown, its mean "
-            'pressure; expected a shape that bounds it, [interface] with law = "power", or a window that repeats, '
-            'grid.boundary = "periodic"'
+            'pressure; expected a shape that bounds it, [interface] with law = "power", or a window that '
+            'repeats, grid.boundary = "periodic"'
         )
     yield ("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), sentence
 

@@ -359,7 +359,7 @@ class Step(NodalStep):
     friction : float
         Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
     sharp : bool
-        Whether the bodies touch without a compliant layer in a window that ends: the edge of the contact is known.
+        Whether the edge of the contact is known: no compliant layer, and a window that ends.
     shear_limit : float
         Bound of the shear traction, Pa; inf: none.
     """

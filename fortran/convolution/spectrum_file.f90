@@ -94,7 +94,7 @@ contains
     character(len=*), intent(in) :: maker
     character(len=:), allocatable :: name
     character(len=64) :: text
-    write (text, '(a, "-", i0, "x", i0, "-", z16.16, ".kernels")') trim(kind_name(key%word(1))), key%word(2:3), &
+    write (text, '(a, "-", i0, "x", i0, "-", z16.16, ".kernels")') trim(kind_name(key%word(1))), abs(key%word(2:3)), &
       hash_of(known_head(key, maker), 0_int64)
     name = trim(text)
   end function file_name

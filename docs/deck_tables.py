@@ -127,12 +127,12 @@ def shapes() -> str:
     for name, shape in surfaces.SHAPES.items():
         first = [f"`{name}`", shape.formula]
         for key, info in documented(shape).items():
-            if key != "offset":
+            if key not in ("offset", "tilt"):
                 lines.append(row([*first, *cells_of(key, info)]))
                 first = ["", ""]
         if first[0]:
             lines.append(row([*first, *[""] * len(HEADER)]))
-    lines.append(row(["all", "", *cells_of("offset", surfaces.Flat.model_fields["offset"])]))
+    lines += [row(["all", "", *cells_of(key, surfaces.Flat.model_fields[key])]) for key in ("offset", "tilt")]
     return "\n".join(lines) + "\n"
 
 

@@ -198,14 +198,16 @@ WRONG = [
     (
         '"sphere"',
         '"spere"',
-        'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
-        '"power", "punch", "rounded_punch" or "formula"; did you mean sphere?',
+        'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
+        '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
+        '"torus", "waviness", "dent", "roller" or "formula"; did you mean sphere?',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
         "{ radius = 1 }",
-        'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
-        '"power", "punch", "rounded_punch" or "formula"',
+        'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
+        '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
+        '"torus", "waviness", "dent", "roller" or "formula"',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',

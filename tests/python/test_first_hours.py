@@ -448,14 +448,14 @@ def test_half_axes_of_a_roller_are_those_of_the_ellipse_with_the_same_moments(fo
         (
             BALL,
             '{ shape = "paraboloid", radius_x = "-4.89 mm", radius_y = "18.2375 mm" }',
-            'radius_x = "-4.89 mm": expected a length above 0 such as "1 mm"; a hollow is a formula with its '
-            'radii in m: { shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }',
+            'radius_x = "-4.89 mm": expected a length above 0 such as "1 mm"; a hollow is an ellipsoid: '
+            '{ shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }',
         ),
         (
             '{ shape = "cylinder", radius = "10 mm" }',
             FLAT,
-            "touch along a line, so the contact has no end; expected a shape that bounds it: a paraboloid "
-            "with a large radius along the line, as in cases/long_cylinder.toml, or a formula with ends",
+            "touch along a line, so the contact has no end; expected a shape that bounds it: shape = "
+            '"roller", which has a length, or a paraboloid with a large radius along the line',
         ),
         (of_formula("y**2/16e-3"), FLAT, "touch along a line, so the contact has no end"),
         (BALL, of_formula("-(x**2 + y**2)/9e-3"), "the gap falls away from the point of contact"),

@@ -16,15 +16,22 @@ from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
     Cylinder,
+    Dent,
+    Ellipsoid,
     Flat,
     FormulaSurface,
     Paraboloid,
     Power,
     Punch,
+    RectangularPunch,
+    Roller,
     RoundedPunch,
     Separation,
     Sphere,
     Surface,
+    SurfaceSum,
+    Torus,
+    Waviness,
     principal_curvatures,
     shape,
 )
@@ -43,6 +50,12 @@ SOME = [
     Power(exponent=3, coefficient=2.0),
     Punch(radius=1.5),
     RoundedPunch(flat_radius=0.6, edge_radius=10.0),
+    Ellipsoid(radius_x=-4.0, radius_y=1.0, angle="30 deg"),
+    RectangularPunch(width=1.0, length=2.0, edge_radius=10.0),
+    Torus(ring_radius=1.0, radius=3.0),
+    Waviness(amplitude=0.1, wavelength=0.7, angle="20 deg"),
+    Dent(depth=0.1, radius=1.0, rim=0.02),
+    Roller(radius=2.0, length=5.0, profile="crown", crown_radius=90.0),
     FormulaSurface(expression="min(x**2, (x + 1)**2 + 0.1)/4 + y**2"),
 ]
 
@@ -52,6 +65,26 @@ SOME = [
     [
         (Flat(), 3.0, 4.0, 0.0),
         (Sphere(radius=2.0), 3.0, 4.0, 25 / 4),
+        (
+            Sphere(radius=2.0, tilt=["0.1 rad", "-0.05 rad"]),
+            3.0,
+            4.0,
+            25 / 4 + 4 * math.tan(0.1) - 3 * math.tan(0.05),
+        ),
+        (Ellipsoid(radius_x=-2.0, radius_y=1.0), 3.0, 4.0, 8 - 9 / 4),
+        (RectangularPunch(width=2.0, length=4.0), 1.0, 2.0, 0.0),
+        (RectangularPunch(width=2.0, length=4.0), 1.1, 0.0, math.inf),
+        (RectangularPunch(width=2.0, length=4.0, edge_radius=5.0), 4.0, 6.0, (9 + 16) / 10),
+        (Torus(ring_radius=4.0, radius=0.5), 3.0, 4.0, 1.0),
+        (Waviness(amplitude=0.5, wavelength=2.0, angle="90 deg"), 9.0, 1.0, 1.0),
+        (Dent(depth=0.2, radius=2.0, rim=0.1), 0.0, 0.0, 0.2),
+        (Dent(depth=0.2, radius=2.0, rim=0.1), 1.0, 0.0, 0.2 * 0.75**2),
+        (Dent(depth=0.2, radius=2.0, rim=0.1), 2.5, 0.0, -0.1),
+        (Dent(depth=0.2, radius=2.0, rim=0.1), 0.0, 3.1, 0.0),
+        (Roller(radius=2.0, length=6.0), 3.0, 4.0, 4.0),
+        (Roller(radius=2.0, length=6.0), 3.1, 4.0, math.inf),
+        (Roller(radius=2.0, length=8.0, angle="90 deg", profile="crown", crown_radius=80.0), 3.0, 4.0, 2.35),
+        (Roller(radius=2.0, length=8.0, profile="chamfer", chamfer=0.5), 3.75, 0.0, 0.25),
         (Sphere(radius="2 mm"), 1e-3, 0.0, 2.5e-4),
         (Sphere(radius=5.0, exact=True), 3.0, 0.0, 1.0),
         (Sphere(radius=5.0, exact=True), 0.0, 5.0, 5.0),
@@ -92,8 +125,9 @@ def test_every_shape_is_vectorised_nonnegative_and_touches_at_its_center(surface
     x, y = np.meshgrid(np.linspace(-3, 3, 7), np.linspace(-2, 2, 5))
     height = surface.height(x, y)
     assert height.shape == x.shape
-    assert (height >= 0).all()
-    assert height[2, 3] == 0
+    if not isinstance(surface, Ellipsoid | Torus | Dent):  # hollow in the middle, or nearer to the other body
+        assert (height >= 0).all()
+        assert height[2, 3] == 0
     one_by_one = [
         [float(surface.height(a, b)) for a, b in zip(p, q, strict=True)] for p, q in zip(x, y, strict=True)
     ]
@@ -139,6 +173,7 @@ def test_all_shapes_of_the_deck_are_there() -> None:
         "power",
         "punch",
         "rounded_punch",
+        *("ellipsoid", "rectangular_punch", "torus", "waviness", "dent", "roller"),
         "formula",
     }
     assert set(SHAPES.values()) == {type(surface) for surface in SOME}
@@ -149,8 +184,25 @@ def test_all_shapes_of_the_deck_are_there() -> None:
     [
         (
             lambda: Sphere(radius=-1.0),
-            'radius = -1.0: expected a length above 0 such as "1 mm"; a hollow is a formula with its radii '
-            'in m: { shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }',
+            'radius = -1.0: expected a length above 0 such as "1 mm"; a hollow is an ellipsoid: '
+            '{ shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }',
+        ),
+        (
+            lambda: Ellipsoid(radius_x=0.0, radius_y=1.0),
+            'radius_x = 0.0: expected a length such as "1 mm", not 0',
+        ),
+        (
+            lambda: Roller(radius=1.0, length=2.0, profile="crown"),
+            'crown_radius: missing; expected it for profile = "crown"',
+        ),
+        (
+            lambda: Roller(radius=1.0, length=2.0, chamfer=0.1),
+            'chamfer = 0.1: expected it for profile = "chamfer" only',
+        ),
+        (
+            lambda: Sphere(radius=1.0, tilt=["20 deg", "0 deg"]),
+            'tilt = ["20 deg", "0 deg"]: expected two angles such as ["0.01 deg", "0 deg"]; entry 1, '
+            '"20 deg": expected an angle with its unit of at least -0.1 rad and at most 0.1 rad such as "30 deg"',
         ),
         (lambda: Sphere(), 'radius: missing; expected a length above 0 such as "1 mm"'),
         (lambda: Sphere(radius=1.0, exakt=True), "exakt: unknown key; did you mean exact?"),
@@ -169,6 +221,73 @@ def test_a_wrong_surface_is_a_deck_error(make: object, sentence: str) -> None:
     with pytest.raises(DeckError) as error:
         make()  # type: ignore[operator]
     assert str(error.value) == sentence
+
+
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+E_STAR = 210e9 / (2 * (1 - 0.3**2))
+
+
+def test_several_shapes_of_a_body_add_up(tmp_path: Path) -> None:
+    parts = [
+        {"shape": "sphere", "radius": 1e-2},
+        {"shape": "dent", "depth": 3e-7, "radius": 6e-5, "offset": [2e-5, 0]},
+    ]
+    case = Case(body_1={**STEEL, "surface": parts}, body_2=STEEL, spacing=1e-5, normal_load=20.0)
+    x, y = case.lattice.x, case.lattice.y
+    one, two = Sphere(radius=1e-2), Dent(depth=3e-7, radius=6e-5, offset=(2e-5, 0.0))
+    assert isinstance(case.body_1.surface, SurfaceSum)
+    assert np.array_equal(case.initial_gap(case.lattice)[0], one.height(x, y) + two.height(x, y))
+    assert Case.from_text(case.deck_text) == case
+    assert (
+        Case(
+            body_1={**STEEL, "surface": parts[:1]}, body_2=STEEL, spacing=1e-5, normal_load=20.0
+        ).body_1.surface
+        == one
+    )
+    with pytest.raises(DeckError, match="body.1.surface.depth"):
+        case.changed({"body.1.surface": [parts[0], {"shape": "dent", "radius": 1.0}]})
+
+
+def test_a_ball_in_a_groove_is_the_ellipse_of_hertz() -> None:
+    groove = {"shape": "ellipsoid", "radius_x": -8e-3, "radius_y": 1e6}
+    case = Case(
+        body_1={**STEEL, "surface": Sphere(radius=5e-3)},
+        body_2={**STEEL, "surface": groove},
+        nodes_in_radius=20,
+        normal_load=50.0,
+    )
+    compared = {entry.quantity: entry.error for entry in case.run().compare()}
+    assert abs(compared["max_pressure"]) < 2e-3
+    assert abs(compared["approach"]) < 2e-3
+
+
+def test_a_profile_by_moduli_needs_them() -> None:
+    with pytest.raises(DeckError, match="design_load: its profile follows from the moduli of the bodies"):
+        Roller(radius=1.0, length=2.0, profile="logarithmic", design_load=1.0).height(0.0, 0.0)
+
+
+def test_a_logarithmic_roller_is_loaded_evenly_at_its_design_load() -> None:
+    """Load by length within 1 % up to 0.95 of the half-length (Johns and Gohar: b/l = 0.02)."""
+    half_width, half_length, radius = 20e-6, 1e-3, 5e-3
+    by_length = math.pi * E_STAR * half_width**2 / (4 * radius)
+    load = 2 * half_length * by_length
+    roller = Roller(
+        radius=radius, length=2 * half_length, angle="90 deg", profile="logarithmic", design_load=load
+    )
+    case = Case(
+        body_1={**STEEL, "surface": roller},
+        body_2=STEEL,
+        spacing=2e-6,
+        cell_ratio=4.0,
+        cell_angle="90 deg",
+        normal_load=load,
+    )
+    last = case.run().dataset.isel(step=-1)
+    carried = last["pressure"].values.sum(axis=1) * 2e-6 / by_length
+    y = last["y"].values[:, 0]
+    assert abs(carried[abs(y) < 0.95 * half_length] - 1.0).max() < 0.01
+    middle = last["pressure"].values[len(y) // 2].max()
+    assert middle == pytest.approx(2 * by_length / (math.pi * half_width), rel=3e-3)
 
 
 # --- two surfaces ------------------------------------------------------------------------------------------
@@ -291,9 +410,13 @@ def test_a_new_shape_needs_its_class_and_a_word() -> None:
         assert body.written(defaults=False)["surface"] == {
             "shape": "wedge",
             "offset": [0.0, 0.0],
+            "tilt": ["0 deg", "0 deg"],
             "slope": 0.1,
         }
-        found = [one["title"] for one in deck_schema()["$defs"]["Body"]["properties"]["surface"]["oneOf"]]
+        found = [
+            one["title"]
+            for one in deck_schema()["$defs"]["Body"]["properties"]["surface"]["anyOf"][0]["oneOf"]
+        ]
         assert found == list(SHAPES)
         assert SHAPES["wedge"] is Wedge
     finally:

@@ -72,6 +72,13 @@ class Body(Table):
         None, "the shape of its surface; flat if absent"
     )
 
+    @property
+    def compliance(self) -> float:
+        """(1 - ν²)/E (1/Pa), 0 of a rigid body."""
+        if self.young_modulus is None or self.poisson_ratio is None:
+            return 0.0
+        return (1.0 - self.poisson_ratio**2) / self.young_modulus
+
     @field_validator("surface")
     @classmethod
     def _curved(cls, surface: Surface | None) -> Surface | None:
@@ -99,7 +106,11 @@ class Bodies(Table):
     @functools.cached_property
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
-        return Separation(self.body_1.surface or Flat(), self.body_2.surface or Flat())
+        modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
+        one, two = (
+            body.surface.beside(modulus) if body.surface else Flat() for body in (self.body_1, self.body_2)
+        )
+        return Separation(one, two)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

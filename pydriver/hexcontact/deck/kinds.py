@@ -384,9 +384,18 @@ class RadiusOfCurvature(Quantity):
         except PydanticCustomError as error:
             with contextlib.suppress(UnitError):
                 if to_si(value, self.dimension) < 0.0:
-                    example = '{ shape = "formula", expression = "-x**2/(2*5e-3) + y**2/(2*20e-3)" }'
-                    refuse(f"{error.message()}; a hollow is a formula with its radii in m: {example}")
+                    example = '{ shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }'
+                    refuse(f"{error.message()}; a hollow is an ellipsoid: {example}")
             raise
+
+
+class NonzeroQuantity(Quantity):
+    """A quantity of either sign, not 0."""
+
+    def _parse(self, value: object) -> float:
+        if (found := super()._parse(value)) == 0.0:
+            refuse(f"expected {self.expected}, not 0")
+        return found
 
 
 class Several(Kind):

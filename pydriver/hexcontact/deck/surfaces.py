@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import PrivateAttr
 from pydantic.fields import FieldInfo
 
 from ..arrays import Array, Mask
@@ -27,6 +28,7 @@ from .kinds import (
     Formula,
     HeightFormula,
     Kind,
+    NonzeroQuantity,
     PowerCoefficient,
     Quantity,
     RadiusOfCurvature,
@@ -37,7 +39,7 @@ from .kinds import (
     refuse,
 )
 from .table_base import Argument, meaning, refuse_key
-from .units import ANGLE, LENGTH, NUMBER, Dimension
+from .units import ANGLE, FORCE, LENGTH, NUMBER, Dimension
 
 _S = TypeVar("_S", bound="Surface")
 
@@ -55,15 +57,22 @@ PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
 if TYPE_CHECKING:
     Radius = Read[float, float | str]
     CurvatureRadius = Read[float, float | str]
+    SignedRadius = Read[float, float | str]
     LengthFromZero = Read[float, float | str]
     Angle = Read[float, float | str]
+    Tilt = Read[tuple[float, float], Sequence[float | str]]
     Coefficient = Read[float, float | str]
     Point = Read[tuple[float, float], Sequence[float | str]]
 else:
     Radius = PositiveLength
     CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
+    SignedRadius = Annotated[float, NonzeroQuantity(LENGTH)]
     LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
     Angle = Annotated[float, Quantity(ANGLE)]
+    Tilt = Annotated[
+        tuple[float, float],
+        Several(Quantity(ANGLE, at_least=-0.1, at_most=0.1), "angles", '["0.01 deg", "0 deg"]', count=2),
+    ]
     Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
     Point = Annotated[
         tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
@@ -88,6 +97,10 @@ class Surface(Argument):
 
     shape: str = ""
     offset: Point = meaning((0.0, 0.0), "moves the shape in x and y")
+    tilt: Tilt = meaning(
+        (0.0, 0.0),
+        "turns the shape about the axes through its center along x and y; the surface rises with y, x",
+    )
 
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
@@ -105,7 +118,20 @@ class Surface(Argument):
         ndarray
             Heights of the same shape: >= 0, and inf where nothing can touch.
         """
-        return self._height(np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1])
+        x, y = np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1]
+        height = self._height(x, y)
+        if self.tilted:
+            height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
+        return height
+
+    @property
+    def tilted(self) -> bool:
+        """Whether the shape is turned."""
+        return self.tilt != (0.0, 0.0)
+
+    def beside(self, modulus: float) -> Surface:
+        """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
+        return self
 
     def candidate(self, x: ArrayLike, y: ArrayLike) -> Mask:
         """Return where the shape has a surface that could touch (False outside a punch)."""
@@ -215,6 +241,18 @@ class Paraboloid(Surface):
         return (a * x + b * y) ** 2 / (2 * self.radius_x) + (a * y - b * x) ** 2 / (2 * self.radius_y)
 
 
+@shape("ellipsoid")
+class Ellipsoid(Paraboloid):
+    """A surface with two principal radii of curvature, of which any may be that of a hollow."""
+
+    radius_x: SignedRadius = meaning(
+        ..., "radius of curvature R₁ along the first axis (x if angle is 0), negative where hollow", '"-5 mm"'
+    )
+    radius_y: SignedRadius = meaning(
+        ..., "radius of curvature R₂ across it, negative where hollow", '"20 mm"'
+    )
+
+
 @shape("cylinder")
 class Cylinder(Surface):
     """A parabolic cylinder with its axis in the plane."""
@@ -285,6 +323,138 @@ class RoundedPunch(Surface):
         return np.maximum(np.hypot(x, y) - self.flat_radius, 0.0) ** 2 / (2 * self.edge_radius)
 
 
+@shape("rectangular_punch")
+class RectangularPunch(Surface):
+    """The flat end of a rectangular punch; its edges are parabolic fillets, or nothing can touch outside."""
+
+    width: Radius = meaning(..., "side of the flat end along x")
+    length: Radius = meaning(..., "side of the flat end along y")
+    edge_radius: Radius | None = meaning(
+        None, "radius of curvature R of the edges; sharp if absent", '"1 mm"'
+    )
+    formula: ClassVar[str] = (
+        "h = (dx² + dy²)/(2R) at distances dx, dy beyond the sides; sharp: nothing beyond"
+    )
+
+    @property
+    def reach(self) -> float:
+        """The half diagonal of a sharp one, else infinite."""
+        return math.inf if self.edge_radius else math.hypot(self.width, self.length) / 2
+
+    def _height(self, x: Array, y: Array) -> Array:
+        beyond = [np.maximum(np.abs(at) - side / 2, 0.0) for at, side in ((x, self.width), (y, self.length))]
+        if self.edge_radius:
+            return (beyond[0] ** 2 + beyond[1] ** 2) / (2 * self.edge_radius)
+        slack = (_RIM - 1.0) * max(self.width, self.length)
+        return np.where(np.maximum(*beyond) <= slack, 0.0, np.inf)
+
+
+@shape("torus")
+class Torus(Surface):
+    """A ring that lies on the plane: it touches along a circle."""
+
+    ring_radius: Radius = meaning(..., "radius of the circle")
+    radius: CurvatureRadius = meaning(..., "radius R of the section")
+    formula: ClassVar[str] = "h = (r − ring_radius)²/(2R)"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return (np.hypot(x, y) - self.ring_radius) ** 2 / (2 * self.radius)
+
+
+@shape("waviness")
+class Waviness(Surface):
+    """A wave in one direction."""
+
+    amplitude: Radius = meaning(..., "amplitude a")
+    wavelength: Radius = meaning(..., "wavelength λ")
+    angle: Angle = meaning(0.0, "direction of the wave, from x towards y")
+    formula: ClassVar[str] = "h = a (1 − cos 2πs/λ), s along the direction"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        (a, b), _ = _axes(self.angle)
+        return self.amplitude * (1.0 - np.cos(2.0 * math.pi / self.wavelength * (a * x + b * y)))
+
+
+@shape("dent")
+class Dent(Surface):
+    """A round dent in a plane, with a rim of displaced material."""
+
+    depth: Radius = meaning(..., "depth d")
+    radius: Radius = meaning(..., "radius R of the dent")
+    rim: LengthFromZero = meaning(0.0, "height of the rim, R/2 wide about the dent")
+    formula: ClassVar[str] = "h = d (1 − r²/R²)² for r < R; −rim sin² 2π(r/R − 1) for R < r < 1.5 R"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        place = np.hypot(x, y) / self.radius
+        inside = self.depth * np.maximum(1.0 - place**2, 0.0) ** 2
+        rim = self.rim * np.sin(2.0 * math.pi * (place - 1.0)) ** 2
+        return inside - np.where(abs(place - 1.25) < 0.25, rim, 0.0)
+
+
+PROFILES = ("sharp", "chamfer", "crown", "logarithmic")
+
+
+@shape("roller")
+class Roller(Surface):
+    """A parabolic cylinder of a length, with its axis in the plane."""
+
+    radius: CurvatureRadius = meaning(..., "radius R")
+    length: Radius = meaning(..., "length l; nothing can touch beyond the ends")
+    angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
+    profile: Annotated[str, Word(PROFILES)] = meaning("sharp", "profile f along the axis")
+    chamfer: Radius | None = meaning(None, "length of the chamfers at 45°", '"0.2 mm"')
+    crown_radius: CurvatureRadius | None = meaning(None, "radius of curvature along the axis", '"1 m"')
+    design_load: Annotated[float, Quantity(FORCE, above=0)] | None = meaning(
+        None, "load P under which the pressure of a logarithmic profile is even along the axis", '"1 kN"'
+    )
+    formula: ClassVar[str] = (
+        "h = t²/(2R) + f(s), s along the axis; crown: s²/(2 crown_radius); logarithmic: "
+        "−P/(πE*l) ln(1 − (1 − 0.6065 b/l)(2s/l)²), b the half-width of the contact on a flat"
+    )
+    _modulus: float = PrivateAttr(0.0)
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Require the key of the profile, and no other."""
+        needed = {"chamfer": "chamfer", "crown": "crown_radius", "logarithmic": "design_load"}
+        profile = data.get("profile", "sharp")
+        for name, key in needed.items():
+            if name == profile and key not in data:
+                yield key, f'missing; expected it for profile = "{name}"'
+            elif name != profile and key in data:
+                yield key, f'expected it for profile = "{name}" only'
+
+    @property
+    def reach(self) -> float:
+        """Half of the length."""
+        return self.length / 2
+
+    def beside(self, modulus: float) -> Surface:
+        """Return the roller with the logarithmic profile of the modulus."""
+        other = self.model_copy()
+        other._modulus = modulus
+        return other
+
+    def _height(self, x: Array, y: Array) -> Array:
+        (a, b), _ = _axes(self.angle)
+        along, across = np.abs(a * x + b * y), a * y - b * x
+        place = 2.0 * along / self.length
+        drop = np.zeros(np.shape(along))
+        if self.chamfer:
+            drop = np.maximum(along - self.length / 2 + self.chamfer, 0.0)
+        elif self.crown_radius:
+            drop = along**2 / (2 * self.crown_radius)
+        elif self.design_load:
+            if not self._modulus:
+                raise DeckError("design_load: its profile follows from the moduli of the bodies, in a case")
+            by_length = self.design_load / self.length
+            width = math.sqrt(4.0 * by_length * self.radius / (math.pi * self._modulus))
+            # the end drops by (P/(pi E* l)) ln(3.2976 l/2b): Johns and Gohar, Tribology Int. 14, 1981
+            end = 1.0 - 2.0 * width / (3.2976 * self.length)
+            drop = -by_length / (math.pi * self._modulus) * np.log(1.0 - end * np.minimum(place, 1.0) ** 2)
+        return np.where(place <= _RIM, across**2 / (2 * self.radius) + drop, np.inf)
+
+
 @shape("formula")
 class FormulaSurface(Surface):
     """Any height, such as that of several pads."""
@@ -333,6 +503,38 @@ _REFUSED = {
 }
 
 
+class SurfaceSum(Surface):
+    """Several shapes on one body, whose heights add up."""
+
+    parts: tuple[Surface, ...] = ()
+
+    @property
+    def curvature(self) -> Array | None:
+        """None: the shapes may have different centers."""
+        return None
+
+    @property
+    def reach(self) -> float:
+        """The smallest of all."""
+        return min(part.reach for part in self.parts)
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the sum of the heights (m)."""
+        return np.asarray(sum(part.height(x, y) for part in self.parts))
+
+    def beside(self, modulus: float) -> Surface:
+        """Return the sum of shapes of the modulus."""
+        return SurfaceSum(parts=tuple(part.beside(modulus) for part in self.parts))
+
+    def written(self, defaults: bool = True) -> Any:
+        """Return the shapes with their keys."""
+        return [part.written(defaults) for part in self.parts]
+
+    def __str__(self) -> str:
+        """Name the shapes."""
+        return " + ".join(map(str, self.parts))
+
+
 class SurfaceKind(Kind):
     """A surface: one of the shapes as an inline table, or a `Surface` of Python."""
 
@@ -345,13 +547,15 @@ class SurfaceKind(Kind):
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
         """Describe each of the shapes."""
         shapes = SHAPES.values()
-        return {
-            "oneOf": [s.__get_pydantic_json_schema__(s.__pydantic_core_schema__, handler) for s in shapes]
-        }
+        one = {"oneOf": [s.__get_pydantic_json_schema__(s.__pydantic_core_schema__, handler) for s in shapes]}
+        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
 
     def _parse(self, value: object) -> Surface:
         if isinstance(value, Surface):
             return value
+        if isinstance(value, list | tuple) and value:
+            parts = tuple(map(self._parse, value))
+            return parts[0] if len(parts) == 1 else SurfaceSum(parts=parts)
         if not isinstance(value, Mapping):
             refuse(f"expected {self.expected}")
         shape = value.get("shape")
@@ -403,9 +607,10 @@ class Separation:
             If the two surfaces nowhere face each other (two punches side by side).
         """
         one, two = self.surface_1, self.surface_2
-        if isinstance(one, Flat | FormulaSurface) or one.offset == two.offset:
+        known = Flat | FormulaSurface | SurfaceSum  # whose heights count as they are given
+        if isinstance(one, known) or one.tilted or one.offset == two.offset:
             return (*two.offset, 0.0)
-        if isinstance(two, Flat | FormulaSurface):
+        if isinstance(two, known) or two.tilted:
             return (*one.offset, 0.0)
         x, y = self.quadratic[1] if self.quadratic else self._search()
         return x, y, float(self._sum(x, y))
@@ -414,7 +619,8 @@ class Separation:
     def curvature(self) -> Array | None:
         """Second derivatives (1/m) of a gap that is a quadratic form; None of others."""
         one, two = self.surface_1.curvature, self.surface_2.curvature
-        return None if one is None or two is None else one + two
+        tilted = self.surface_1.tilted or self.surface_2.tilted
+        return None if one is None or two is None or tilted else one + two
 
     @cached_property
     def quadratic(self) -> tuple[Array, tuple[float, float]] | None:

@@ -291,8 +291,8 @@ def _touching_problems(gap: Separation) -> Found:
         return
     sentence = (
         "the two surfaces touch along a line, so the contact has no end; expected a shape that bounds it: "
-        "a paraboloid with a large radius along the line, as in cases/long_cylinder.toml, or a formula with "
-        "ends, such as a profile that rises there"
+        'shape = "roller", which has a length, or a paraboloid with a large radius along the line, as in '
+        "cases/long_cylinder.toml"
     )
     if smaller < -1e-12 * abs(larger):
         sentence = (

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from ..core.lattice import Lattice
 from ..deck.keys import Body, Bulk
 from ..deck.kinds import Quantity
-from ..deck.surfaces import Surface
+from ..deck.surfaces import Surface, SurfaceSum
 from ..text import Row, percent, quantity
 from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility
@@ -247,6 +247,8 @@ def _body(body: Body) -> str:
 def _surface(surface: Surface | None) -> str:
     if surface is None:
         return "flat"
+    if isinstance(surface, SurfaceSum):
+        return " + ".join(map(_surface, surface.parts))
     given = [surface.shape]
     for name, field in type(surface).model_fields.items():
         value = getattr(surface, name)
@@ -255,6 +257,8 @@ def _surface(surface: Surface | None) -> str:
         unit = next((kind.dimension.unit for kind in field.metadata if isinstance(kind, Quantity)), "")
         if name == "offset":
             given.append(f"{name} ({', '.join(quantity(part, 'm') for part in value)})")
+        elif name == "tilt":
+            given.append(f"{name} ({', '.join(f'{math.degrees(part):.6g} deg' for part in value)})")
         elif unit == "rad":
             given.append(f"{name} {math.degrees(value):.6g} deg")
         else:

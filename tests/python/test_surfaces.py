@@ -37,7 +37,7 @@ from hexcontact.deck.surfaces import (
 )
 from hexcontact.deck.table_base import meaning
 from hexcontact.deck.units import NUMBER
-from hexcontact.errors import DeckError
+from hexcontact.errors import DeckError, PlausibilityWarning
 
 ROOT = Path(__file__).parents[2]
 SOME = [
@@ -202,7 +202,8 @@ def test_all_shapes_of_the_deck_are_there() -> None:
         (
             lambda: Sphere(radius=1.0, tilt=["20 deg", "0 deg"]),
             'tilt = ["20 deg", "0 deg"]: expected two angles such as ["0.01 deg", "0 deg"]; entry 1, '
-            '"20 deg": expected an angle with its unit of at least -0.1 rad and at most 0.1 rad such as "30 deg"',
+            '"20 deg": expected an angle with its unit of at least -0.1 rad and at most 0.1 rad such as '
+            '"30 deg"',
         ),
         (lambda: Sphere(), 'radius: missing; expected a length above 0 such as "1 mm"'),
         (lambda: Sphere(radius=1.0, exakt=True), "exakt: unknown key; did you mean exact?"),
@@ -259,6 +260,14 @@ def test_a_ball_in_a_groove_is_the_ellipse_of_hertz() -> None:
     compared = {entry.quantity: entry.error for entry in case.run().compare()}
     assert abs(compared["max_pressure"]) < 2e-3
     assert abs(compared["approach"]) < 2e-3
+
+
+def test_a_sharp_end_is_told() -> None:
+    roller = Roller(radius=5e-3, length=2e-3)
+    with pytest.warns(
+        PlausibilityWarning, match="body.1.surface ends sharply: there the pressure has no bound"
+    ):
+        Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, spacing=1e-5, normal_load=10.0)
 
 
 def test_a_profile_by_moduli_needs_them() -> None:

@@ -129,6 +129,11 @@ class Surface(Argument):
         """Whether the shape is turned."""
         return self.tilt != (0.0, 0.0)
 
+    @property
+    def sharp(self) -> bool:
+        """Whether the shape ends sharply under pressure, along a profile that should have an end."""
+        return False
+
     def beside(self, modulus: float) -> Surface:
         """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
         return self
@@ -429,6 +434,11 @@ class Roller(Surface):
         """Half of the length."""
         return self.length / 2
 
+    @property
+    def sharp(self) -> bool:
+        """Whether no profile relieves the ends."""
+        return self.profile == "sharp"
+
     def beside(self, modulus: float) -> Surface:
         """Return the roller with the logarithmic profile of the modulus."""
         other = self.model_copy()
@@ -521,6 +531,11 @@ class SurfaceSum(Surface):
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the sum of the heights (m)."""
         return np.asarray(sum(part.height(x, y) for part in self.parts))
+
+    @property
+    def sharp(self) -> bool:
+        """Whether one of them does."""
+        return any(part.sharp for part in self.parts)
 
     def beside(self, modulus: float) -> Surface:
         """Return the sum of shapes of the modulus."""

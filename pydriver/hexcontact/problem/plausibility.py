@@ -232,8 +232,18 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
             if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most
         ]
         known = found | _words(case, found) if passed else {}
-        case.judged[estimated] = [limit.words.format(**known) for limit in passed]
+        case.judged[estimated] = [*(limit.words.format(**known) for limit in passed), *_sharp_ends(case)]
     return case.judged[estimated]
+
+
+def _sharp_ends(case: Problem) -> Iterator[str]:
+    """Yield a sentence about each body that ends sharply on the other one."""
+    for number, body in enumerate((case.body_1, case.body_2), 1):
+        if body.surface and body.surface.sharp:
+            yield (
+                f"body.{number}.surface ends sharply: there the pressure has no bound, and the largest "
+                "pressure is that of the lattice"
+            )
 
 
 def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:

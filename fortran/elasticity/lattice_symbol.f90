@@ -21,7 +21,7 @@ module hc_lattice_symbol
   !> Order of the symbols: those of K1, K_xx and K_xy.
   integer, parameter :: symbol_1 = 1, symbol_xx = 2, symbol_xy = 3
 
-  !> Reciprocal vectors on each side; the terms fall off like |G|^-3 at least.
+  !> Reciprocal vectors on each side of equilateral cells; the terms fall off like |G|^-3 at least.
   integer, parameter :: n_alias = 1
 
 contains
@@ -74,7 +74,7 @@ contains
     real(wp), dimension(size(symbol, 1)) :: term, square
     real(wp) :: sine_1(0:length(1) - 1), cosine_1(0:length(1) - 1), sine_2(0:length(2) - 1), cosine_2(0:length(2) - 1)
     real(wp) :: area, g(3), h(3), d(3), shift(3), here(3), all_symbols(3)
-    integer :: m, i, j, f(2), low(2)
+    integer :: m, i, j, f(2), low(2), most(2)
 
     area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
     ! (|k| area/2)^2 = g1 half1^2 + g2 half1 half2 + g3 half2^2
@@ -94,8 +94,9 @@ contains
     end do
     where (none > 0.0_wp) sine = 0.0_wp
     symbol = 0.0_wp
-    do j = -n_alias, n_alias
-      do i = -n_alias, n_alias
+    most = aliases(basis)
+    do j = -most(2), most(2)
+      do i = -most(1), most(1)
         shift = pi*[i, j, j - i]
         here = merge(1.0_wp, 0.0_wp, [i, j, j - i] == 0)
         do m = 1, size(symbol, 1)
@@ -142,6 +143,17 @@ contains
     end do
   end subroutine half_angles
 
+  !> Return the reciprocal vectors on each side, as far in both directions: more along the longer side of a cell.
+  pure function aliases(basis) result(most)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    integer :: most(2)
+
+    associate (side => norm2(basis, dim=1))
+      most = n_alias*max(1, nint(side/side(2:1:-1)))
+    end associate
+  end function aliases
+
   !> Sum over reciprocal vectors; theta = k.basis in (-pi, pi].
   pure function alias_sum(basis, area, theta) result(total)
     !> Basis vectors as columns [m]
@@ -153,12 +165,13 @@ contains
     real(wp) :: total(3)
 
     real(wp) :: phase(2), k(2), half(3), sine(3), weight, k_squared
-    integer :: i, j
+    integer :: i, j, most(2)
 
     sine = [sin(0.5_wp*theta(1)), sin(0.5_wp*theta(2)), sin(0.5_wp*(theta(2) - theta(1)))]
+    most = aliases(basis)
     total = 0.0_wp
-    do j = -n_alias, n_alias
-      do i = -n_alias, n_alias
+    do j = -most(2), most(2)
+      do i = -most(1), most(1)
         phase = theta + 2.0_wp*pi*[i, j]
         ! k from its products with the basis vectors
         k = [phase(1)*basis(2, 2) - phase(2)*basis(2, 1), phase(2)*basis(1, 1) - phase(1)*basis(1, 2)]/area

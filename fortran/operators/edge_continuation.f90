@@ -69,12 +69,13 @@ contains
     !> those of the rings, `free` elsewhere and `outside` around
     integer, allocatable :: mark(:)
     integer, allocatable :: frontier(:), next(:), node(:)
-    integer :: n_ring, n_col, width, step(6), n_active, r, n, k
+    integer, allocatable :: step(:)
+    integer :: n_ring, n_col, width, n_active, r, n, k
     real(wp) :: fall
 
     n_col = size(active, 1)
     width = n_col + 2
-    step = neighbor_steps(width)
+    step = pack(neighbor_steps(width), options%near)
     call mark_window(active, space, mark, within)
     n_active = space%count(active)
     call find_edge(active, mark, step, space, frontier)
@@ -168,7 +169,7 @@ contains
     logical, intent(in), contiguous :: active(:, :)
     !> Marks of all nodes, and steps to the neighbors of a node
     integer, intent(in), contiguous :: mark(:)
-    integer, intent(in) :: step(6)
+    integer, intent(in) :: step(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
@@ -202,7 +203,7 @@ contains
     logical, intent(in), contiguous :: active(:)
     !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
     integer, intent(in), contiguous :: mark(:)
-    integer, intent(in) :: step(6), before
+    integer, intent(in) :: step(:), before
     !> The nodes
     integer, allocatable, intent(out) :: node(:)
     integer :: is_edge(size(active)), col, k, low, high, found
@@ -260,7 +261,7 @@ contains
   !> List the neighbors of a node in the ring before and in its own.
   pure subroutine list_neighbors(node, step, mark, first, inner, beside, n_inner, n_beside)
     !> The node, and steps to its neighbors
-    integer, intent(in) :: node, step(6)
+    integer, intent(in) :: node, step(:)
     !> Marks of all nodes
     integer, intent(in) :: mark(:)
     !> First marks of its own ring and of the next

@@ -9,7 +9,7 @@ module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
-  use hc_lattice, only: lattice_t
+  use hc_lattice, only: lattice_t, neighbors
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -78,6 +78,9 @@ contains
     self%extent = lattice%extent
     self%space = space
     self%options = options
+    associate (edges => norm2(matmul(lattice%basis, real(neighbors, wp)), dim=1))
+      self%options%near = edges < 2.5_wp*minval(edges)
+    end associate
   end subroutine new_symbol_preconditioner
 
   !> Set the nodes in contact, and their springs.

@@ -127,13 +127,18 @@ contains
   end function equilateral_basis
 
   !> Return a basis with its first vector along x; that of the equilateral lattice at a ratio of 1 and 60 degrees.
-  pure function oblique_basis(spacing, ratio, angle) result(basis)
-    !> Length of the first vector [m], of the second one over it, and angle of the second one from x [rad]
+  pure function oblique_basis(spacing, ratio, angle, direction) result(basis)
+    !> Length of the first vector [m], of the second one over it, and angle of the second one from the first [rad]
     real(wp), intent(in) :: spacing, ratio, angle
+    !> Angle of the first vector from x [rad]; absent: 0
+    real(wp), intent(in), optional :: direction
     !> Basis vectors as columns [m]
     real(wp) :: basis(2, 2)
 
     basis = spacing*rounded(reshape([1.0_wp, 0.0_wp, ratio*cos(angle), ratio*sin(angle)], [2, 2]))
+    if (.not. present(direction)) return
+    if (abs(direction) > 0.0_wp) basis = matmul(reshape([cos(direction), sin(direction), -sin(direction), cos(direction)], &
+                                                        [2, 2]), basis)
   end function oblique_basis
 
   !> Return a basis in spacings, that of the equilateral lattice to the bit if it differs by rounding errors only.

@@ -65,12 +65,12 @@ class Case(Problem):
         with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins, near
         steps without overshoot. Infinite where the bodies cannot touch; NaN in holes of the data, near which
         a contact is an error. The approach counts from gap = 0.
-    lattice : Lattice, optional
-        The window, instead of the keyword arguments of the grid.
+    lattice : Lattice or str, optional
+        The window, instead of the keyword arguments of the grid; or the key of [grid].
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
         Keys of [grid].
-    cell_ratio, cell_angle, boundary : optional
-        Keys of [grid]; `cell_angle` carries its unit: "90 deg".
+    cell_ratio, cell_angle, direction, boundary : optional
+        Keys of [grid]; an angle carries its unit: "90 deg".
     normal_load, approach : float, optional
         The only load (N) or motion (m), in one step or in `steps`.
     steps : int or "auto", optional
@@ -130,8 +130,8 @@ class Case(Problem):
         body_1: Body | Mapping[str, Any],
         body_2: Body | Mapping[str, Any],
         gap: Callable[[Array, Array], ArrayLike] | ArrayLike | None = None,
-        lattice: Lattice | None = None,
-        spacing: float | str | None = None,
+        lattice: Lattice | str | None = None,
+        spacing: float | str | Sequence[float | str] | None = None,
         nodes_across: int | None = None,
         nodes_in_radius: float | None = None,
         extent: str | Sequence[float | str] | None = None,
@@ -141,6 +141,7 @@ class Case(Problem):
         cell_ratio: float | None = None,
         cell_angle: str | None = None,
         boundary: str | None = None,
+        direction: str | None = None,
         normal_load: float | str | None = None,
         approach: float | str | None = None,
         steps: int | str | None = None,
@@ -164,18 +165,22 @@ class Case(Problem):
         every: int | None = None,
         title: str = "",
     ) -> None:
+        words = lattice if isinstance(lattice, str) else None
+        lattice = None if isinstance(lattice, str) else lattice
         own_gap = None if gap is None else given_field(gap, GAP, lattice)
         if lattice is not None:
             given = {"spacing": spacing, "window": window, "origin": origin, "cell_ratio": cell_ratio}
-            for key, value in {**given, "cell_angle": cell_angle, "boundary": boundary}.items():
+            given |= {"cell_angle": cell_angle, "boundary": boundary, "direction": direction}
+            for key, value in given.items():
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
             cell_ratio, cell_angle = lattice.cell_ratio, angle_text(lattice.cell_angle)
             boundary = "periodic" if lattice.periodic else None
+            direction = angle_text(lattice.direction) if lattice.direction else None
             if not callable(own_gap):  # the deck of the case leads to the same window
                 center = middle_of(lattice)
-        arguments = locals()
+        arguments = locals() | {"lattice": words}
         data = with_overrides({}, _deck_keys({name: arguments[name] for name in _ARGUMENTS}, lattice))
         data = {key: value for key, value in data.items() if value or key not in _LEFT_OUT}
         self._set_up(assemble(data), own_gap, lattice)

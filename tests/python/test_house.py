@@ -150,7 +150,7 @@ FORMATS: dict[str, dict[str, object]] = {  # by the version that first wrote the
         "record": "run index lattice history control",
         "metadata": "title deck fields every planned_steps parameters run created version resumed deck_file",
         "header": "metadata loads steps",
-        "window": "spacing row_first col_first n_row n_col origin cell_ratio cell_angle periodic",
+        "window": "spacing row_first col_first n_row n_col origin cell_ratio cell_angle direction periodic",
         "solution": "level copy spacing origin nodes histories",
     },
 }

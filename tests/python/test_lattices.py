@@ -137,8 +137,114 @@ def test_a_line_over_flat_cells_crosses_all_edges() -> None:
 
 
 def test_cells_that_are_too_flat_are_one_sentence() -> None:
-    for key, value in (("cell_ratio", 9), ("cell_angle", "170 deg"), ("cell_angle", 1.2)):
+    for key, value in (("cell_ratio", 900), ("cell_angle", "170 deg"), ("cell_angle", 1.2)):
         with pytest.raises(DeckError, match=rf"grid\.{key} = .*: expected an? .* at least 0\.\S* .*at most"):
             sphere("square", 6).changed({f"grid.{key}": value})
     with pytest.raises(DeckError, match="cell_angle = 4: expected an angle in radians between 0 and pi"):
         Lattice(1.0, 0, 0, 1, 1, cell_angle=4)
+
+
+# --- cells that follow the contact --------------------------------------------------------------------------
+
+
+def slender(radius: float, angle: str, **arguments) -> tuple[Case, analytic.EllipticContact]:
+    """A contact of two principal radii, 10 mm and another one, and the solution of Hertz."""
+    load = 50.0
+    exact = analytic.hertz_ellipse(210e9 / (2 * 0.91), [[100.0, 0.0], [0.0, 1.0 / radius]], normal_load=load)
+    shape = {"shape": "paraboloid", "radius_x": 0.01, "radius_y": radius, "angle": angle}
+    load_of = {} if "loads" in arguments else {"normal_load": load}
+    return Case(body_1={**STEEL, "surface": shape}, body_2=STEEL, **load_of, **arguments), exact
+
+
+@pytest.mark.parametrize(
+    ("radius", "angle", "direction"),
+    [
+        (0.01, "0 deg", 0.0),
+        (0.1, "0 deg", 0.0),
+        (0.1, "90 deg", 0.0),
+        (0.1, "-60 deg", 30.0),
+        (5.0, "20 deg", 20.0),
+    ],
+)
+def test_cells_are_as_slender_as_the_contact(radius: float, angle: str, direction: float) -> None:
+    """Up to 46:1 with some 110 x 110 nodes: as many spacings in both half-axes."""
+    case, exact = slender(radius, angle, lattice="rectangular", nodes_in_radius=50)
+    assert math.degrees(case.lattice.direction) == pytest.approx(direction, abs=1e-9)
+    assert max(case.lattice.shape) <= 113
+    last = case.run().dataset.isel(step=-1)
+    assert float(last["max_pressure"]) == pytest.approx(exact.max_pressure, rel=1e-4)
+    assert float(last["approach"]) == pytest.approx(exact.approach, rel=1e-4)
+    assert float(last["contact_semi_major"]) == pytest.approx(exact.semi_major, rel=2e-3)
+    assert float(last["contact_semi_minor"]) == pytest.approx(exact.semi_minor, rel=2e-3)
+    assert float(last["operator_applications"]) < 5
+
+
+def test_crossed_cylinders_at_five_degrees() -> None:
+    bodies = ({"shape": "cylinder", "radius": 0.01, "angle": angle} for angle in ("0 deg", "5 deg"))
+    one, two = ({**STEEL, "surface": surface} for surface in bodies)
+    case = Case(body_1=one, body_2=two, lattice="rectangular", nodes_in_radius=40, normal_load=20.0)
+    compared = {entry.quantity: entry.error for entry in case.run().compare()}
+    assert abs(compared["max_pressure"]) < 2e-4
+    assert abs(compared["approach"]) < 2e-4
+
+
+def test_a_turned_lattice_is_read_again_and_solves_friction(tmp_path: Path) -> None:
+    """The tractions of Cattaneo and Mindlin along the long axis, wherever the lattice lies."""
+    loads = [{"normal_load": 50.0}, {"tangential_load_x": 9.0}]
+    given = {"friction_coefficient": 0.3, "nodes_in_radius": 16, "loads": loads}
+    along, _ = slender(0.1, "0 deg", **given, lattice="rectangular")
+    case, _ = slender(0.1, "0 deg", **given, lattice="rectangular", direction="15 deg")
+    result = case.run(tmp_path / "turned.nc")
+    read = open_result(tmp_path / "turned.nc")
+    assert read.lattice == case.lattice
+    assert math.degrees(read.lattice.direction) == pytest.approx(15.0)
+    last, other = result.dataset.isel(step=-1), along.run().dataset.isel(step=-1)
+    for name, error in (
+        ("shift_x", 1e-3),
+        ("stick_area_fit", 1e-2),
+        ("max_pressure", 3e-3),
+        ("approach", 1e-3),
+    ):
+        assert float(last[name]) == pytest.approx(float(other[name]), rel=error)
+    depth = 1e-4
+    stress = result.stress(points=[(0.0, 0.0, depth)])["von_mises_stress"]
+    expected = along.run().stress(points=[(0.0, 0.0, depth)])["von_mises_stress"]
+    assert float(stress.values.ravel()[-1]) == pytest.approx(float(expected.values.ravel()[-1]), rel=2e-3)
+    assert Case.from_text(read.deck) == case
+
+
+BAD_GRIDS = {
+    "two": ({"spacing": [1e-5, 2e-5]}, "spacing = .*expected one length on an equilateral lattice"),
+    "angle": (
+        {"lattice": "rectangular", "spacing": 1e-5, "cell_angle": "80 deg"},
+        "lattice or cells, not both",
+    ),
+    "ratio": (
+        {"cell_angle": "90 deg", "spacing": [1e-5, 2e-5], "cell_ratio": 2.0},
+        "two spacings or cell_ratio",
+    ),
+    "word": ({"spacing": "fine"}, 'spacing = "fine": expected a length above 0'),
+    "periodic": (
+        {"spacing": "auto", "boundary": "periodic", "extent": [1e-3, 1e-3]},
+        "since the window repeats",
+    ),
+    "lattice": ({"lattice": "square", "spacing": 1e-5}, 'expected "equilateral" or "rectangular"'),
+}
+
+
+@pytest.mark.parametrize("name", BAD_GRIDS)
+def test_wrong_grids_are_told(name: str) -> None:
+    grid, sentence = BAD_GRIDS[name]
+    with pytest.raises(DeckError, match=sentence):
+        slender(0.1, "0 deg", **grid)
+
+
+def test_spacings_of_both_directions() -> None:
+    case, _ = slender(0.1, "0 deg", lattice="rectangular", spacing=["4 um", "16 um"])
+    assert case.lattice.basis.tolist() == [
+        [pytest.approx(4e-6), 0.0],
+        [pytest.approx(0.0), pytest.approx(16e-6)],
+    ]
+    auto, _ = slender(0.1, "0 deg", spacing="auto")
+    radius = auto.estimate.radius
+    assert auto.lattice.spacing == pytest.approx(radius / 20)

@@ -31,6 +31,7 @@ class Pattern(NamedTuple):
     origin: tuple[float, float] = (0.0, 0.0)
     cell_ratio: float = 1.0
     cell_angle: float = math.pi / 3
+    direction: float = 0.0
 
     def window(self, spacing: float, row_first: int, col_first: int, n_row: int, n_col: int) -> Lattice:
         """Return a window of it."""
@@ -63,7 +64,9 @@ class Lattice:
     cell_ratio
         Length of the second basis vector over that of the first.
     cell_angle
-        Angle of the second basis vector from x [rad].
+        Angle of the second basis vector from the first [rad].
+    direction
+        Angle of the first basis vector from x [rad].
     periodic
         Whether the window repeats along columns and rows.
     """
@@ -76,6 +79,7 @@ class Lattice:
     origin: tuple[float, float] = (0.0, 0.0)
     cell_ratio: float = 1.0
     cell_angle: float = math.pi / 3
+    direction: float = 0.0
     periodic: bool = False
 
     def __post_init__(self) -> None:
@@ -84,6 +88,7 @@ class Lattice:
         number(self.cell_ratio, "cell_ratio", "a positive number", lambda ratio: 0 < ratio < np.inf)
         kind = "an angle in radians between 0 and pi"
         number(self.cell_angle, "cell_angle", kind, lambda angle: 0 < angle < np.pi)
+        number(self.direction, "direction", "an angle in radians", lambda angle: abs(angle) <= np.pi)
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
         origin = reals(self.origin, "origin")
@@ -104,6 +109,7 @@ class Lattice:
         origin: tuple[float, float] = (0.0, 0.0),
         cell_ratio: float = 1.0,
         cell_angle: float = math.pi / 3,
+        direction: float = 0.0,
     ) -> Lattice:
         """Return the smallest window whose parallelogram covers a rectangle.
 
@@ -118,9 +124,11 @@ class Lattice:
         origin
             Position of node (0, 0) [m].
         cell_ratio, cell_angle
-            Length of the second basis vector over that of the first, and its angle from x [rad].
+            Length of the second basis vector over that of the first, and its angle from it [rad].
+        direction
+            Angle of the first basis vector from x [rad].
         """
-        pattern = Pattern(origin, cell_ratio, cell_angle)
+        pattern = Pattern(origin, cell_ratio, cell_angle, direction)
         unit = pattern.window(spacing, 0, 0, 1, 1)
         half = 0.5 * np.array([length_x, length_y])
         signs = np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)])
@@ -135,12 +143,12 @@ class Lattice:
     @property
     def pattern(self) -> Pattern:
         """The lattice but for spacing and window."""
-        return Pattern(self.origin, self.cell_ratio, self.cell_angle)
+        return Pattern(self.origin, self.cell_ratio, self.cell_angle, self.direction)
 
     @cached_property
     def basis(self) -> Array:
         """Basis vectors, one a row [m]."""
-        basis: Array = flat.lattice_basis(self.spacing, self.cell_ratio, self.cell_angle)
+        basis: Array = flat.lattice_basis(self.spacing, self.cell_ratio, self.cell_angle, self.direction)
         return basis
 
     @cached_property

@@ -28,6 +28,7 @@ from .kinds import (
     Schema,
     Several,
     Share,
+    Spacing,
     Text,
     Whole,
     Word,
@@ -35,7 +36,7 @@ from .kinds import (
     refuse,
 )
 from .series import DRIVEN, MOST_STEPS, Series
-from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
+from .surfaces import Flat, Point, Separation, Surface, SurfaceKind
 from .table_base import Table, extended, meaning, problems_of
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, Dimension
 
@@ -44,6 +45,8 @@ METHODS = ("auto", "direct", "fft")
 ITERATIONS = ("newton", "dissertation")
 FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
 BOUNDARIES = ("free", "periodic")
+LATTICES = ("equilateral", "rectangular")
+AUTO_SPACINGS = 20.0  # in the contact radius, where the spacing is "auto"
 # Loads of a window that repeats, and the load or motion that each of them is.
 MEANS = {
     "mean_pressure": "normal_load",
@@ -148,7 +151,17 @@ class Grid(Table):
 
     schema_if_whole: ClassVar[Schema] = {"oneOf": [{"required": [name]} for name in FINENESS]}
 
-    spacing: PositiveLength | None = meaning(None, "distance l_e between neighboring nodes", '"5 um"')
+    lattice: Annotated[str, Word(LATTICES)] | None = meaning(
+        None,
+        "rectangular: cells with a right angle, as slender as the estimated contact with `nodes_in_radius`; "
+        "equilateral if absent, unless `cell_angle` is given",
+    )
+    spacing: Annotated[float | tuple[float, float] | str, Spacing()] | None = meaning(
+        None,
+        "distance l_e between neighboring nodes, or the distances along both basis vectors; auto: 20 in the "
+        "estimated contact radius",
+        '"5 um"',
+    )
     nodes_across: Annotated[int, Whole(5, 100_000)] | None = meaning(
         None, "nodes per side of the window, instead of the spacing", "41"
     )
@@ -179,6 +192,34 @@ class Grid(Table):
         "`extent` has the lengths of the period",
     )
 
+    direction: Annotated[float, Quantity(ANGLE, at_least=-math.pi, at_most=math.pi)] | None = meaning(
+        None,
+        "angle of the first basis vector from x; if absent that of the estimated contact on a rectangular "
+        "lattice with `nodes_in_radius`, else 0",
+        '"30 deg"',
+    )
+
+    @property
+    def length(self) -> float | None:
+        """Spacing (m) along the first basis vector, if it is given."""
+        spacing = self.spacing[0] if isinstance(self.spacing, tuple) else self.spacing
+        return None if isinstance(spacing, str) else spacing
+
+    @property
+    def in_radius(self) -> float | None:
+        """Spacings in the contact radius, if they are given."""
+        return AUTO_SPACINGS if self.spacing == "auto" else self.nodes_in_radius
+
+    @property
+    def ratio(self) -> float:
+        """Spacing along the second basis vector over that along the first."""
+        return self.spacing[1] / self.spacing[0] if isinstance(self.spacing, tuple) else self.cell_ratio
+
+    @property
+    def fits(self) -> bool:
+        """Whether the cells follow from the shape of the contact."""
+        return self.lattice == "rectangular" and self.in_radius is not None
+
     @property
     def periodic(self) -> bool:
         """Whether the window repeats."""
@@ -187,7 +228,8 @@ class Grid(Table):
     @property
     def angle(self) -> float:
         """Angle of the second basis vector (rad)."""
-        return self.cell_angle or (math.pi / 2 if self.periodic else math.pi / 3)
+        right = self.lattice == "rectangular" or (self.periodic and self.lattice is None)
+        return self.cell_angle or (math.pi / 2 if right else math.pi / 3)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -202,7 +244,17 @@ class Grid(Table):
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:
             yield "window", "expected window or nodes_across, not both"
+        for key in ("cell_angle", "cell_ratio"):
+            if data.get("lattice") and key in data:
+                yield key, "expected lattice or cells, not both"
+        two = isinstance(data.get("spacing"), list | tuple)
+        if two and "cell_ratio" in data:
+            yield "cell_ratio", "expected two spacings or cell_ratio, not both"
+        if two and data.get("lattice", "equilateral") == "equilateral" and "cell_angle" not in data:
+            yield "spacing", 'expected one length on an equilateral lattice; or lattice = "rectangular"'
         if data.get("boundary") == "periodic":
+            if data.get("spacing") == "auto":
+                yield "spacing", "expected a length, since the window repeats"
             if "nodes_in_radius" in data:
                 yield "nodes_in_radius", "expected spacing or nodes_across, since the window repeats"
             if data.get("extent", "auto") == "auto" and "window" not in data:

@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from ..arrays import Array
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
-from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, angle_text, spelled, to_si
+from .units import ANGLE, DIGITS, LENGTH, LONGEST, NUMBER, Dimension, UnitError, angle_text, spelled, to_si
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "tanh")
@@ -445,6 +445,26 @@ class Several(Kind):
         if fault := self.fault_of(parsed):
             refuse(fault)
         return tuple(parsed)
+
+
+class Spacing(Kind):
+    """One length or two, or "auto"."""
+
+    one = Quantity(LENGTH, above=0)
+    expected = 'a length above 0, two of them such as ["5 um", "20 um"], or "auto"'
+
+    def __init__(self) -> None:
+        self.two = Several(self.one, "lengths", '["5 um", "20 um"]', count=2)
+        self.schema = {"anyOf": [{"const": "auto"}, self.one.schema, self.two.schema]}
+
+    def written(self, value: Any) -> Any:
+        """Return the word, the length or both of them."""
+        return list(value) if isinstance(value, tuple) else value
+
+    def _parse(self, value: object) -> Any:
+        if isinstance(value, list | tuple):
+            return self.two.parse(value)
+        return value if value == "auto" else self.one.parse(value)
 
 
 class WordOr(Kind):

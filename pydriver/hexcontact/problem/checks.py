@@ -311,7 +311,7 @@ def _touching_problems(gap: Separation) -> Found:
 def _full_contact_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...]) -> Found:
     """Check that nothing varies over the window of a flat-on-flat contact."""
     grid, friction, whole = tables.get("grid"), tables.get("friction"), "flat on flat has one unknown"
-    if grid is not None and (grid.spacing is None or grid.window is None):
+    if grid is not None and (grid.length is None or grid.window is None):
         sentence = f"{whole}: expected spacing and window, whose nodes are the area that shares the loads"
         yield ("grid",), sentence
     if any(step.twist.value or step.twist.control == "force" for step in steps):

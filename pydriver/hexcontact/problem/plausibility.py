@@ -178,7 +178,7 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "slope": max(known.slope, *known.body_slopes, 0.0),
         "gap_slope": known.slope,
         "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
-        "spacings": known.half_width / case.lattice.spacing,
+        "spacings": known.spacings(case.lattice),
     }
     if grid := case.height_map:
         along = np.array(grid.distances) / case.lattice.spacing

@@ -15,7 +15,7 @@ from ..arrays import Array, Mask
 from ..core import contact, friction, memory
 from ..core.contact import ElasticPair, Method
 from ..core.friction import FrictionLaw
-from ..core.lattice import Lattice
+from ..core.lattice import Lattice, Pattern
 from ..core.measures import bulk_strain
 from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
@@ -357,9 +357,9 @@ class Problem:
         center = grid.center or touch
         self._center = center if self._gap.given else touch
         if self.full_contact:
-            assert grid.spacing is not None  # checked, as the window is
+            assert grid.length is not None  # checked, as the window is
             assert grid.window is not None
-            lattice = window.centered(grid.spacing, center, grid.window, window.pattern_of(grid))
+            lattice = window.centered(grid.length, center, grid.window, window.pattern_of(grid))
             self._check_interface(source, lattice)
             return lattice
         try:
@@ -371,6 +371,15 @@ class Problem:
             raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
         first, *second = self._estimates.values()  # by force, and by approach
         self.estimate = estimate = first.joined(*second) if second else first
+        if grid.fits and lattice is None:
+            # once more, on cells as slender as the contact: the bounds of the window are in their coordinates
+            pattern = estimate.fitted(window.pattern_of(grid), grid.direction)
+            again = [self.estimated(pattern, **d) for d in self.largest_drives]
+            first, *second = again
+            bounds = first.joined(*second) if second else first
+            self.estimate = estimate = estimate._replace(
+                lower=bounds.lower, upper=bounds.upper, cell=bounds.cell
+            )
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
@@ -392,9 +401,9 @@ class Problem:
                 raise deck_error(problems, source)
             self._stiffest = max(self._stiffest, *ratios)
 
-    def estimated(self, **drive: Any) -> Estimate:
+    def estimated(self, pattern: Pattern | None = None, /, **drive: Any) -> Estimate:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
-        place = self._center, window.pattern_of(self.deck.grid)
+        place = self._center, pattern or window.pattern_of(self.deck.grid)
         return window.estimate_contact(
             self.pair, self._gap.at, *place, self.interface, self._gap.heights, **drive
         )

@@ -31,6 +31,8 @@ MOST_COARSE_NODES = 40_000
 MOST_TRIALS = 24  # coarse solutions; a contact along a line has no end
 MOST_ENLARGEMENTS = 12
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
+_RIGHT = 1e-6  # rounding of a right angle
+ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
 # Decimal logarithms of the stiffness of an interface over that of the bodies.
@@ -57,6 +59,31 @@ class Estimate(NamedTuple):
     slope: float = 0.0  # largest slope of the gap within the contact
     # those of the surfaces of body 1 and body 2; empty if only their gap is known
     body_slopes: tuple[float, ...] = ()
+    half_length: float = 0.0  # larger semi-axis (m) of that ellipse
+    angle: float = 0.0  # its direction from x (rad)
+
+    def along(self, direction: float) -> float:
+        """Return the semi-axis (m) of the ellipse nearer to a direction (rad)."""
+        return self.half_length if abs(math.cos(self.angle - direction)) > math.sqrt(0.5) else self.half_width
+
+    def spacings(self, lattice: Lattice) -> float:
+        """Return the spacings in the semi-axis of the ellipse that has the fewest."""
+        if lattice.cell_ratio == 1.0 or abs(lattice.cell_angle - math.pi / 2) > _RIGHT:
+            return self.half_width / lattice.spacing
+        first = self.along(lattice.direction)
+        across = self.half_length * self.half_width / first
+        return min(first, across / lattice.cell_ratio) / lattice.spacing
+
+    def fitted(self, pattern: Pattern, direction: float | None) -> Pattern:
+        """Return a lattice whose rectangular cells are as slender as the contact."""
+        if direction is None:
+            # its first axis is the one nearer to x; a round contact has no direction
+            turned = math.degrees((self.angle + math.pi / 4) % (math.pi / 2) - math.pi / 4)
+            direction = (
+                0.0 if self.half_width > ROUND * self.half_length else math.radians(round(2 * turned) / 2)
+            )
+        across = self.half_length * self.half_width / self.along(direction)
+        return pattern._replace(cell_ratio=across / self.along(direction), direction=direction)
 
     @property
     def bounds(self) -> Array:
@@ -145,9 +172,11 @@ def estimate_contact(
             continue
         enclosed = True
         estimate = _measure(lattice, pressure, x[contact], y[contact])
-        narrow = estimate.half_width < NARROW_NODES * lattice.spacing
-        if narrow:
-            factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
+        across = lattice.spacing
+        if pattern.cell_ratio != 1.0:  # the spacing along the narrow side of the contact
+            across *= min(1.0, pattern.cell_ratio)
+        if estimate.half_width < NARROW_NODES * across:
+            factor = min(max(math.ceil(NARROW_NODES * across / estimate.half_width), 2), 8)
             cell = lattice.spacing
             finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, pattern)
             if finer.size <= MOST_COARSE_NODES:
@@ -218,8 +247,8 @@ def _measure(lattice: Lattice, pressure: Array, x: Array, y: Array) -> Estimate:
     right, up = x - x.mean(), y - y.mean()
     xx, yy, xy = (float(product.mean()) for product in (right * right, up * up, right * up))
     # the smaller principal second moment, with the inertia of a cell itself
-    least = (xx + yy) / 2 - math.hypot((xx - yy) / 2, xy) + lattice.cell_area / 12
-    half_width = 2 * math.sqrt(max(least, 0.0))
+    mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12
+    half_width, half_length = (2 * math.sqrt(max(mean + sign * apart + cell, 0.0)) for sign in (-1, 1))
     indices = np.array([cols + lattice.col_first, rows + lattice.row_first]) * lattice.spacing
     return Estimate(
         radius=math.sqrt(area / math.pi),
@@ -229,6 +258,8 @@ def _measure(lattice: Lattice, pressure: Array, x: Array, y: Array) -> Estimate:
         cell=lattice.spacing,
         size=np.array([np.ptp(x), np.ptp(y)]) + lattice.spacing,
         max_pressure=float(pressure.max()),
+        half_length=half_length,
+        angle=0.5 * math.atan2(2 * xy, xx - yy),
     )
 
 
@@ -288,21 +319,21 @@ def is_fixed(grid: Grid) -> bool:
 
 def pattern_of(grid: Grid) -> Pattern:
     """Return the lattice of a deck but for its spacing."""
-    return Pattern(grid.origin, grid.cell_ratio, grid.angle)
+    return Pattern(grid.origin, grid.ratio, grid.angle, grid.direction or 0.0)
 
 
 def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     """Return the window of a deck that repeats, about the center, and its faults."""
     pattern, center = pattern_of(grid), grid.center or (0.0, 0.0)
     if isinstance(grid.extent, str):
-        assert grid.spacing is not None
+        assert grid.length is not None
         assert grid.window is not None  # checked, one of the two is given
-        spacing, (n_row, n_col) = grid.spacing, grid.window
+        spacing, (n_row, n_col) = grid.length, grid.window
         key, value = "window", grid.window
     else:
         n_col, n_row = (
-            grid.nodes_across or max(round(length / (size * (grid.spacing or 1.0))), 1)
-            for length, size in zip(grid.extent, (1.0, grid.cell_ratio), strict=True)
+            grid.nodes_across or max(round(length / (size * (grid.length or 1.0))), 1)
+            for length, size in zip(grid.extent, (1.0, grid.ratio), strict=True)
         )
         # the period is exact, and the cells follow from it
         spacing = grid.extent[0] / n_col
@@ -351,7 +382,11 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     """
     lower, upper = estimate.bounds.T
     pattern = pattern_of(grid)
-    spacing = grid.spacing or (estimate.radius / grid.nodes_in_radius if grid.nodes_in_radius else None)
+    spacing = grid.length or (estimate.radius / grid.in_radius if grid.in_radius else None)
+    if grid.fits:
+        assert grid.in_radius is not None
+        pattern = estimate.fitted(pattern, grid.direction)
+        spacing = estimate.along(pattern.direction) / grid.in_radius
     if spacing is not None:
         if grid.window is not None:
             return centered(spacing, center, grid.window, pattern)
@@ -399,14 +434,16 @@ def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
 def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
     """Return the faults of a window: too coarse or too small for the contact, or too many nodes."""
     problems = []
-    given = "spacing" if grid.spacing else "nodes_across" if grid.nodes_across else "nodes_in_radius"
+    given = (
+        "spacing" if grid.spacing is not None else "nodes_across" if grid.nodes_across else "nodes_in_radius"
+    )
     size = "window" if grid.window is not None else "extent" if grid.extent != "auto" else given
     if max(lattice.shape) > MOST_NODES_PER_SIDE:
         least = readable(lattice.spacing * max(lattice.shape) / MOST_NODES_PER_SIDE * 1.01)
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}: "
         sentence += f"a spacing of {least} or more"
         problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
-    if lattice.spacing > estimate.half_width:
+    if estimate.spacings(lattice) < 1.0:
         sentence = f"the spacing of {readable(lattice.spacing)} is larger than the contact: "
         fitting = readable(estimate.half_width / GOOD_SPACINGS)
         sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}, "

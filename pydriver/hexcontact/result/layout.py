@@ -35,7 +35,7 @@ _STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin", "lattice_cell_ratio", "lattice_cell_angle"),
-    "lattice_periodic",
+    *("lattice_direction", "lattice_periodic"),
     *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
 )
 
@@ -163,6 +163,7 @@ class Layout:
             "lattice_origin": np.asarray(window.origin, dtype=float),
             "lattice_cell_ratio": float(window.cell_ratio),
             "lattice_cell_angle": float(window.cell_angle),
+            **({"lattice_direction": float(window.direction)} if window.direction else {}),
             **({"lattice_periodic": np.int32(1)} if window.periodic else {}),
             **self.metadata.attributes(),
         }
@@ -240,6 +241,7 @@ def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[A
     cells = (f"lattice_{name}" for name in ("cell_ratio", "cell_angle"))  # older files have none
     pattern = Pattern((x0, y0), *(float(attributes[name]) for name in cells if name in attributes))
     spacing = float(attributes["lattice_spacing"])
+    pattern = pattern._replace(direction=float(attributes.get("lattice_direction", 0.0)))
     found = pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
     return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
 

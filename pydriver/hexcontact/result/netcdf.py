@@ -103,6 +103,7 @@ _ATTRIBUTES: dict[str, Fits] = {
 }
 _LATER = {
     "lattice_cell_ratio": _is_positive,
+    "lattice_direction": lambda value: _is_number(value) and abs(value) <= math.pi,
     "lattice_periodic": lambda value: value in (0, 1),
     "lattice_cell_angle": lambda value: _is_number(value) and 0 < value < math.pi,
     INTERFACE[0]: _is_positive,

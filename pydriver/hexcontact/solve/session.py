@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.keys import Load
 from ..deck.toml import as_toml, load_as_toml, plain
+from ..deck.units import angle_text
 from ..errors import DeckError
 from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
@@ -395,6 +396,10 @@ class Session:
         # the same nodes, whatever the largest load is
         grid = {key: value for key, value in tables["grid"].items() if key not in _FINENESS}
         grid |= {"spacing": lattice.spacing, "origin": list(lattice.origin)}
+        if self.case.deck.grid.fits:
+            grid = {key: value for key, value in grid.items() if key != "lattice"}
+            grid |= {"cell_ratio": lattice.cell_ratio, "cell_angle": "90 deg"}
+            grid |= {"direction": angle_text(lattice.direction)}
         if self.case.period:
             grid = dict(tables["grid"])
         elif self.case.window_fixed:

@@ -121,7 +121,9 @@ def _cells(lattice: Lattice) -> str:
     """Return the cells of a lattice that is not equilateral."""
     if lattice.pattern[1:] == Lattice(1.0, 0, 0, 1, 1).pattern[1:]:
         return ""
-    return f", cells 1:{lattice.cell_ratio:g}, {math.degrees(lattice.cell_angle):g} deg"
+    turned = f", first axis at {math.degrees(lattice.direction):.4g} deg" if lattice.direction else ""
+    across = quantity(lattice.spacing * lattice.cell_ratio, "m")
+    return f" by {across}, at {math.degrees(lattice.cell_angle):.4g} deg{turned}"
 
 
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:

@@ -21,7 +21,7 @@ module hexcontact
   use hc_interior_points, only: fields_at_points
   use hc_interior_planes, only: interior_planes_t, new_interior_planes, planes_memory
   use hc_stress_invariants, only: stress_invariants, von_mises, principal_stresses
-  use hc_elastic_medium, only: elastic_medium_t, influence_t
+  use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory

@@ -199,6 +199,12 @@ class Grid(Table):
         '"30 deg"',
     )
 
+    def written(self, defaults: bool = True) -> dict[str, Any]:
+        """Return the keys without the ratio of cells that follow from others."""
+        keys = super().written(defaults)
+        follows = self.lattice is not None or isinstance(self.spacing, tuple)
+        return {key: value for key, value in keys.items() if key != "cell_ratio" or not follows}
+
     @property
     def length(self) -> float | None:
         """Spacing (m) along the first basis vector, if it is given."""

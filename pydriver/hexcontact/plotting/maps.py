@@ -135,13 +135,16 @@ class Part:
         size = np.hypot(*vector)
         if not size.max() > 0.0:
             return
-        width = max(np.ptp(view.x[view.contact]), np.ptp(view.y[view.contact]))
-        stride = max(1, round(float(width) / view.spacing / many))
+        sides = [float(np.ptp(at[view.contact])) for at in (view.x, view.y)]
+        along, across = (
+            max(1, round(max(sides) / step / many))
+            for step in (view.spacing, view.spacing * view.lattice.cell_ratio)
+        )
         at = np.zeros_like(view.contact)
         row, col = np.indices(at.shape)
         away = np.hypot(view.x - view.center[0], view.y - view.center[1])
         middle = np.unravel_index(np.argmin(away), at.shape)
-        at[((row - middle[0]) % stride == 0) & ((col - middle[1]) % stride == 0)] = True
+        at[((row - middle[0]) % across == 0) & ((col - middle[1]) % along == 0)] = True
         at &= view.contact & (size > 0.02 * size.max())
         longest = float(size[at].max()) if at.any() else 1.0
         axes.quiver(
@@ -151,7 +154,7 @@ class Part:
             vector[1][at],
             angles="xy",
             scale_units="xy",
-            scale=longest / (0.95 * stride * view.spacing * self.factor),
+            scale=longest / (0.95 * min(along * view.spacing, min(sides) or max(sides)) * self.factor),
             pivot="mid",
             width=0.0045,
             color=color,

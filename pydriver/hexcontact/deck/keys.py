@@ -205,33 +205,33 @@ class Grid(Table):
         follows = self.lattice is not None or isinstance(self.spacing, tuple)
         return {key: value for key, value in keys.items() if key != "cell_ratio" or not follows}
 
-    @property
+    @functools.cached_property
     def length(self) -> float | None:
         """Spacing (m) along the first basis vector, if it is given."""
         spacing = self.spacing[0] if isinstance(self.spacing, tuple) else self.spacing
         return None if isinstance(spacing, str) else spacing
 
-    @property
+    @functools.cached_property
     def in_radius(self) -> float | None:
         """Spacings in the contact radius, if they are given."""
         return AUTO_SPACINGS if self.spacing == "auto" else self.nodes_in_radius
 
-    @property
+    @functools.cached_property
     def ratio(self) -> float:
         """Spacing along the second basis vector over that along the first."""
         return self.spacing[1] / self.spacing[0] if isinstance(self.spacing, tuple) else self.cell_ratio
 
-    @property
+    @functools.cached_property
     def fits(self) -> bool:
         """Whether the cells follow from the shape of the contact."""
         return self.lattice == "rectangular" and self.in_radius is not None
 
-    @property
+    @functools.cached_property
     def periodic(self) -> bool:
         """Whether the window repeats."""
         return self.boundary == "periodic"
 
-    @property
+    @functools.cached_property
     def angle(self) -> float:
         """Angle of the second basis vector (rad)."""
         right = self.lattice == "rectangular" or (self.periodic and self.lattice is None)

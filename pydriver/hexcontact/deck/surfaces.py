@@ -120,14 +120,9 @@ class Surface(Argument):
         """
         x, y = np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1]
         height = self._height(x, y)
-        if self.tilted:
+        if any(self.tilt):
             height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
         return height
-
-    @property
-    def tilted(self) -> bool:
-        """Whether the shape is turned."""
-        return self.tilt != (0.0, 0.0)
 
     @property
     def sharp(self) -> bool:
@@ -623,9 +618,9 @@ class Separation:
         """
         one, two = self.surface_1, self.surface_2
         known = Flat | FormulaSurface | SurfaceSum  # whose heights count as they are given
-        if isinstance(one, known) or one.tilted or one.offset == two.offset:
+        if isinstance(one, known) or any(one.tilt) or one.offset == two.offset:
             return (*two.offset, 0.0)
-        if isinstance(two, known) or two.tilted:
+        if isinstance(two, known) or any(two.tilt):
             return (*one.offset, 0.0)
         x, y = self.quadratic[1] if self.quadratic else self._search()
         return x, y, float(self._sum(x, y))
@@ -634,7 +629,7 @@ class Separation:
     def curvature(self) -> Array | None:
         """Second derivatives (1/m) of a gap that is a quadratic form; None of others."""
         one, two = self.surface_1.curvature, self.surface_2.curvature
-        tilted = self.surface_1.tilted or self.surface_2.tilted
+        tilted = any(self.surface_1.tilt + self.surface_2.tilt)
         return None if one is None or two is None or tilted else one + two
 
     @cached_property

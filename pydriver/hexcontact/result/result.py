@@ -585,41 +585,34 @@ class Result:
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
 
 
-def computed(
-    result: Result, kept: list[int], names: list[str] | None = None
+def at_hand(
+    result: Result, kept: list[int], names: list[str] | None = None, anew: bool = False
 ) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield name and dataset of each table, or of those named, of the deck of a result."""
+    """Yield name and dataset of each table, or of those named, of the deck of a result.
+
+    Tables that the run has written are read from their files, unless they are wanted `anew`.
+    """
+    run, path = result.dataset.attrs.get("run"), Path(result.path)
+    files = files_of(result.deck, path) if path.name and not anew else {}
     for name, table in tables_of(result.deck).items():
         if names is None or name in names:
-            yield name, of_table(result, name, table, kept)
+            found = readable_table(files[name]) if files else None
+            if found is None or found.attrs.get("stress_of") != run:
+                found = _of_table(result, name, table, kept)
+            yield name, found
 
 
-def at_hand(
-    result: Result, kept: list[int], names: list[str] | None = None
-) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield the tables as `computed`; those that the run has written are read from their files."""
-    run, path = result.dataset.attrs.get("run"), Path(result.path)
-    files = files_of(result.deck, path) if path.name else {}
-    for name, table in tables_of(result.deck).items():
-        if names is not None and name not in names:
-            continue
-        found = readable_table(files[name]) if files else None
-        if found is None or found.attrs.get("stress_of") != run:
-            found = of_table(result, name, table, kept)
-        yield name, found
-
-
-def of_table(
-    result: Result, name: str, table: Stress | Fatigue, kept: list[int] | None = None
-) -> xarray.Dataset:
-    """Return the dataset of a table of the deck; arguments and errors as of `computed`."""
+def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> xarray.Dataset:
+    """Return the dataset of a table of the deck."""
     if isinstance(table, Fatigue):
+        constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
+        given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
+        cycle = {"segment": table.segment, "steps": table.steps, "body": table.body, **table.where}
         try:
-            found = of_cycle(result, table)
+            found = result.fatigue(*table.parameters, **given, **cycle)
         except DeckError as error:
             raise DeckError(f"fatigue {name}: {error}") from error
     else:
-        kept = kept or []
         steps = kept[-1:] if table.steps is None else kept
         if isinstance(table.steps, tuple):
             steps = list(table.steps)
@@ -634,11 +627,3 @@ def of_table(
         stress_of=attributes["run"],
         content=FATIGUE if isinstance(table, Fatigue) else STRESS,
     )
-
-
-def of_cycle(result: Result, table: Fatigue) -> xarray.Dataset:
-    """Return the fatigue parameters that a table wants."""
-    constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
-    given = {key: value for key, value in constants.items() if value is not None}
-    cycle = {"segment": table.segment, "steps": table.steps}
-    return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]

@@ -233,16 +233,8 @@ class OnDisk:
         """Write the output and delete the journal."""
         best = accuracy.finest(refinement.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))
-        self._store.finish_with(
-            refinement.metadata(self._store.metadata), _WithErrors(journal, refinement), refinement.trials
+        self._store.finish(
+            refinement.metadata(self._store.metadata),
+            lambda: map(refinement.with_errors, journal),
+            refinement.trials,
         )
-
-
-class _WithErrors:
-    """The load steps of a journal with their errors."""
-
-    def __init__(self, journal: Journal, refinement: Refinement) -> None:
-        self._journal, self._refinement = journal, refinement
-
-    def __iter__(self) -> Iterator[Step]:
-        return map(self._refinement.with_errors, self._journal)

@@ -158,7 +158,7 @@ def write_stresses(
     from ..interior.files import tables_of, write_netcdf
     from ..interior.stress import with_errors
     from ..result.export import kept_steps
-    from ..result.result import computed
+    from ..result.result import at_hand
 
     result = open_result(output)
     try:
@@ -166,7 +166,7 @@ def write_stresses(
         wanted = [name for name, t in tables_of(result.deck).items() if refined or t.estimate_error]
         asked = [name for name in missing if name in wanted]
         others = list(_on_coarser(result, case, asked, listener or Log())) if asked else []
-        for name, found in computed(result, kept_steps(result), [*missing]):
+        for name, found in at_hand(result, kept_steps(result), [*missing], anew=True):
             if name in wanted:
                 with_errors(found, result.lattice.spacing, [(h, tables[name]) for h, tables in others])
             require_free([missing[name]], overwrite=True)
@@ -180,7 +180,7 @@ def _on_coarser(
 ) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
     from ..result.export import kept_steps
-    from ..result.result import Result, computed
+    from ..result.result import Result, at_hand
 
     case = case or Problem.from_text(result.deck, f"deck of {result.path}")
     level = int(result.dataset["trial_level"].max()) if "trial_level" in result.dataset else 0
@@ -190,7 +190,7 @@ def _on_coarser(
         require_memory(other, other.lattice, len(other.load_steps))
         finished = list(steps(other, in_memory=True, listener=Listener()))
         found = Result(partial(assemble, metadata_of(other), finished, True, None, ""))
-        yield other.lattice.spacing, dict(computed(found, kept_steps(found), names))
+        yield other.lattice.spacing, dict(at_hand(found, kept_steps(found), names, anew=True))
 
 
 def _announce_finished(step: Step, store: Store, listener: Listener) -> None:

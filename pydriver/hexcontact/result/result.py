@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..analytic.hertz_gap import friction_of
 from ..arrays import Array, has_entries, integer, number
@@ -335,17 +335,13 @@ class Result:
         number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
         if "dissipation_density" not in self:
             raise DeckError("nothing wears without friction: the result has no dissipation_density")
-        given = (self._fields(WEARING, at) for at in self.cycle_steps(segment, steps))
+        cycle = map(self._nodal, self.cycle_steps(segment, steps))
+        given = (chosen_fields(WEARING, one.fields, one.number) for one in cycle)
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
     def _nodal(self, step: int) -> NodalStep:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""
         return nodal(self.step(step), self.lattice)
-
-    def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
-        """Return the nodal values of some fields of a step, or of all."""
-        one = self._nodal(step)
-        return chosen_fields(names, one.fields, one.number)
 
     # --- below the surface ----------------------------------------------------------------------------------
 

@@ -138,11 +138,22 @@ def solve_into(case: Problem, store: Store, listener: Listener, before: Sequence
 
 
 def _record_steps(case: Problem, store: Store, listener: Listener, before: Sequence[Step]) -> None:
-    """Record all load steps; apart from `solve_into`, so that the last one is freed before the output."""
+    """Record all load steps, and pass them on; the store records an exception of a callback.
+
+    Apart from `solve_into`, so that the last one is freed before the output.
+    """
     for step in steps(case, before=before, listener=listener):
         store.append(step)
         store.publish()
-        _announce_finished(step, store, listener)
+        try:
+            listener.step(step)
+        except Stopped:
+            raise
+        except Exception as error:
+            store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
+            if not isinstance(error, HexcontactError):  # to which the store adds it
+                error.add_note(store.kept)
+            raise
 
 
 def write_stresses(
@@ -191,16 +202,3 @@ def _on_coarser(
         finished = list(steps(other, in_memory=True, listener=Listener()))
         found = Result(partial(assemble, metadata_of(other), finished, True, None, ""))
         yield other.lattice.spacing, dict(at_hand(found, kept_steps(found), names, anew=True))
-
-
-def _announce_finished(step: Step, store: Store, listener: Listener) -> None:
-    """Pass a recorded step to the listener; the store records an exception of a callback."""
-    try:
-        listener.step(step)
-    except Stopped:
-        raise
-    except Exception as error:
-        store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
-        if not isinstance(error, HexcontactError):  # to which the store adds it
-            error.add_note(store.kept)
-        raise

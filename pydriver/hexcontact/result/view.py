@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
 
 import numpy as np
 
@@ -22,13 +22,20 @@ from .step import is_kept, nodal
 if TYPE_CHECKING:
     import xarray
 
-    from .result import Result
-
 
 STICK = 1  # value of zone at a sticking node
 
 
-AnyResult: TypeAlias = "Result | xarray.Dataset"
+class HasDataset(Protocol):
+    """An object with a data set, such as a result."""
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Its data set."""
+        ...
+
+
+AnyResult: TypeAlias = "HasDataset | xarray.Dataset"
 Results: TypeAlias = "AnyResult | Sequence[AnyResult]"
 
 

@@ -129,9 +129,7 @@ def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     try:
         finer = Trial(last.level + 1).case(case)
         nodes = finer.lattice.size
-        if (
-            last.nodes > Trial(last.level, last.copy).case(case).lattice.size
-        ):  # a window that grew grows again
+        if last.nodes > Trial(last.level).case(case).lattice.size:  # a window that grew grows again
             nodes = max(nodes, math.ceil(RATIO**2 * last.nodes))
         if nodes > case.accuracy.max_nodes:
             return (

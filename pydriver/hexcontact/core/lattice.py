@@ -276,7 +276,11 @@ def nearest(
 def section_ends(
     lattice: Lattice, pressure: Array, angle: float, through: Point | None
 ) -> tuple[Point, Point, float]:
-    """Return the ends of a line across a contact, and the distance of its zero from the first one (m)."""
+    """Return the ends of a line across a contact at an angle (rad) from x, with a margin on both sides.
+
+    The third value is the distance (m) of its zero from the first end: at the point `through`, by default at
+    the node next to the center of pressure.
+    """
     point = (0.0, 0.0) if through is None else through
     ends, zero = flat.section_of_pressure(lattice, pressure, angle, through is not None, point)
     (x0, y0), (x1, y1) = ends.tolist()

@@ -13,9 +13,10 @@ from matplotlib.lines import Line2D
 
 from ..analytic.compare import PartialSlip
 from ..arrays import Array
+from ..core.lattice import section_ends
 from ..errors import DeckError, NotInResult
 from ..result.result import Result
-from ..result.step import Line, section_line
+from ..result.step import Line
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
 from .maps import closed_solutions, views_of
@@ -49,7 +50,7 @@ _FINER = 8  # points along a spacing where values are joined, since tractions ar
 
 
 def line_of(views: Iterable[StepView], angle: float, through: Point | None = None) -> Line:
-    """Return the line across the contacts of some steps of one result, see `section_line`.
+    """Return the line across the contacts of some steps of one result, see `section_ends`.
 
     Without any contact it crosses the whole window.
     """
@@ -57,7 +58,8 @@ def line_of(views: Iterable[StepView], angle: float, through: Point | None = Non
     for view in views:
         lattice, loaded = view.lattice, np.maximum(loaded, view.pressure)
     assert lattice is not None
-    return section_line(lattice, loaded if loaded.any() else np.ones(loaded.shape), angle, through)
+    pressure = loaded if loaded.any() else np.ones(loaded.shape)
+    return Line(*section_ends(lattice, pressure, angle, through))
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,6 @@ _KIND = "a record of a journal"
 LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _COMPANION = "companion."  # before the names of restart data
 _PARTS = {"run": str, "index": int, **dict.fromkeys(("lattice", "history", "control"), dict)}
-_OTHER_VERSION = "{} was kept by hexcontact {}, whose journal has the layout {}; this version reads layout {}"
 _CHANGED = "{} is damaged: its content is not what was written"
 
 
@@ -111,13 +110,22 @@ def read_sealed(path: Path) -> dict[str, Any]:
     """Read a text (JSON), and compare its seal."""
     with reading(path, "a text of a journal"):
         about: dict[str, Any] = json.loads(path.read_bytes())
-        require_kinds(about)
-        if (layout := about.pop("journal_version")) != VERSION:
-            raise DeckError(_OTHER_VERSION.format(path, about["hexcontact_version"], layout, VERSION))
+        _require_layout(about, path)
+        del about["journal_version"]
         if about.pop("sha256", "") != _digest(about):
             raise DeckError(f"{_CHANGED.format(path)} (SHA-256)")
         del about["hexcontact_version"]
         return about
+
+
+def _require_layout(about: Any, path: Path) -> None:
+    """Refuse a text of another layout of the journal."""
+    require_kinds(about)
+    if (layout := about["journal_version"]) != VERSION:
+        raise DeckError(
+            f"{path} was kept by hexcontact {about['hexcontact_version']}, whose journal has the layout "
+            f"{layout}; this version reads layout {VERSION}"
+        )
 
 
 def begins_like_sealed(path: Path) -> bool:
@@ -299,10 +307,7 @@ def read_about(path: Path) -> dict[str, Any]:
 def _about(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     """Return the text of a record, and compare its seal."""
     about: dict[str, Any] = json.loads(_array(archive, _ABOUT).tobytes())
-    require_kinds(about)
-    if about["journal_version"] != VERSION:
-        layout = about["journal_version"]
-        raise DeckError(_OTHER_VERSION.format(path, about["hexcontact_version"], layout, VERSION))
+    _require_layout(about, path)
     if archive.comment != _seal_of(archive):
         raise DeckError(_CHANGED.format(path))
     require_kinds(about, **_PARTS)

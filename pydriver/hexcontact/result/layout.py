@@ -66,19 +66,6 @@ class Metadata:
         """Times at which the run was started and resumed, a line for each."""
         return "\n".join([f"{self.created} started by hexcontact {self.version}", *self.resumed])
 
-    def attributes(self) -> dict[str, Any]:
-        """Return the global attributes of a file."""
-        own = {
-            "title": self.title,
-            "output_fields": " ".join(self.fields),
-            "output_every": np.int32(self.every),
-            "planned_steps": np.int32(self.planned_steps),
-            "run": self.run,
-            "created": self.created,
-            "deck": self.deck,
-        }
-        return {**self.parameters, **own}
-
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
         """Return the metadata from the table of `dataclasses.asdict`, after JSON."""
@@ -150,11 +137,11 @@ class Layout:
 
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Return the global attributes; `complete`: the result has all planned steps."""
-        window = self.window
+        window, metadata = self.window, self.metadata
         return {
             "Conventions": CONVENTIONS,
             "source": f"hexcontact {__version__}",
-            "history": self.metadata.story,
+            "history": metadata.story,
             "hexcontact_version": __version__,
             "schema_version": np.int32(SCHEMA_VERSION),
             "complete": np.int32(complete),
@@ -165,7 +152,14 @@ class Layout:
             "lattice_cell_angle": float(window.cell_angle),
             **({"lattice_direction": float(window.direction)} if window.direction else {}),
             **({"lattice_periodic": np.int32(1)} if window.periodic else {}),
-            **self.metadata.attributes(),
+            **metadata.parameters,
+            "title": metadata.title,
+            "output_fields": " ".join(metadata.fields),
+            "output_every": np.int32(metadata.every),
+            "planned_steps": np.int32(metadata.planned_steps),
+            "run": metadata.run,
+            "created": metadata.created,
+            "deck": metadata.deck,
         }
 
     def keeps(self, position: int) -> bool:

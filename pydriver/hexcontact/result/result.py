@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..analytic.hertz_gap import friction_of
 from ..arrays import Array, has_entries, integer, number
@@ -335,17 +335,13 @@ class Result:
         number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
         if "dissipation_density" not in self:
             raise DeckError("nothing wears without friction: the result has no dissipation_density")
-        given = (self._fields(WEARING, at) for at in self.cycle_steps(segment, steps))
+        cycle = map(self._nodal, self.cycle_steps(segment, steps))
+        given = (chosen_fields(WEARING, one.fields, one.number) for one in cycle)
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
     def _nodal(self, step: int) -> NodalStep:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""
         return nodal(self.step(step), self.lattice)
-
-    def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
-        """Return the nodal values of some fields of a step, or of all."""
-        one = self._nodal(step)
-        return chosen_fields(names, one.fields, one.number)
 
     # --- below the surface ----------------------------------------------------------------------------------
 
@@ -587,41 +583,34 @@ class Result:
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
 
 
-def computed(
-    result: Result, kept: list[int], names: list[str] | None = None
+def at_hand(
+    result: Result, kept: list[int], names: list[str] | None = None, anew: bool = False
 ) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield name and dataset of each table, or of those named, of the deck of a result."""
+    """Yield name and dataset of each table, or of those named, of the deck of a result.
+
+    Tables that the run has written are read from their files, unless they are wanted `anew`.
+    """
+    run, path = result.dataset.attrs.get("run"), Path(result.path)
+    files = files_of(result.deck, path) if path.name and not anew else {}
     for name, table in tables_of(result.deck).items():
         if names is None or name in names:
-            yield name, of_table(result, name, table, kept)
+            found = readable_table(files[name]) if files else None
+            if found is None or found.attrs.get("stress_of") != run:
+                found = _of_table(result, name, table, kept)
+            yield name, found
 
 
-def at_hand(
-    result: Result, kept: list[int], names: list[str] | None = None
-) -> Iterator[tuple[str, xarray.Dataset]]:
-    """Yield the tables as `computed`; those that the run has written are read from their files."""
-    run, path = result.dataset.attrs.get("run"), Path(result.path)
-    files = files_of(result.deck, path) if path.name else {}
-    for name, table in tables_of(result.deck).items():
-        if names is not None and name not in names:
-            continue
-        found = readable_table(files[name]) if files else None
-        if found is None or found.attrs.get("stress_of") != run:
-            found = of_table(result, name, table, kept)
-        yield name, found
-
-
-def of_table(
-    result: Result, name: str, table: Stress | Fatigue, kept: list[int] | None = None
-) -> xarray.Dataset:
-    """Return the dataset of a table of the deck; arguments and errors as of `computed`."""
+def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> xarray.Dataset:
+    """Return the dataset of a table of the deck."""
     if isinstance(table, Fatigue):
+        constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
+        given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
+        cycle = {"segment": table.segment, "steps": table.steps, "body": table.body, **table.where}
         try:
-            found = of_cycle(result, table)
+            found = result.fatigue(*table.parameters, **given, **cycle)
         except DeckError as error:
             raise DeckError(f"fatigue {name}: {error}") from error
     else:
-        kept = kept or []
         steps = kept[-1:] if table.steps is None else kept
         if isinstance(table.steps, tuple):
             steps = list(table.steps)
@@ -636,11 +625,3 @@ def of_table(
         stress_of=attributes["run"],
         content=FATIGUE if isinstance(table, Fatigue) else STRESS,
     )
-
-
-def of_cycle(result: Result, table: Fatigue) -> xarray.Dataset:
-    """Return the fatigue parameters that a table wants."""
-    constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
-    given = {key: value for key, value in constants.items() if value is not None}
-    cycle = {"segment": table.segment, "steps": table.steps}
-    return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]

@@ -135,7 +135,7 @@ class NodalStep:
     ) -> xarray.Dataset:
         """Return fields along a line across the contact; see `hexcontact.Result.section`."""
         pressure = chosen_fields(["pressure"], self.fields, self.number)["pressure"]
-        return self._along(section_line(self.lattice, pressure, angle, through), names, points, source)
+        return self._along(Line(*section_ends(self.lattice, pressure, angle, through)), names, points, source)
 
     def _along(
         self, line: Line, names: Sequence[str], points: int | None, source: str | None
@@ -246,15 +246,6 @@ class Line:
         """Return the coordinates (m) of points at some distances (m) from the start."""
         x, y = (a + (b - a) * (distance / self.length) for a, b in zip(self.start, self.end, strict=True))
         return np.asarray(x), np.asarray(y)
-
-
-def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point | None) -> Line:
-    """Return the line across a contact at an angle (rad) from x, with a margin on both sides.
-
-    Distances count from the point `through` (m), by default from the node next to the center of pressure.
-    """
-    start, end, zero = section_ends(lattice, pressure, angle, through)
-    return Line(start, end, zero)
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:

@@ -17,7 +17,7 @@ import shlex
 import shutil
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -388,12 +388,26 @@ class Store:
             with self._replacing(record) as path:
                 write_record(path, about["run"], before, about["loads"])
 
-    def finish(self) -> None:
-        """Write the output and delete the journal, which remains after an error."""
+    def finish(
+        self,
+        metadata: Metadata | None = None,
+        steps: Callable[[], Iterable[Step]] | None = None,
+        trials: Mapping[str, Sequence[Any]] | None = None,
+    ) -> None:
+        """Write the output and delete the journal, which remains after an error.
+
+        `steps` reads those that are recorded elsewhere, with their `metadata` and `trials` as of `Layout`.
+        """
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
-            self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._finish(Layout(self.metadata, self.heads), self._steps())
+            heads = [step.head for step in steps()] if steps else self.heads
+            self.metadata = metadata or dataclasses.replace(self.metadata, planned_steps=len(heads))
+            with self.writing("the output"):
+                layout = Layout(self.metadata, heads, trials)
+                self._put_together(layout, (steps or self._steps)(), complete=True)
+            self.finished = True
+            remove_all(self.folder)
+            self.close()
 
     def _steps(self) -> Iterator[Step]:
         """Yield the finished steps: their records, and the last one as it is."""
@@ -401,24 +415,6 @@ class Store:
         yield from itertools.islice(Journal(self.folder, ours=True), recorded) if recorded else ()
         if self._last is not None:
             yield self._last
-
-    def finish_with(
-        self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
-    ) -> None:
-        """Write the output of steps that are recorded elsewhere, and delete the journal.
-
-        The steps are read twice: no generator. `trials` as of `hexcontact.result.layout.Layout`.
-        """
-        with self._mutex:
-            self._finish(Layout(metadata, [step.head for step in steps], trials), steps)
-
-    def _finish(self, layout: Layout, steps: Iterable[Step]) -> None:
-        self._require_open()
-        with self.writing("the output"):
-            self._put_together(layout, steps, complete=True)
-        self.finished = True
-        remove_all(self.folder)
-        self.close()
 
     def _require_open(self) -> None:
         if self._closed:

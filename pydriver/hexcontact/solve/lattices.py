@@ -129,9 +129,7 @@ def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     try:
         finer = Trial(last.level + 1).case(case)
         nodes = finer.lattice.size
-        if (
-            last.nodes > Trial(last.level, last.copy).case(case).lattice.size
-        ):  # a window that grew grows again
+        if last.nodes > Trial(last.level).case(case).lattice.size:  # a window that grew grows again
             nodes = max(nodes, math.ceil(RATIO**2 * last.nodes))
         if nodes > case.accuracy.max_nodes:
             return (
@@ -233,16 +231,8 @@ class OnDisk:
         """Write the output and delete the journal."""
         best = accuracy.finest(refinement.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))
-        self._store.finish_with(
-            refinement.metadata(self._store.metadata), _WithErrors(journal, refinement), refinement.trials
+        self._store.finish(
+            refinement.metadata(self._store.metadata),
+            lambda: map(refinement.with_errors, journal),
+            refinement.trials,
         )
-
-
-class _WithErrors:
-    """The load steps of a journal with their errors."""
-
-    def __init__(self, journal: Journal, refinement: Refinement) -> None:
-        self._journal, self._refinement = journal, refinement
-
-    def __iter__(self) -> Iterator[Step]:
-        return map(self._refinement.with_errors, self._journal)

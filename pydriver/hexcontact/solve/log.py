@@ -174,22 +174,19 @@ def refuse_same(file: Path | None, spare: Sequence[Path]) -> None:
             raise DeckError(f"--log-file {file}: expected a file of its own, not {other} of this command")
 
 
-def _may_be_a_log(file: Path) -> bool:
-    """Test whether a file is empty or begins with a time."""
-    try:
-        with file.open("rb") as there:
-            return re.match(rb"\d{4}-\d\d-\d\dT|$", there.read(20)) is not None
-    except PermissionError as error:
-        unknown = "cannot be read, so that it may be no log to append to"
-        raise DeckError(f"--log-file {file}: {unknown}: {error.strerror}") from None
-
-
 def _opened(file: Path, spare: Sequence[Path]) -> _File:
     refuse_same(file, spare)
     try:
-        if file.is_file() and not _may_be_a_log(file):
-            expected = "expected a new file, or a log to append to"
-            raise DeckError(f"--log-file {file}: is there and no log; {expected}")
+        if file.is_file():
+            try:
+                with file.open("rb") as there:
+                    begins = there.read(20)
+            except PermissionError as error:
+                unknown = "cannot be read, so that it may be no log to append to"
+                raise DeckError(f"--log-file {file}: {unknown}: {error.strerror}") from None
+            if not re.match(rb"\d{4}-\d\d-\d\dT|$", begins):  # empty, or begins with a time
+                expected = "expected a new file, or a log to append to"
+                raise DeckError(f"--log-file {file}: is there and no log; {expected}")
         if file.is_fifo():  # OSError without a reader, for which open would wait
             os.close(os.open(file, os.O_WRONLY | os.O_NONBLOCK))
         return _File(file, encoding="utf-8", errors="backslashreplace")

@@ -48,11 +48,12 @@ def error(
     """Return the error of a step that did not converge, or of gross sliding."""
     residuals = _residuals(case, solution, target)
     worst = _worst(case, lattice, solution, residuals, values)
+    cuts = getattr(solution, "cuts", 0)
     details = {
         "step": target.index + 1,
         "label": target.label,
         "iterations": solution.sweeps,
-        "halvings": getattr(solution, "cuts", 0),
+        "halvings": cuts,
         "tolerance": case.solver.tolerance,
         "stopped": solution.stopped,
         "residuals": residuals,
@@ -62,7 +63,8 @@ def error(
     planned = f" of {case.planned_steps}" if case.planned_steps else ""
     step = f"step {target.index + 1}{planned}{segment}"
     shown = listed([f"{sign} = {_number(value)}" for sign, value in residuals.items()], "and")
-    after = f"after {listed(_tried(solution), 'and')} the residuals are {shown}"
+    tried = f" and halving the step {cuts} time{'s' * (cuts > 1)}" if cuts else ""
+    after = f"after {solution.sweeps} iterations{tried} the residuals are {shown}"
     doubtful, excess, expected = _sliding(case, lattice, solution, target, values)
     if excess:
         return ConvergenceError(f"{step}: gross sliding: {excess}; {after}; {expected}", details)
@@ -91,12 +93,6 @@ def _residuals(case: Problem, solution: NormalSolution, target: LoadStep) -> dic
 
 def _number(value: float) -> str:
     return f"{value:.2e}" if value < _INFINITE else "inf"
-
-
-def _tried(solution: NormalSolution) -> list[str]:
-    cuts = getattr(solution, "cuts", 0)
-    halved = [f"halving the step {cuts} time{'s' * (cuts > 1)}"] if cuts else []
-    return [f"{solution.sweeps} iterations", *halved]
 
 
 def _sliding(

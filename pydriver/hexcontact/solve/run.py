@@ -138,11 +138,22 @@ def solve_into(case: Problem, store: Store, listener: Listener, before: Sequence
 
 
 def _record_steps(case: Problem, store: Store, listener: Listener, before: Sequence[Step]) -> None:
-    """Record all load steps; apart from `solve_into`, so that the last one is freed before the output."""
+    """Record all load steps, and pass them on; the store records an exception of a callback.
+
+    Apart from `solve_into`, so that the last one is freed before the output.
+    """
     for step in steps(case, before=before, listener=listener):
         store.append(step)
         store.publish()
-        _announce_finished(step, store, listener)
+        try:
+            listener.step(step)
+        except Stopped:
+            raise
+        except Exception as error:
+            store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
+            if not isinstance(error, HexcontactError):  # to which the store adds it
+                error.add_note(store.kept)
+            raise
 
 
 def write_stresses(
@@ -158,7 +169,7 @@ def write_stresses(
     from ..interior.files import tables_of, write_netcdf
     from ..interior.stress import with_errors
     from ..result.export import kept_steps
-    from ..result.result import computed
+    from ..result.result import at_hand
 
     result = open_result(output)
     try:
@@ -166,7 +177,7 @@ def write_stresses(
         wanted = [name for name, t in tables_of(result.deck).items() if refined or t.estimate_error]
         asked = [name for name in missing if name in wanted]
         others = list(_on_coarser(result, case, asked, listener or Log())) if asked else []
-        for name, found in computed(result, kept_steps(result), [*missing]):
+        for name, found in at_hand(result, kept_steps(result), [*missing], anew=True):
             if name in wanted:
                 with_errors(found, result.lattice.spacing, [(h, tables[name]) for h, tables in others])
             require_free([missing[name]], overwrite=True)
@@ -180,7 +191,7 @@ def _on_coarser(
 ) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
     from ..result.export import kept_steps
-    from ..result.result import Result, computed
+    from ..result.result import Result, at_hand
 
     case = case or Problem.from_text(result.deck, f"deck of {result.path}")
     level = int(result.dataset["trial_level"].max()) if "trial_level" in result.dataset else 0
@@ -190,17 +201,4 @@ def _on_coarser(
         require_memory(other, other.lattice, len(other.load_steps))
         finished = list(steps(other, in_memory=True, listener=Listener()))
         found = Result(partial(assemble, metadata_of(other), finished, True, None, ""))
-        yield other.lattice.spacing, dict(computed(found, kept_steps(found), names))
-
-
-def _announce_finished(step: Step, store: Store, listener: Listener) -> None:
-    """Pass a recorded step to the listener; the store records an exception of a callback."""
-    try:
-        listener.step(step)
-    except Stopped:
-        raise
-    except Exception as error:
-        store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
-        if not isinstance(error, HexcontactError):  # to which the store adds it
-            error.add_note(store.kept)
-        raise
+        yield other.lattice.spacing, dict(at_hand(found, kept_steps(found), names, anew=True))

@@ -262,7 +262,10 @@ class Session:
         given = {name: value for name, value in locals().items() if name != "self"}
         self._check_open()
         entry = with_radians(plain(given | {"label": label or None}))
-        before = self._loads if self._by_hand else self._loads_so_far()
+        before = self._loads
+        if not self._by_hand:  # iteration applied the loads of the case, or one for each solved step
+            as_given = self._whole and not self.case.adaptive
+            before = list(self.case.deck_tables["load"]) if as_given else self._resolved(self._steps)
         history = self._unrolled(before, entry)
         if not self._by_hand:
             self._by_hand, self._loads, self._solving = True, before, None
@@ -340,12 +343,6 @@ class Session:
         return step
 
     # --- loads as entries of a deck -------------------------------------------------------------------------
-
-    def _loads_so_far(self) -> list[dict[str, Any]]:
-        """Return the loads that iteration applied: those of the case, or one for each solved step."""
-        if self._whole and not self.case.adaptive:
-            return list(self.case.deck_tables["load"])
-        return self._resolved(self._steps)
 
     def _resting_in(self, step: Step) -> frozenset[str]:
         """Return the loads and motions that were zero in all steps, also in this one."""

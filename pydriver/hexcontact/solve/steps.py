@@ -22,14 +22,14 @@ from ..variables import LOADS
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .log import Log
-from .window import FrictionWindow, NormalWindow, Window
+from .window import FrictionWindow, Window
 
 _SAME = 1e-9  # relative difference of equal initial gaps
 
 
-def window_type(case: Problem) -> type[Window[Any]]:
+def window_type(case: Problem) -> type[Window]:
     """Return the kind of window that the algorithm of a case needs."""
-    return FrictionWindow if case.frictional else NormalWindow
+    return FrictionWindow if case.frictional else Window
 
 
 def check_step(case: Problem, last: Step, found: str) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,6 @@ from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, S
 from .events import Listener
 from .memory_needed import fields_of, require_memory
 
-S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
-
 _STEPPED = names_where(lambda v: v.dims == ("step",))
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
@@ -34,10 +31,13 @@ _PATH_ERROR = "dissipated_energy_path_error"  # static steps have no path
 _ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contact
 
 
-class Window(ABC, Generic[S]):
-    """A case on one window, whose results hold the fields of `steps_held` load steps in memory."""
+class Window:
+    """A case without friction on one window; results hold the fields of `steps_held` load steps in memory.
 
-    state: ClassVar[tuple[str, ...]]  # fields of every step
+    The steps have no history: each is solved from its load alone.
+    """
+
+    state = STATE[False]  # fields of every step
     worn: Array | None = None  # depth by which the surfaces are worn, m
 
     def __init__(
@@ -52,36 +52,33 @@ class Window(ABC, Generic[S]):
         self._bodies: dict[int, FlexibilityOperator] = {}
         self.contact: Any = self._solver(gap)
 
-    @abstractmethod
     def _solver(self, gap: Array) -> Any:
         """Return the solver for an initial gap (inf where nothing can touch)."""
-
-    def _without_friction(self, gap: Array) -> NormalContact:
-        """Return the solver of the contact without friction."""
         method = self.case.method_for(self.lattice)
         given = self.lattice, self.case.solved_pair, gap, self.candidate
         return NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
 
-    @abstractmethod
-    def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
+    def advance(self, state: Any, target: LoadStep, values: tuple[float, ...]) -> Any:
         """Solve a load step from the state at its beginning, None before the first load.
 
         `values` are the prescribed loads or motions of z, x, y and the twist.
         """
+        driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
+        return self.contact.solve(**driven, tolerance=self.case.solver.tolerance)
 
-    def carried(self, state: S | None, lattice: Lattice) -> S | None:
+    def carried(self, state: Any, lattice: Lattice) -> Any:
         """Return a state of a smaller window on this one."""
         return state
 
-    def restored(self, step: Step) -> S | None:
+    def restored(self, step: Step) -> Any:
         """Return the state at the end of a step on this window, if the next one needs it."""
         return None
 
-    def outgrown(self, solution: S) -> bool:
+    def outgrown(self, solution: NormalSolution) -> bool:
         """Test whether the contact reached the rim of the window, also in a part of the step only."""
         return solution.touches_rim and not self.case.full_contact
 
-    def grown(self, solution: S, target: LoadStep) -> Self:
+    def grown(self, solution: NormalSolution, target: LoadStep) -> Self:
         """Return a larger window for a contact that reached the rim, unless the deck fixes the window."""
         if self.case.window_fixed:
             raise DeckError(
@@ -95,7 +92,7 @@ class Window(ABC, Generic[S]):
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return type(self)(self.case, larger, self.steps_held, self.listener)
 
-    def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
+    def step(self, target: LoadStep, solution: NormalSolution, before: Any, started: float) -> Step:
         """Return a finished step from the states at its end and beginning; its time counts from `started`."""
         fields = {"initial_gap": self.initial_gap}
         fields |= {name: getattr(solution, name) for name in self.state}
@@ -150,7 +147,7 @@ class Window(ABC, Generic[S]):
         stresses = zip(BULK_STRESS, target.bulk, strict=True)
         return driven | {name: value for name, value in stresses if name in known}
 
-    def _history(self, solution: S, before: S | None) -> dict[str, float]:
+    def _history(self, solution: Any, before: Any) -> dict[str, float]:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
@@ -180,27 +177,10 @@ class Window(ABC, Generic[S]):
         return {"x": sign * x, "y": sign * y, "z": z}
 
 
-class NormalWindow(Window[NormalSolution]):
-    """Contact without friction, whose steps have no history."""
-
-    state = STATE[False]
-
-    _solver = Window._without_friction
-
-    def advance(
-        self, state: NormalSolution | None, target: LoadStep, values: tuple[float, ...]
-    ) -> NormalSolution:
-        """Press with a force or to an approach."""
-        driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
-        solution: NormalSolution = self.contact.solve(**driven, tolerance=self.case.solver.tolerance)
-        return solution
-
-
-class FrictionWindow(Window[ContactState]):
+class FrictionWindow(Window):
     """Contact with friction; a step starts from the state at the end of the step before."""
 
     state = STATE[True]
-    contact: FrictionalContact
 
     def _solver(self, gap: Array) -> FrictionalContact:
         return FrictionalContact(
@@ -261,7 +241,7 @@ class FrictionWindow(Window[ContactState]):
         self.worn = depth
         self.contact.wear(depth)
 
-    def grown(self, solution: ContactState, target: LoadStep) -> Self:
+    def grown(self, solution: NormalSolution, target: LoadStep) -> Self:
         """Return the problem on a larger window, with its worn depth."""
         larger = super().grown(solution, target)
         if self.worn is not None:
@@ -291,7 +271,7 @@ class FrictionWindow(Window[ContactState]):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        solver, nodes = self._without_friction(self.initial_gap), 1
+        solver, nodes = super()._solver(self.initial_gap), 1
         for drive in self.case.largest_drives:
             known: dict[str, Any] = {**drive}
             nodes = max(nodes, int((solver.solve(**known, tolerance=_ROUGHLY).zone > 0).sum()))

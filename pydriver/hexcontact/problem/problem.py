@@ -235,7 +235,7 @@ class Problem:
 
     def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
-        if fault := self._gap.fault_near(lattice, contact):
+        if self.period is None and (fault := self._gap.fault_near(lattice, contact)):
             raise DeckError(f"gap: the contact of load step {number} {fault}")
 
     def holes_near(self, contact: Estimate) -> int:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from hexcontact import Case, DeckError, Lattice, open_result
 
@@ -116,6 +117,18 @@ def test_the_period_is_exact_and_has_whole_cells() -> None:
         cell_angle="60 deg", extent=["1 mm", "1 mm"], loads={"mean_pressure": 1e6}, expression="0*x"
     )
     assert rhombus.lattice.cell_angle == pytest.approx(math.pi / 3)
+
+
+def test_a_map_of_one_period() -> None:
+    """Heights at the nodes of a period, with contact across its sides."""
+    at = np.arange(64) * WAVE / 64 - WAVE / 2
+    heights = HEIGHT * (1.0 - np.cos(2 * np.pi * at / WAVE) * np.cos(2 * np.pi * at[:, None] / WAVE))
+    gap = xarray.DataArray(heights, dims=("y", "x"), coords={"x": at, "y": at})
+    load = {"mean_pressure": 0.1 * FULL}
+    case = waves(body_1=STEEL, gap=gap, loads=load)
+    last, other = (made.run().dataset.isel(step=-1) for made in (case, waves(loads=load)))
+    assert float(last["mean_gap"]) == pytest.approx(float(other["mean_gap"]), rel=1e-6)
+    assert (last["pressure"].values[0] > 0.0).any()
 
 
 BAD = {

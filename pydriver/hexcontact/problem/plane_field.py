@@ -86,7 +86,12 @@ class HeightMap:
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Return the gap (m) at points of the plane."""
-        inside = (self.x[0] <= x) & (x <= self.x[-1]) & (self.y[0] <= y) & (y <= self.y[-1])
+        # a node at the end of the map belongs to it, whatever the rounding of its coordinates
+        (low, high), (left, right) = (
+            (points[0] - slack, points[-1] + slack)
+            for points, slack in zip((self.x, self.y), 1e-9 * np.array(self.distances), strict=True)
+        )
+        inside = (low <= x) & (x <= high) & (left <= y) & (y <= right)
         found = np.where(inside, self._spline.ev(x, y), np.inf)
         if self._smooth is not None:
             share = np.clip(self._smooth.ev(x, y), 0.0, 1.0)

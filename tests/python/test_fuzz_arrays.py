@@ -282,7 +282,9 @@ def test_a_tolerance_below_rounding_errors_ends() -> None:
     for k in range(1, 61):
         with time_limit():
             solution = contact.solve(normal_load=0.05 * 1.37**k, tolerance=5e-16)
-        assert max(solution.residual_normal, solution.residual_force) < 1e-14
+        assert solution.residual_force < 1e-14
+        # the last iteration may be any of those that swing with rounding errors, by compiler and FFT
+        assert solution.residual_normal < 1e-7
 
 
 def test_solvers_say_why_they_stopped() -> None:

@@ -213,6 +213,57 @@ def test_a_turned_lattice_is_read_again_and_solves_friction(tmp_path: Path) -> N
     assert Case.from_text(read.deck) == case
 
 
+@pytest.mark.parametrize("spacings", [("20 um", "5 um"), ("5 um", "20 um")])
+def test_slopes_are_those_along_both_sides_of_a_cell(spacings: tuple[str, str]) -> None:
+    """The gap of a paraboloid rises by b/R at the end of the minor semi-axis b, whichever way that lies."""
+    angle = "0 deg" if spacings[0] == "5 um" else "90 deg"
+    case, exact = slender(0.1, angle, lattice="rectangular", spacing=spacings)
+    assert case.estimate.slope == pytest.approx(exact.semi_minor / 0.01, rel=0.2)
+
+
+def test_the_most_slender_cells() -> None:
+    """A contact of 240:1 on cells of 100:1, with the spacings asked for in the shorter semi-axis at least."""
+    case, exact = slender(100.0, "0 deg", lattice="rectangular", nodes_in_radius=12)
+    assert case.lattice.cell_ratio == pytest.approx(100.0)
+    assert exact.semi_minor / case.lattice.spacing > 11
+    assert exact.semi_major / (case.lattice.spacing * case.lattice.cell_ratio) > 11
+    assert float(case.run().dataset["max_pressure"][-1]) == pytest.approx(exact.max_pressure, rel=1e-3)
+    with case.start() as session:
+        session.advance(normal_load=10.0)
+        assert Case.from_text(session.result().deck).lattice.basis == pytest.approx(case.lattice.basis)
+
+
+# K1, Kxx, Kxy, Kx, Ky of the hat over cells of 1 by 1/ratio at a node: line integrals in 40 digits.
+FLAT_KERNELS = {
+    (10, 0, 0): (0.70792457007327, 0.51592941992511, -0.01662315037744, 0.0, 0.0),
+    (10, 1, 1): (0.12577645261123, 0.11439512067869, 0.02376524732184, 0.11909877060070, 0.02786531948773),
+    (10, 2, 3): (0.05151891664788, 0.04995919294167, 0.00840904863513, 0.05073054243176, 0.00856563741992),
+    (10, 12, 5): (0.00833562165530, 0.00832087480952, 0.00034845709386, 0.00832824483165, 0.00034877221935),
+    (50, 0, 0): (0.20459095155752, 0.16496314155566, -0.00125717475872, 0.0, 0.0),
+    (50, 0, 1): (0.14954061639339, 0.11031557985867, -0.00071862132918, 0.00056058855022, 0.05904543400834),
+    (50, 2, 3): (0.01045830623617, 0.01044501125312, 0.00035482161097, 0.01045165569793, 0.00035509467721),
+    (50, 12, 5): (0.00166854190982, 0.00166842362122, 0.00001397461697, 0.00166848276443, 0.00001397512277),
+}
+
+
+@pytest.mark.parametrize(("ratio", "col", "row"), FLAT_KERNELS)
+def test_influence_of_flat_cells(ratio: int, col: int, row: int) -> None:
+    """Near and far: digits are lost like the square of the ratio, 1e-11 of K1 at most."""
+    beta, gamma = 0.3, 0.5
+    k_1, k_xx, k_xy, k_x, k_y = FLAT_KERNELS[ratio, col, row]
+    lattice = Lattice(1.0, 0, 0, row + 2, col + 2, cell_ratio=1 / ratio, cell_angle=math.pi / 2)
+    operator = FlexibilityOperator(lattice, ElasticPair(1.0, beta, gamma))
+    load, none = np.zeros(lattice.shape), np.zeros(lattice.shape)
+    load[0, 0] = 1.0
+    loads = ((load, none, none), (none, load, none), (none, none, load))
+    moved = [[part[row, col] for part in operator.apply(*each)] for each in loads]
+    pressure, along_x, along_y = np.array(moved)
+    error = 1e-11 * k_1
+    assert pressure == pytest.approx([k_1, -beta * k_x, -beta * k_y], abs=error)
+    assert along_x[1:] == pytest.approx([k_1 + gamma * k_xx, gamma * k_xy], abs=error)
+    assert along_y[1:] == pytest.approx([gamma * k_xy, k_1 + gamma * (k_1 - k_xx)], abs=error)
+
+
 BAD_GRIDS = {
     "two": ({"spacing": [1e-5, 2e-5]}, "spacing = .*expected one length on an equilateral lattice"),
     "angle": (
@@ -222,6 +273,10 @@ BAD_GRIDS = {
     "ratio": (
         {"cell_angle": "90 deg", "spacing": [1e-5, 2e-5], "cell_ratio": 2.0},
         "two spacings or cell_ratio",
+    ),
+    "flat": (
+        {"lattice": "rectangular", "spacing": [1e-5, 1e-8]},
+        r"grid\.spacing = .*: expected lengths of a ratio of at most 100",
     ),
     "word": ({"spacing": "fine"}, 'spacing = "fine": expected a length above 0'),
     "periodic": (

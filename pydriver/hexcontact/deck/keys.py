@@ -21,6 +21,7 @@ from .below import Fatigue, Stress
 from .faults import Mistake
 from .interface import Friction, Interface
 from .kinds import (
+    MOST_SLENDER,
     FileName,
     Flag,
     OrShare,
@@ -177,8 +178,8 @@ class Grid(Table):
     ) = meaning(None, "nodes of the window about `center`, [n_row, n_col], instead of `extent`")
     center: Point | None = meaning(None, "middle of the window; where the bodies touch first if absent")
     origin: Point = meaning((0.0, 0.0), "a point of the plane that is a node")
-    cell_ratio: Annotated[float, Quantity(NUMBER, at_least=0.01, at_most=100.0)] = meaning(
-        1.0, "distance of nodes along the second basis vector of the lattice over the spacing", "0.5"
+    cell_ratio: Annotated[float, Quantity(NUMBER, at_least=1.0 / MOST_SLENDER, at_most=MOST_SLENDER)] = (
+        meaning(1.0, "distance of nodes along the second basis vector of the lattice over the spacing", "0.5")
     )
     cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] | None = meaning(
         None,

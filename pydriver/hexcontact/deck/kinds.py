@@ -447,6 +447,9 @@ class Several(Kind):
         return tuple(parsed)
 
 
+MOST_SLENDER = 100.0  # ratio of the sides of a cell: the kernels lose digits like its square
+
+
 class Spacing(Kind):
     """One length or two, or "auto"."""
 
@@ -454,7 +457,12 @@ class Spacing(Kind):
     expected = 'a length above 0, two of them such as ["5 um", "20 um"], or "auto"'
 
     def __init__(self) -> None:
-        self.two = Several(self.one, "lengths", '["5 um", "20 um"]', count=2)
+        example, fault = '["5 um", "20 um"]', f"expected lengths of a ratio of at most {MOST_SLENDER:g}"
+        self.two = Several(
+            *(self.one, "lengths", example),
+            count=2,
+            fault_of=lambda both: fault if max(both) > MOST_SLENDER * min(both) else "",
+        )
         self.schema = {"anyOf": [{"const": "auto"}, self.one.schema, self.two.schema]}
 
     def written(self, value: Any) -> Any:

@@ -20,6 +20,7 @@ from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
 from ..core.lattice import Lattice, Pattern
 from ..deck.faults import MISSING, Mistake
 from ..deck.keys import Grid
+from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
 
 GapFunction = Callable[[Array, Array], Array]
@@ -83,7 +84,8 @@ class Estimate(NamedTuple):
                 0.0 if self.half_width > ROUND * self.half_length else math.radians(round(2 * turned) / 2)
             )
         across = self.half_length * self.half_width / self.along(direction)
-        return pattern._replace(cell_ratio=across / self.along(direction), direction=direction)
+        ratio = min(max(across / self.along(direction), 1.0 / MOST_SLENDER), MOST_SLENDER)
+        return pattern._replace(cell_ratio=ratio, direction=direction)
 
     @property
     def bounds(self) -> Array:
@@ -266,8 +268,11 @@ def _measure(lattice: Lattice, pressure: Array, x: Array, y: Array) -> Estimate:
 def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     """Return the largest slope of a surface within the contact."""
     heights = np.where(contact, height, np.nan)
-    steepest = max(np.nanmax(np.abs(np.diff(heights, axis=axis)), initial=0.0) for axis in (0, 1))
-    return float(steepest) / lattice.spacing
+    across = lattice.spacing * lattice.cell_ratio
+    return max(
+        float(np.nanmax(np.abs(np.diff(heights, axis=axis)), initial=0.0)) / side
+        for axis, side in ((0, across), (1, lattice.spacing))
+    )
 
 
 # --- the interface ------------------------------------------------------------------------------------------
@@ -386,7 +391,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     if grid.fits:
         assert grid.in_radius is not None
         pattern = estimate.fitted(pattern, grid.direction)
-        spacing = estimate.along(pattern.direction) / grid.in_radius
+        spacing = estimate.spacings(pattern.window(1.0, 0, 0, 1, 1)) / grid.in_radius
     if spacing is not None:
         if grid.window is not None:
             return centered(spacing, center, grid.window, pattern)

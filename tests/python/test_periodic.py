@@ -1,4 +1,4 @@
-"""Windows that repeat: waves, asperities far apart, loads by their means, and what is refused."""
+"""Periodic windows: waves, asperities far apart, loads by their means, refused decks."""
 
 import math
 from pathlib import Path
@@ -64,7 +64,7 @@ def test_an_asperity_far_from_the_next_is_alone() -> None:
 
 
 def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
-    """Loads by their means, a file, and what a window that repeats does not have."""
+    """Loads by their means, a result file, refused stress and edges."""
     case = waves(
         body_2={"rigid": True},
         friction_coefficient=0.3,

@@ -131,7 +131,9 @@ def measures(
         found = flat.measure_pressure(lattice, *given)._asdict()
         found = {name: value for name, value in found.items() if not VARIABLES[name].frictional}
     if lattice.periodic:  # no edges, and no place of a zone
-        found = {name: value for name, value in found.items() if VARIABLES[name].required or value == value}
+        found = {
+            name: value for name, value in found.items() if VARIABLES[name].required or not math.isnan(value)
+        }
     return found
 
 

@@ -183,7 +183,7 @@ class Grid(Table):
     )
     cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] | None = meaning(
         None,
-        "angle of the second basis vector from x; if absent 60 deg, the equilateral lattice, and 90 deg "
+        "angle of the second basis vector from the first; if absent 60 deg, the equilateral lattice, and 90 deg "
         "where the window repeats",
         '"90 deg"',
     )

@@ -89,13 +89,13 @@ def _repeating(
         if faults:
             return None, faults
     heights = PlaneField(tables["body"].separation if gap is None else gap, GAP).over(lattice)
-    if fault := window.seam_fault(lattice, heights):
+    if fault := window.seam_fault(heights):
         return None, [Mistake(("grid", "boundary"), "periodic", fault)]
     return Repeating(lattice, Period(lattice.size * lattice.cell_area, float(heights.mean()))), []
 
 
 def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
-    """Yield what a window that repeats does not have, and means without one."""
+    """Yield tables and loads that a periodic window refuses, and means in a free window."""
     if not tables["grid"].periodic:
         for place, load in enumerate(tables["load"]):
             for name in MEANS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import math
 from collections.abc import Mapping
 from functools import cached_property
@@ -369,14 +370,13 @@ class Problem:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
             raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
-        first, *second = self._estimates.values()  # by force, and by approach
-        self.estimate = estimate = first.joined(*second) if second else first
+        # by force, and by approach
+        self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())
         if grid.fits and lattice is None:
             # once more, on cells as slender as the contact: the bounds of the window are in their coordinates
             pattern = estimate.fitted(window.pattern_of(grid), grid.direction)
-            again = [self.estimated(pattern, **d) for d in self.largest_drives]
-            first, *second = again
-            bounds = first.joined(*second) if second else first
+            again = (self.estimated(pattern, **d) for d in self.largest_drives)
+            bounds = functools.reduce(Estimate.joined, again)
             self.estimate = estimate = estimate._replace(
                 lower=bounds.lower, upper=bounds.upper, cell=bounds.cell
             )

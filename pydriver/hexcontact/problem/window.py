@@ -174,9 +174,7 @@ def estimate_contact(
             continue
         enclosed = True
         estimate = _measure(lattice, pressure, x[contact], y[contact])
-        across = lattice.spacing
-        if pattern.cell_ratio != 1.0:  # the spacing along the narrow side of the contact
-            across *= min(1.0, pattern.cell_ratio)
+        across = lattice.spacing * min(1.0, pattern.cell_ratio)
         if estimate.half_width < NARROW_NODES * across:
             factor = min(max(math.ceil(NARROW_NODES * across / estimate.half_width), 2), 8)
             cell = lattice.spacing
@@ -360,10 +358,10 @@ def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     return replace(centered(spacing, center, (n_row, n_col), pattern), periodic=True), problems
 
 
-def seam_fault(lattice: Lattice, gap: Array) -> str:
-    """Return the fault of a gap (m) that does not go on beyond a window that repeats; empty if there is none.
+def seam_fault(gap: Array) -> str:
+    """Return the fault of a gap (m) with a step between opposite sides of its period; empty without one.
 
-    Across the seam it may change by as much as between neighboring columns, or rows, elsewhere.
+    A step is a larger change than those between neighboring columns, or rows.
     """
     if not np.isfinite(gap).all():
         return "the gap of a window that repeats has nodes that cannot touch; expected heights everywhere"

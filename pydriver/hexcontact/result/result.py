@@ -588,7 +588,7 @@ def at_hand(
 ) -> Iterator[tuple[str, xarray.Dataset]]:
     """Yield name and dataset of each table, or of those named, of the deck of a result.
 
-    Tables that the run has written are read from their files, unless they are wanted `anew`.
+    Tables of the run are read from their files; with `anew` all are computed.
     """
     run, path = result.dataset.attrs.get("run"), Path(result.path)
     files = files_of(result.deck, path) if path.name and not anew else {}

@@ -183,8 +183,8 @@ class Grid(Table):
     )
     cell_angle: Annotated[float, Quantity(ANGLE, at_least=0.5, at_most=2.5)] | None = meaning(
         None,
-        "angle of the second basis vector from the first; if absent 60 deg, the equilateral lattice, and 90 deg "
-        "where the window repeats",
+        "angle of the second basis vector from the first; if absent 60 deg, the equilateral lattice, and "
+        "90 deg where the window repeats",
         '"90 deg"',
     )
     boundary: Annotated[str, Word(BOUNDARIES)] = meaning(

@@ -27,7 +27,7 @@ module hc_pyramid_influence
   implicit none
   private
 
-  public :: pyramid_t, new_pyramid
+  public :: pyramid_t, new_pyramid, equivalent_spacing
   public :: k_1, k_xx, k_xy, k_x, k_y
 
   !> Positions of the five kernels in a vector.
@@ -82,6 +82,17 @@ contains
     call hat_creases(basis, pyramid%crease, edges, pyramid%spacing, pyramid%volume)
     call expand(pyramid, cmplx(edges(1, :), edges(2, :), wp))
   end subroutine new_pyramid
+
+  !> Compute the spacing of the equilateral lattice whose pyramid has the same K1 at its apex.
+  pure real(wp) function equivalent_spacing(basis) result(spacing)
+    !> Basis vectors of the lattice as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    type(pyramid_t) :: pyramid
+
+    call new_pyramid(pyramid, basis)
+    spacing = pyramid%spacing
+    if (.not. pyramid%is_equilateral()) spacing = pyramid%normal_kernel(0.0_wp, 0.0_wp)/(1.5_wp*sqrt(3.0_wp)*log(3.0_wp))
+  end function equivalent_spacing
 
   !> Compute the five kernels at a point relative to the node.
   pure function kernels(self, x, y) result(k)

@@ -10,6 +10,7 @@ module hc_inverse_symbol
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
+  use hc_pyramid_influence, only: equivalent_spacing
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t, influence_t
   use hc_flexibility, only: transform_length
@@ -287,15 +288,16 @@ contains
     traction = self%share*traction + passed
   end subroutine apply_on_springs
 
-  !> Compute the compliance t_h of a node in the plane, with its spring: 2 lambda_1 (1 + gamma/2) l_e on half-spaces [m/Pa].
+  !> Compute the compliance t_h of a node in the plane, with its spring: 2 lambda_1 (1 + gamma/2) l_e on half-spaces [m/Pa],
+  !> l_e of the equilateral cells with the same K1 at the node.
   pure real(wp) function node_compliance(lattice, medium)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
 
-    associate (spacing => lattice%spacing())
-      node_compliance = 2.0_wp*medium%shear_ratio()*medium%normal_point(spacing)*spacing + medium%spring_compliance()
+    associate (length => equivalent_spacing(lattice%basis))
+      node_compliance = 2.0_wp*medium%shear_ratio()*medium%normal_point(length)*length + medium%spring_compliance()
     end associate
   end function node_compliance
 

@@ -264,6 +264,19 @@ def test_influence_of_flat_cells(ratio: int, col: int, row: int) -> None:
     assert along_y[1:] == pytest.approx([gamma * k_xy, k_1 + gamma * (k_1 - k_xx)], abs=error)
 
 
+def test_counted_work_of_slender_contacts_with_friction() -> None:
+    """Beside a round contact of as many nodes: 1.3 times at 12:1, 1.7 times at 45:1."""
+    load, mu = 50.0, 0.3
+    loads = [{"normal_load": load}, {"tangential_load_y": 0.8 * mu * load, "steps": 4}]
+    given = {"lattice": "rectangular", "nodes_in_radius": 30, "friction_coefficient": mu, "loads": loads}
+    work = [
+        float(slender(radius, "0 deg", **given)[0].run().dataset["operator_applications"].sum())
+        for radius in (0.01, 0.5, 5.0)
+    ]
+    assert work[1] < 1.4 * work[0]
+    assert work[2] < 1.8 * work[0]
+
+
 BAD_GRIDS = {
     "two": ({"spacing": [1e-5, 2e-5]}, "spacing = .*expected one length on an equilateral lattice"),
     "angle": (

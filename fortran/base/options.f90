@@ -157,8 +157,6 @@ module hc_options
     !> nodes at the edge (the width of the contact), and the most rings
     real(wp) :: ring_factor = 0.7_wp, ring_power = 0.8_wp
     integer :: max_rings = 16
-    !> Neighbours that a ring consists of: those at the ends of short edges, see `near_neighbors`
-    logical :: near(6) = .true.
     !> Times that a ring is smoothed: waves along the edge fall off the faster the shorter they are
     integer :: smoothings = 2
     !> Compliances of the shortest and of the longest waves in slip, over that of a node, (P5): the shortest ones are known, and

@@ -274,7 +274,7 @@ contains
     !$omp end parallel do
     load = 0.0_wp
     load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
-    if (any(self%lattice%periodic)) load(about_z) = 0.0_wp                     ! a torque does not repeat
+    if (self%lattice%is_periodic()) load(about_z) = 0.0_wp                     ! a torque does not repeat
   end function resultants
 
   !> Compute r = kappa/(2 pi lambda a) for a contact of n nodes, a its radius, (F8) [Pa/m].
@@ -349,7 +349,7 @@ contains
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
                            state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
-    state%clipped = touches_rim(state) .and. .not. any(self%lattice%periodic)
+    state%clipped = touches_rim(state) .and. .not. self%lattice%is_periodic()
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
   end subroutine complete_state

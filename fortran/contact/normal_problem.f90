@@ -267,7 +267,7 @@ contains
     end if
     ! one by one: the largest of several numbers hides one that is not a number
     state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
-    state%clipped = touches_rim(state) .and. .not. any(self%lattice%periodic)
+    state%clipped = touches_rim(state) .and. .not. self%lattice%is_periodic()
     if (state%converged) state%stopped = within_tolerance
     if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
     ! penetration without any pressure is infinite as well, but a state that can be shown

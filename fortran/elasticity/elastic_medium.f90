@@ -121,7 +121,7 @@ module hc_elastic_medium
       real(wp), intent(in) :: basis(2, 2)
       !> Number of columns and rows of the window
       integer, intent(in) :: length(2)
-      !> Blocks that are wanted: 1, that of the pressure, or all
+      !> Number of blocks: 1, of the pressure, or all
       integer, intent(in) :: n
       !> The transform, without that of springs
       class(block_symbols_t), allocatable, intent(out) :: symbols

@@ -47,7 +47,7 @@ contains
     options = now%problem%options%newton
     if (now%residual_tangential < options%front_residual) return
     ! nodes of slender cells are coupled beyond the reach of a relaxation node by node
-    if (maxval(norm2(now%problem%lattice%basis, dim=1)) > 4.0_wp*minval(norm2(now%problem%lattice%basis, dim=1))) return
+    if (.not. all(now%problem%lattice%near_neighbors())) return
     ! a pressure that moves with the shear traction moves the fronts again
     if (now%pressure_feels_shear .or. (now%without_start .and. now%first)) return
     if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return

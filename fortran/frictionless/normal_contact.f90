@@ -182,7 +182,7 @@ contains
         else
           where (level%candidate) state%pressure = 1.0_wp
           ! the same pressure everywhere would move no surface from its mean plane
-          if (any(level%lattice%periodic) .and. goal%control(normal) /= force_control) then
+          if (level%lattice%is_periodic() .and. goal%control(normal) /= force_control) then
             state%pressure = max(goal%value(normal) - level%initial_gap, 0.0_wp)
           end if
         end if

@@ -76,7 +76,7 @@ contains
 
     self%space = space
     ! on a window that repeats, single precision is rounded from the spectrum of the other
-    if ((exact .or. all(self%lattice%periodic)) .and. .not. self%exact) then
+    if ((exact .or. self%lattice%is_periodic()) .and. .not. self%exact) then
       call new_fft_flexibility(self%flexibility, self%lattice, self%medium, error, normal_only=.true., space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return

@@ -90,7 +90,7 @@ contains
         call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
         ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; it closes it from mean planes
-        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. any(level%lattice%periodic)), &
+        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. level%lattice%is_periodic()), &
                      tolerance, max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution

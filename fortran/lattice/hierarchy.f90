@@ -58,7 +58,7 @@ contains
     side = minval(extent)
     do while (side >= 2*smallest_side)
       ! every second node of a window that repeats is one that repeats
-      if (any(lattice%periodic) .and. any(modulo(extent, [8, 2]) /= 0)) exit
+      if (lattice%is_periodic() .and. any(modulo(extent, [8, 2]) /= 0)) exit
       extent = extent/2
       side = side/2
       level_count = level_count + 1

@@ -59,6 +59,10 @@ module hc_lattice
     procedure :: unit_basis
     !> Column and row of a neighbor of a node
     procedure :: neighbor
+    !> Neighbours at the ends of edges that are not much longer than the shortest
+    procedure :: near_neighbors
+    !> Whether the window repeats, both ways
+    procedure :: is_periodic
     !> Values of the neighbors at all nodes
     procedure, private :: shifted_field, shifted_zone
     generic :: shifted => shifted_field, shifted_zone
@@ -110,7 +114,7 @@ contains
     else if (.not. lattice%cell_area() > 1.0e-3_wp*lattice%spacing()**2) then
       call raise(error, status%invalid_input, &
                  'the lattice basis is degenerate: two vectors in counter-clockwise order expected')
-    else if (any(lattice%periodic) .and. .not. (all(lattice%periodic) .and. modulo(lattice%extent(1), 4) == 0)) then
+    else if (any(lattice%periodic) .and. .not. (lattice%is_periodic() .and. modulo(lattice%extent(1), 4) == 0)) then
       call raise(error, status%invalid_input, 'a window that repeats: both ways, and a multiple of four columns expected')
     end if
   end subroutine check_lattice
@@ -239,6 +243,22 @@ contains
     where (self%periodic) there = modulo(there - 1, self%extent) + 1
     if (any(there < 1 .or. there > self%extent)) there = 0
   end function neighbor
+
+  !> Return which neighbors lie at the ends of edges that are not much longer than the shortest: all but on slender cells.
+  pure function near_neighbors(self) result(near)
+    class(lattice_t), intent(in) :: self
+    logical :: near(6)
+
+    associate (edges => norm2(matmul(self%basis, real(neighbors, wp)), dim=1))
+      near = edges < 2.5_wp*minval(edges)
+    end associate
+  end function near_neighbors
+
+  !> Return whether the window repeats.
+  pure logical function is_periodic(self)
+    class(lattice_t), intent(in) :: self
+    is_periodic = all(self%periodic)
+  end function is_periodic
 
   !> Return the values of a field at a neighbor of each node; 0 beyond the end of the window.
   pure function shifted_field(self, field, k) result(shifted)
@@ -394,7 +414,7 @@ contains
     !> First and last column and row of the part
     integer, intent(in) :: low(2), high(2)
     type(multilevel_options_t), intent(in) :: options
-    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size() .and. .not. any(self%periodic)
+    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size() .and. .not. self%is_periodic()
   end function is_worth_parting
 
   !> Return lattice and window of a part.

@@ -54,7 +54,7 @@ contains
     !$omp end parallel do
   end subroutine prolong
 
-  !> Take a row of a coarse field, continued beyond its window, where a window that repeats goes on.
+  !> Take a row of a coarse field and its continuation; a periodic window continues with its other side.
   pure subroutine take_row(lattice, field, row, held, first, values)
     !> Coarse lattice and window, and field (n_col, n_row)
     type(lattice_t), intent(in) :: lattice
@@ -69,7 +69,7 @@ contains
 
     r = row - lattice%first(2) + 1
     associate (start => lattice%first(1), n => shape(field))
-      if (all(lattice%periodic)) then
+      if (lattice%is_periodic()) then
         do c = first, ubound(values, 1)
           values(c) = field(modulo(c - start, n(1)) + 1, modulo(r - 1, n(2)) + 1)
         end do
@@ -124,7 +124,7 @@ contains
                                                           coarse(max(1, 1 + c):min(last, last + c), r))
         end associate
       end do
-      if (all(coarse_lattice%periodic)) around([1, last]) = 1.0_wp
+      if (coarse_lattice%is_periodic()) around([1, last]) = 1.0_wp
       do col = 1, last
         if (coarse(col, row) > 0.0_wp .or. .not. around(col) > 0.0_wp) cycle
         beyond = 0.0_wp

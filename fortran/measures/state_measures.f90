@@ -222,7 +222,7 @@ contains
     found%stick_center = ieee_value(1.0_wp, ieee_quiet_nan)
     found%stick_lower = found%stick_center
     found%stick_upper = found%stick_center
-    if (any(lattice%periodic)) then
+    if (lattice%is_periodic()) then
       found%stick = cells_of(lattice, space%count(zone))
       return
     end if
@@ -254,7 +254,7 @@ contains
     found%max_pressure = space%max(state%pressure)
     associate (contact => state%zone /= separated)
       found%elastic_energy = normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, state%motion(normal))
-      if (any(lattice%periodic)) then
+      if (lattice%is_periodic()) then
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))

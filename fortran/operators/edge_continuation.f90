@@ -53,7 +53,7 @@ module hc_edge_continuation
 contains
 
   !> Find the rings around the active nodes.
-  subroutine new_edge_extension(self, active, space, options, within)
+  subroutine new_edge_extension(self, active, space, options, within, near)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, n_row)
@@ -64,6 +64,8 @@ contains
     type(preconditioner_options_t), intent(in) :: options
     !> Nodes beyond which there are no rings (n_col, n_row); absent: all of the window
     logical, intent(in), contiguous, optional :: within(:, :)
+    !> Neighbours that a ring consists of; absent: all
+    logical, intent(in), optional :: near(6)
 
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
@@ -75,7 +77,8 @@ contains
 
     n_col = size(active, 1)
     width = n_col + 2
-    step = pack(neighbor_steps(width), options%near)
+    step = neighbor_steps(width)
+    if (present(near)) step = pack(step, near)
     call mark_window(active, space, mark, within)
     n_active = space%count(active)
     call find_edge(active, mark, step, space, frontier)

@@ -85,7 +85,7 @@ contains
     integer :: length(2)
 
     length = lattice%extent
-    if (.not. all(lattice%periodic)) length = good_size(2*lattice%extent - 1)
+    if (.not. lattice%is_periodic()) length = good_size(2*lattice%extent - 1)
   end function transform_length
 
   !> Refuse arrays that do not fit the window and the components.

@@ -107,7 +107,7 @@ contains
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, medium)
     call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
-    if (all(lattice%periodic)) then
+    if (lattice%is_periodic()) then
       call set_periodic_spectra(operator%convolution, lattice, medium, source%transformed)
     else if (only_normal .and. present(kernel)) then
       call kernel%cover(lattice, medium, shared)

@@ -98,7 +98,7 @@ contains
     n_component = merge(2, 1, self%tangential)
     self%shape = [lattice%extent, n_component]
     length = good_size(lattice%extent)
-    if (all(lattice%periodic)) length = lattice%extent
+    if (lattice%is_periodic()) length = lattice%extent
     self%length = length
     call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
                          space, error)

@@ -136,7 +136,8 @@ contains
     !> Nodes in contact, and those of them that slip
     logical, intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
 
-    call new_edge_extension(self%front, active .and. .not. slips, self%space, self%options, within=active)
+    call new_edge_extension(self%front, active .and. .not. slips, self%space, self%options, within=active, &
+                            near=self%beside)
   end subroutine new_front
 
   !> Find the nodes in contact near slip, a rhombus of the lattice about each that slips.

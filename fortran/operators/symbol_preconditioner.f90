@@ -9,7 +9,7 @@ module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
-  use hc_lattice, only: lattice_t, neighbors
+  use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -28,6 +28,8 @@ module hc_symbol_preconditioner
     type(preconditioner_options_t) :: options
     !> Columns and rows of the window
     integer :: extent(2) = 0
+    !> Neighbours at the ends of short edges
+    logical :: beside(6) = .true.
     !> Space of the fields
     type(field_space_t) :: space
     !> Continuation of displacements beyond the contact; none before there are active nodes
@@ -78,9 +80,7 @@ contains
     self%extent = lattice%extent
     self%space = space
     self%options = options
-    associate (edges => norm2(matmul(lattice%basis, real(neighbors, wp)), dim=1))
-      self%options%near = edges < 2.5_wp*minval(edges)
-    end associate
+    self%beside = lattice%near_neighbors()
   end subroutine new_symbol_preconditioner
 
   !> Set the nodes in contact, and their springs.
@@ -108,7 +108,7 @@ contains
 
     call self%release()
     if (.not. allocated(self%edge)) allocate (self%edge)
-    call new_edge_extension(self%edge, active, self%space, self%options)
+    call new_edge_extension(self%edge, active, self%space, self%options, near=self%beside)
   end subroutine continue_beyond
 
   !> Take memory for displacements, zero, and tractions.

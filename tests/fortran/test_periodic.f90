@@ -176,6 +176,33 @@ contains
     call check_true(error, state%converged .and. .not. state%clipped, 'converged')
   end subroutine solve
 
+  !> Three waves on a unit square: a rough surface.
+  subroutine waves(lattice, gap, error)
+    type(lattice_t), intent(out) :: lattice
+    real(wp), intent(out) :: gap(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), dimension(size(gap, 1), size(gap, 2)) :: x, y
+
+    call new_lattice(lattice, oblique_basis(1.0_wp/size(gap, 1), 1.0_wp, 0.5_wp*pi), [0, 0], shape(gap), error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    call lattice%coordinates(x, y)
+    gap = sin(2.0_wp*pi*x + 1.0_wp) + 0.4_wp*sin(2.0_wp*pi*(2*x + y)) + 0.3_wp*cos(2.0_wp*pi*(3*y - x))
+  end subroutine waves
+
+  !> A contact with friction of bodies with E* = 1.
+  subroutine new_contact(lattice, beta, gamma, mu, gap, contact, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: beta, gamma, mu, gap(:, :)
+    type(frictional_contact_t), intent(out) :: contact
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: problem
+
+    call new_friction_problem(problem, lattice, elastic_pair_t(1.0_wp/pi, beta/pi, gamma/pi), gap, gap < huge(1.0_wp), &
+                              coulomb_t(mu), .false., error)
+    if (.not. allocated(error)) call new_frictional_contact(contact, problem, error)
+  end subroutine new_contact
+
   !> A wave along the second reciprocal vector, on n nodes; its height is 1 (REACH: H. M. Westergaard, J. Appl. Mech. 6, 1939).
   subroutine test_westergaard(error)
     type(error_t), allocatable, intent(out) :: error
@@ -277,13 +304,10 @@ contains
     integer, parameter :: n = 64
     type(lattice_t) :: lattice
     type(contact_state_t) :: by_load, by_gap
-    real(wp) :: gap(n, n), x(n, n), y(n, n)
+    real(wp) :: gap(n, n)
 
-    call new_lattice(lattice, oblique_basis(1.0_wp/n, 1.0_wp, 0.5_wp*pi), [0, 0], [n, n], error)
+    call waves(lattice, gap, error)
     if (allocated(error)) return
-    lattice%periodic = .true.
-    call lattice%coordinates(x, y)
-    gap = sin(2.0_wp*pi*x + 1.0_wp) + 0.4_wp*sin(2.0_wp*pi*(2*x + y)) + 0.3_wp*cos(2.0_wp*pi*(3*y - x))
     call solve(lattice, gap, force_control, 0.6_wp, by_load, error)
     if (allocated(error)) return
     call solve(lattice, gap, displacement_control, by_load%motion(1), by_gap, error)
@@ -344,27 +368,20 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 64
     type(lattice_t) :: lattice
-    type(friction_problem_t) :: problem
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: pressed, less, before, after
-    real(wp) :: gap(n, n), x(n, n), y(n, n), reference(n, n, 2), area
+    real(wp) :: gap(n, n), reference(n, n, 2), area
     real(wp), parameter :: mu = 0.4_wp, p = 0.6_wp, q = 0.1_wp
     type(load_target_t) :: target
 
-    call new_lattice(lattice, oblique_basis(1.0_wp/n, 1.0_wp, 0.5_wp*pi), [0, 0], [n, n], error)
+    call waves(lattice, gap, error)
     if (allocated(error)) return
-    lattice%periodic = .true.
     area = lattice%cell_area()*lattice%size()
-    call lattice%coordinates(x, y)
-    gap = sin(2.0_wp*pi*x + 1.0_wp) + 0.4_wp*sin(2.0_wp*pi*(2*x + y)) + 0.3_wp*cos(2.0_wp*pi*(3*y - x))
     call solve(lattice, gap, force_control, p, pressed, error)
     if (allocated(error)) return
     call solve(lattice, gap, force_control, p - q/mu, less, error)
     if (allocated(error)) return
-    call new_friction_problem(problem, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, gap < huge(1.0_wp), coulomb_t(mu), &
-                              .false., error)
-    if (allocated(error)) return
-    call new_frictional_contact(contact, problem, error)
+    call new_contact(lattice, 0.0_wp, 0.0_wp, mu, gap, contact, error)
     if (allocated(error)) return
     reference = 0.0_wp
     call new_friction_state(before, lattice, field_space_t())
@@ -388,7 +405,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 32
     type(lattice_t) :: lattice
-    type(friction_problem_t) :: problem
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: before, after
     real(wp) :: gap(n, n), reference(n, n, 2)
@@ -401,10 +417,7 @@ contains
     gap = 0.0_wp
     reference = 0.0_wp
     do k = 1, 2
-      call new_friction_problem(problem, lattice, elastic_pair_t(1.0_wp/pi, beta(k)/pi, 0.2_wp/pi), gap, gap < huge(1.0_wp), &
-                                coulomb_t(mu), .false., error)
-      if (allocated(error)) return
-      call new_frictional_contact(contact, problem, error)
+      call new_contact(lattice, beta(k), 0.2_wp, mu, gap, contact, error)
       if (allocated(error)) return
       call new_friction_state(before, lattice, field_space_t())
       call contact%solve_step(before, reference, load_target_t(by_loads, [load, 0.3_wp*load, 0.1_wp*load, 0.0_wp]), 1.0e-10_wp, &
@@ -426,24 +439,17 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 64
     type(lattice_t) :: lattice
-    type(friction_problem_t) :: problem
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: before, after
-    real(wp) :: gap(n, n), x(n, n), y(n, n), reference(n, n, 2), area, load
+    real(wp) :: gap(n, n), reference(n, n, 2), area, load
     real(wp), parameter :: mu = 0.3_wp, p(7) = [0.2_wp, 1.0_wp, 1.0_wp, 1.0_wp, 8.0_wp, 20.0_wp, 20.0_wp], &
                            q(7) = [0.0_wp, 0.0_wp, 0.15_wp, -0.1_wp, 0.0_wp, 0.0_wp, 2.0_wp]
     integer :: k
 
-    call new_lattice(lattice, oblique_basis(1.0_wp/n, 1.0_wp, 0.5_wp*pi), [0, 0], [n, n], error)
+    call waves(lattice, gap, error)
     if (allocated(error)) return
-    lattice%periodic = .true.
     area = lattice%cell_area()*lattice%size()
-    call lattice%coordinates(x, y)
-    gap = sin(2.0_wp*pi*x + 1.0_wp) + 0.4_wp*sin(2.0_wp*pi*(2*x + y)) + 0.3_wp*cos(2.0_wp*pi*(3*y - x))
-    call new_friction_problem(problem, lattice, elastic_pair_t(1.0_wp/pi, 0.25_wp/pi, 0.3_wp/pi), gap, gap < huge(1.0_wp), &
-                              coulomb_t(mu), .false., error)
-    if (allocated(error)) return
-    call new_frictional_contact(contact, problem, error)
+    call new_contact(lattice, 0.25_wp, 0.3_wp, mu, gap, contact, error)
     if (allocated(error)) return
     reference = 0.0_wp
     call new_friction_state(before, lattice, field_space_t())

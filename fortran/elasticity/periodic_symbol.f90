@@ -62,6 +62,7 @@ contains
     real(wp), dimension(0:degree, 0:degree) :: wave, value
     real(wp) :: node(0:degree), side(2), rest(0:n_line, n), weight(size(hexagon)), x(size(hexagon))
     real(wp), allocatable :: at_nodes(:, :, :, :, :)
+    integer, allocatable :: terms(:, :)
     integer :: a, b, half, k, m, stretch
 
     self%basis = basis
@@ -77,13 +78,13 @@ contains
     do a = 0, degree
       wave(a, :) = cos(a*pi*([(real(b, wp), b=0, degree)] + 0.5_wp)/(degree + 1))*merge(1.0_wp, 2.0_wp, a == 0)/(degree + 1)
     end do
+    terms = terms_beyond(self%near, stretch*hexagon)
     allocate (at_nodes(0:degree, 0:degree, 0:n_line, n, 2))
     allocate (self%coefficient(0:degree, 0:degree, 0:n_line, n, 2))
     do half = 1, 2
       do b = 0, degree
         do a = 0, degree
-          call sum_beyond(self, 0.5_wp*pi*[1.0_wp + node(a), node(b) + merge(1.0_wp, -1.0_wp, half == 1)], stretch*hexagon, &
-                          weight, rest)
+          call sum_beyond(self, 0.5_wp*pi*[1.0_wp + node(a), node(b) + merge(1.0_wp, -1.0_wp, half == 1)], terms, weight, rest)
           at_nodes(a, b, :, :, half) = rest
         end do
       end do
@@ -98,58 +99,75 @@ contains
     end do
   end subroutine new_periodic_symbols
 
-  !> Sum the terms that are not summed at each frequency, without sines and without the factors that lines have for themselves.
-  pure subroutine sum_beyond(self, theta, hexagons, weight, total)
-    type(periodic_symbols_t), intent(in) :: self
-    !> Phases
-    real(wp), intent(in) :: theta(2)
-    !> Hexagons, and the weights of their sums
+  !> List the terms that are not summed at each frequency: i, j, the first hexagon that they lie in, and the line or 0 (4, terms).
+  pure function terms_beyond(near, hexagons) result(terms)
+    !> Largest |i| and |j| of the others
+    integer, intent(in) :: near(2)
+    !> Numbers of the hexagons
     integer, intent(in) :: hexagons(:)
-    real(wp), intent(in) :: weight(:)
-    !> Sums: off the lines and on each (0:n_line, symbol)
-    real(wp), intent(out) :: total(0:, :)
-    real(wp) :: part(0:n_line, size(total, 2), size(hexagons)), half(3)
-    integer :: i, j, k, m, last, shift(3)
+    integer, allocatable :: terms(:, :)
+    integer :: i, j, k, m, n, last, shift(3)
 
-    part = 0.0_wp
     last = 3*hexagons(size(hexagons)) + 1
+    allocate (terms(4, (2*last + 1)**2))
+    n = 0
     do j = -last, last
       do i = -last, last
-        if (abs(i) <= self%near(1) .and. abs(j) <= self%near(2)) cycle
-        ! the first of the hexagons that this term lies in
+        if (abs(i) <= near(1) .and. abs(j) <= near(2)) cycle
         m = findloc(3*hexagons + 1 >= max(abs(i), abs(j)) .and. 5*hexagons + 2 >= abs(i + j), .true., dim=1)
         if (m == 0) cycle
         shift = [i, j, j - i]
-        half = 0.5_wp*[theta(1), theta(2), theta(2) - theta(1)] + pi*shift
         do k = n_line, 1, -1
           if (shift(line(1, k)) == line(2, k)) exit
         end do
-        if (k > 0) half(line(1, k)) = 1.0_wp
-        part(k, :, m) = part(k, :, m) + response(self, 0.5_wp*theta(1) + pi*i, 0.5_wp*theta(2) + pi*j, size(total, 2)) &
-                        /product(half)
+        n = n + 1
+        terms(:, n) = [i, j, m, k]
       end do
     end do
+    terms = terms(:, :n)
+  end function terms_beyond
+
+  !> Sum these terms, without sines and without the factors that lines have for themselves.
+  pure subroutine sum_beyond(self, theta, terms, weight, total)
+    type(periodic_symbols_t), intent(in) :: self
+    !> Phases
+    real(wp), intent(in) :: theta(2)
+    !> The terms, and the weights of the sums over hexagons
+    integer, intent(in) :: terms(:, :)
+    real(wp), intent(in) :: weight(:)
+    !> Sums: off the lines and on each (0:n_line, symbol)
+    real(wp), intent(out) :: total(0:, :)
+    real(wp) :: part(0:n_line, size(total, 2), size(weight)), half(3), f(n_symbol)
+    integer :: m, t
+
+    part = 0.0_wp
+    do t = 1, size(terms, 2)
+      associate (i => terms(1, t), j => terms(2, t), hexagon => terms(3, t), k => terms(4, t))
+        half(1:2) = 0.5_wp*theta + pi*[i, j]
+        half(3) = 0.5_wp*(theta(2) - theta(1)) + pi*(j - i)
+        if (k > 0) half(line(1, k)) = 1.0_wp
+        f = response(self, 0.5_wp*theta(1) + pi*i, 0.5_wp*theta(2) + pi*j)/(half(1)*half(2)*half(3))
+        part(k, :, hexagon) = part(k, :, hexagon) + f(:size(part, 2))
+      end associate
+    end do
     total = 0.0_wp
-    do m = 1, size(hexagons)
+    do m = 1, size(weight)
       total = total + sum(weight(m:))*part(:, :, m)
     end do
   end subroutine sum_beyond
 
   !> Compute the transforms F of the kernels at a wave vector.
-  pure function response(self, h1, h2, n) result(f)
+  pure function response(self, h1, h2) result(f)
     type(periodic_symbols_t), intent(in) :: self
     !> Half phases
     real(wp), intent(in) :: h1, h2
-    !> How many
-    integer, intent(in) :: n
-    real(wp) :: f(n), square, root, d(2)
+    real(wp) :: f(n_symbol), square, root, d(2)
 
     ! the wave vector times half the area of a cell
     d = [h1*self%basis(2, 2) - h2*self%basis(2, 1), h2*self%basis(1, 1) - h1*self%basis(1, 2)]
     square = dot_product(d, d)
     root = pi*self%area/sqrt(square)
-    f(1) = root
-    if (n > 1) f(2:) = [root*d(2)**2/square, -root*d(1)*d(2)/square, -pi*self%area*d(1)/square, -pi*self%area*d(2)/square]
+    f = [root, root*d(2)**2/square, -root*d(1)*d(2)/square, -pi*self%area*d(1)/square, -pi*self%area*d(2)/square]
   end function response
 
   !> Compute the symbols at all frequencies with the same first index.
@@ -160,6 +178,7 @@ contains
     !> Symbols by the second index (0:number of rows - 1, symbol); K1, K_xx, K_xy, those of K_x and K_y over i [m]
     real(wp), intent(out) :: symbol(0:, :)
     real(wp) :: row(0:degree, 0:n_line, size(symbol, 2), 2), wave(0:degree), half(3), sine(3), factor(0:n_line)
+    real(wp) :: response_here(n_symbol)
     integer :: g, i, j, k, m, side
 
     half(1) = pi*f/self%length(1)
@@ -190,8 +209,9 @@ contains
       end do
       do j = -self%near(2), self%near(2)
         do i = -self%near(1), self%near(1)
-          symbol(g, :) = symbol(g, :) + sinc(half(1) + pi*i)*sinc(half(2) + pi*j)*sinc(half(3) + pi*(j - i)) &
-                         *response(self, half(1) + pi*i, half(2) + pi*j, size(symbol, 2))
+          response_here = sinc(half(1) + pi*i)*sinc(half(2) + pi*j)*sinc(half(3) + pi*(j - i)) &
+                          *response(self, half(1) + pi*i, half(2) + pi*j)
+          symbol(g, :) = symbol(g, :) + response_here(:size(symbol, 2))
         end do
       end do
       ! a frequency that is its own opposite: the odd symbols vanish

@@ -74,7 +74,7 @@ contains
     worst = 0.0_wp
     odd = [1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
     do case = 1, 3
-      basis = oblique_basis(1.0_wp, [1.0_wp, 0.2_wp, 4.0_wp], [1.1_wp, 0.5_wp*pi, 1.8_wp], case)
+      basis = oblique_basis(1.0_wp, [1.0_wp, 0.5_wp, 3.0_wp], [1.1_wp, 0.5_wp*pi, 1.8_wp], case)
       call new_periodic_symbols(fine, basis, [n, n], n_symbol)
       call new_periodic_symbols(coarse, 2.0_wp*basis, [n/2, n/2], n_symbol)
       do f = 0, n/2

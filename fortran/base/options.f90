@@ -44,9 +44,11 @@ module hc_options
   type :: normal_options_t
     !> Length of a projected step, (N3): M is a little more than the inverse of the operator
     real(wp) :: step_length = 0.85_wp
-    !> Factor by which projected steps have to bring the residual down every other time, or sets are fixed: on rough
-    !> surfaces they would change without end
+    !> Factor by which projected steps have to bring the residual down every other time, or their length is searched for: on rough
+    !> surfaces sets would change without end
     real(wp) :: progress = 0.5_wp
+    !> Length of the first searched step; share of the length below which none is tried
+    real(wp) :: searched_length = 0.5_wp, least_searched = 0.1_wp
     !> Steps that are not judged by it: the first ones cut off most of a wrong start
     integer :: first_steps = 3
     !> A fixed set is changed when its residual has come down by this factor: then the next one can be trusted

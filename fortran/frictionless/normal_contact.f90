@@ -193,7 +193,11 @@ contains
           call move_alloc(state%pressure, coarse%pressure)
           call move_alloc(state%gap, coarse%gap)
         else
-          if (allocated(passing)) deallocate (passing)
+          self%iterate%searches = .false.
+          if (allocated(passing)) then
+            self%iterate%searches = passing%searches
+            deallocate (passing)
+          end if
           coarse = contact_state_t()
           call solve_finest(self, goal, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return

@@ -1,16 +1,17 @@
 !> Steps of an iteration for frictionless contact: direction and length.
 !>
-!> Equations: docs/theory/normal_contact.md, (N3) to (N5), (N7).
+!> Equations: docs/theory/normal_contact.md, (N3) to (N5), (N7), (N8).
 module hc_normal_directions
   use hc_precision, only: wp, sp
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
-  use hc_normal_rows, only: residual_row, sum_row, projected_row, direction_row
+  use hc_normal_rows, only: residual_row, sum_row, projected_row, direction_row, dot_single
   implicit none
   private
 
-  public :: find_residual, projected_step, next_direction, next_sprung_direction, curvature, find_sprung_step
+  public :: find_residual, projected_step, searched_step, steepness, next_direction, next_sprung_direction, curvature, &
+            find_sprung_step
 
 contains
 
@@ -89,6 +90,102 @@ contains
     end do
     !$omp end parallel do
   end subroutine projected_step
+
+  !> Compute the step d to max(p + length (z + share of the last step), 0) on the active nodes and to zero elsewhere, conjugate to
+  !> the last step before the cut.
+  !>
+  !> What the cut changes of a prescribed load is taken off along the punch before it, so that there is no tension, (N8).
+  subroutine searched_step(level, now, length, follows, steep)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    !> Length of the step before the cut
+    real(wp), intent(in) :: length
+    !> d and its product are those of the last step; otherwise there is none
+    logical, intent(in) :: follows
+    !> The step goes down, not much less than without the cut
+    logical, intent(out) :: steep
+    !> Newton's method for the part along the punch, and the error of the load that is left to rounding
+    integer, parameter :: max_cuts = 12
+    real(wp), parameter :: rounding = 1.0e-7_wp
+    !> Share of the steepness before the cut
+    real(wp), parameter :: least_share = 0.1_wp
+    real(wp), dimension(size(now%p, 2)) :: sum_z, part, punch
+    real(wp) :: mean, off, lack, uncut
+    real(sp) :: back
+    integer :: row, try
+
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), &
+                     now%kd(from:to, row, 1), part(row))
+      end associate
+    end do
+    !$omp end parallel do
+    mean = 0.0_wp
+    if (now%by_load) mean = sum(sum_z)/now%punch_sum
+    back = 0.0_sp
+    if (follows) back = max(real(-sum(part)/curvature(level, now), sp), 0.0_sp)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        where (now%active(from:to, row))
+          now%z(from:to, row, 1) = now%z(from:to, row, 1) + back*now%d(from:to, row, 1)
+        else where
+          now%z(from:to, row, 1) = 0.0_sp
+        end where
+        part(row) = dot_single(to - from + 1, now%r(from:to, row, 1), now%z(from:to, row, 1))
+      end associate
+    end do
+    !$omp end parallel do
+    uncut = length*sum(part)
+    off = length*mean
+    do try = 1, max_cuts
+      !$omp parallel do schedule(static) num_threads(level%space%threads)
+      do row = 1, size(now%p, 2)
+        now%d(:, row, 1) = 0.0_sp
+        associate (from => now%span(1, row), to => now%span(2, row))
+          associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+                     z => now%z(from:to, row, 1))
+            if (now%by_load) then
+              call projected_row(now%p_unit, p, active, d, part(row), [length, off], z, now%punch(from:to, row), punch(row))
+            else
+              call projected_row(now%p_unit, p, active, d, part(row), [length, 0.0_wp], z)
+            end if
+          end associate
+        end associate
+      end do
+      !$omp end parallel do
+      if (.not. now%by_load) exit
+      lack = sum(part) - now%pressures/now%p_unit
+      if (abs(lack) <= rounding*now%pressures/now%p_unit .or. .not. sum(punch) > 0.0_wp) exit
+      off = off + lack/sum(punch)
+    end do
+    steep = steepness(level, now) > least_share*max(uncut, 0.0_wp)
+  end subroutine searched_step
+
+  !> Compute -g^T d, the fall of the energy along a direction by its length.
+  real(wp) function steepness(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(in) :: now
+    real(wp) :: part(size(now%p, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        ! the gap may be infinite where nothing can touch
+        part(row) = sum((now%approach - level%initial_gap(from:to, row) - now%w(from:to, row))*now%d(from:to, row, 1), &
+                        mask=abs(now%d(from:to, row, 1)) > 0.0_sp)
+      end associate
+    end do
+    !$omp end parallel do
+    steepness = sum(part)/now%w_unit
+  end function steepness
 
   !> Compute the next direction of conjugate gradients.
   subroutine next_direction(level, now, recurrence)

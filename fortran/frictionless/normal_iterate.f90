@@ -54,6 +54,8 @@ module hc_normal_iterate
     real(wp) :: pressures = 0.0_wp
     !> Active nodes, now and next
     integer :: n_active = 0, n_next = 0
+    !> Sets change without end, here or on the coarser lattice: steps are searched
+    logical :: searches = .false.
   end type normal_iterate_t
 
 contains
@@ -279,7 +281,8 @@ contains
     !$omp end parallel do
     if (.not. allocated(now%punch)) return
     now%punch_sum = level%space%sum(now%punch)
-    if (.not. now%punch_sum > 0.0_wp) deallocate (now%punch)
+    ! nodes that came back are not in it
+    if (2*level%space%count(now%punch > 0.0_sp) < now%n_active) deallocate (now%punch)
   end subroutine set_active
 
   !> Find the columns between which the active nodes of each row lie, those of earlier sets included.
@@ -350,8 +353,8 @@ contains
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              - now%compliance(from:to, row)*now%p(from:to, row)
         call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
-        ! nodes that left the set carry no pressure, not even what single precision would leave of it
-        where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
+        ! nodes that left the set carry no pressure after a whole step, not even what single precision would leave of it
+        if (share >= 1.0_wp) where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              + now%compliance(from:to, row)*now%p(from:to, row)
       end associate

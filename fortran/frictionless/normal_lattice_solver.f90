@@ -5,8 +5,8 @@
 !> projected gradient method, p <- max(p + c M r, 0), finds pressure and set
 !> together, with one product of the operator; M is close enough to the inverse of
 !> the operator for that. Once the set stands still the steps become those of preconditioned
-!> conjugate gradients. Where a set changes without end (rough surfaces), it is fixed until
-!> the linear problem on it is solved well enough to trust the next one.
+!> conjugate gradients. Where sets change without end (rough surfaces), the
+!> steps are conjugate to the last one and their length is searched for.
 !>
 !> A compliant layer between the bodies gives each active node a spring, (N6). In the first iterations it is linearised anew in
 !> each: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
@@ -19,7 +19,7 @@
 !> I. A. Polonsky and L. M. Keer, Wear 231, 1999, 206-219; M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 2003,
 !> 865-888.
 !>
-!> Equations: docs/theory/normal_contact.md, (N2) to (N7).
+!> Equations: docs/theory/normal_contact.md, (N2) to (N8).
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -30,21 +30,28 @@ module hc_normal_lattice_solver
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, &
     linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
-  use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, curvature, &
-    find_sprung_step
+  use hc_normal_directions, only: find_residual, projected_step, searched_step, steepness, next_direction, &
+    next_sprung_direction, curvature, find_sprung_step
   implicit none
   private
 
   public :: solve_on_normal_lattice
 
+  !> Kinds of steps.
+  integer, parameter :: projected = 1, searched = 2, conjugate = 3
+
   !> Progress of an iteration.
   type :: progress_t
     !> The last residual, the one before it, and the best of those before
     real(wp) :: best(3) = huge(1.0_wp)
-    !> The set of active nodes is fixed until its linear problem is solved; some set was fixed
-    logical :: fixed = .false., fresh = .false.
+    !> The set of active nodes is fixed until its linear problem is solved
+    logical :: fixed = .false.
     !> Residual where the set was fixed
     real(wp) :: fixed_start = 1.0_wp
+    !> Length of searched steps before their cut
+    real(wp) :: length = 1.0_wp
+    !> Kind of the last step
+    integer :: step = projected
     !> Times that the pressure was fitted to the load
     integer :: fits = 0
   contains
@@ -139,6 +146,7 @@ contains
     logical :: changed, compliant, anew, corrected, follows
 
     sweeps = 0
+    progress%length = level%options%normal%searched_length
     call set_start(level, now, candidate, error)
     if (allocated(error)) return
     allocate (next, mold=candidate)
@@ -162,39 +170,22 @@ contains
       end if
       if (compliant) call follow_law(level, now, changed, sweeps, anew)
       if (now%by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
-      if (.not. (changed .and. progress%fixed)) then
-        if (now%by_load .and. changed) call find_approach(level, now)
-        call find_residual(level, now)
-        call level%precondition(now%r, now%z)
-      end if
-      if (changed) then
-        call projected_step(level, now, progress%fixed)
-      else if (compliant) then
-        call next_sprung_direction(level, now, anew)
-      else
-        call next_direction(level, now, recurrence)
-      end if
-      anew = changed .or. (anew .and. .not. compliant)
+      if (now%by_load .and. changed) call find_approach(level, now)
+      call find_residual(level, now)
+      call level%precondition(now%r, now%z)
+      call find_step(level, now, progress, recurrence, changed, anew)
       call level%multiply(now%d, now%kd)
-      share = 1.0_wp
-      if (.not. changed) then
-        if (compliant) then
-          share = find_sprung_step(level, now)
-        else
-          share = recurrence%step_length(curvature(level, now))
-        end if
-        if (.not. share > 0.0_wp) then
-          ! the residual has reached round-off of single precision: a product in double precision is next, or the end
-          if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return
-          now%closing_error = huge(1.0_wp)
-          cycle
-        end if
+      share = share_of_step(level, now, progress, recurrence)
+      if (.not. share > 0.0_wp) then
+        ! the residual has reached round-off of single precision: a product in double precision is next, or the end
+        if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return
+        now%closing_error = huge(1.0_wp)
+        cycle
       end if
-      ! a step of a fixed set moves pressures whose approach was not found; close to the solution rounding errors would add up
-      follows = now%by_load .and. now%residual > sqrt(epsilon(1.0_wp)) .and. &
-                .not. (compliant .or. (changed .and. progress%fixed))
+      ! close to the solution rounding errors would add up
+      follows = now%by_load .and. now%residual > sqrt(epsilon(1.0_wp)) .and. .not. compliant
       call advance(level, now, share, follows)
-      if (changed .and. .not. now%by_load) call rescale(level, now)
+      if (progress%step == projected .and. .not. now%by_load) call rescale(level, now)
     end do
   end subroutine iterate
 
@@ -229,7 +220,7 @@ contains
   !> Judge the progress of the residual, and fix the set where it changes without end.
   pure subroutine judge(self, now, options, sweeps, compliant, changed)
     class(progress_t), intent(inout) :: self
-    type(normal_iterate_t), intent(in) :: now
+    type(normal_iterate_t), intent(inout) :: now
     type(normal_options_t), intent(in) :: options
     !> Iterations made
     integer, intent(in) :: sweeps
@@ -244,16 +235,91 @@ contains
     if (stalled .and. now%residual_changed <= options%slight_change*now%residual) changed = .false.
     if (sweeps == 1) changed = .true.
     ! has the residual come down, compared with the best but the last two?
-    if (.not. self%fixed .and. sweeps > options%first_steps) self%fixed = now%residual > options%progress*self%best(3)
+    if (.not. now%searches .and. sweeps > options%first_steps) now%searches = now%residual > options%progress*self%best(3)
     self%best = [now%residual, self%best(1), min(self%best(2), self%best(3))]
-    if (.not. (self%fixed .and. changed)) return
-    if (self%fresh .and. now%residual_active > options%fixed_accuracy*self%fixed_start) then
-      changed = .false.
-    else
-      self%fixed_start = min(now%residual, 1.0_wp)
-      self%fresh = .true.
-    end if
+    if (.not. self%fixed) return
+    self%fixed = now%residual_active > options%fixed_accuracy*self%fixed_start
+    if (self%fixed) changed = .false.
   end subroutine judge
+
+  !> Find the next step: a conjugate one on a set that stands or is fixed, else a projected one, of a length that is searched for
+  !> where sets change without end.
+  subroutine find_step(level, now, progress, recurrence, changed, anew)
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
+    type(progress_t), intent(inout) :: progress
+    type(conjugate_gradient_t), intent(inout) :: recurrence
+    !> The set of active nodes is another one
+    logical, intent(in) :: changed
+    !> The next sprung direction is not conjugate to the last one
+    logical, intent(inout) :: anew
+    logical :: found
+
+    if (now%searches .and. .not. progress%fixed) then
+      call search_step(level, now, progress, found)
+      anew = .true.
+      if (found) return
+      ! what is left of nodes that left the set goes first
+      call projected_step(level, now, .true.)
+      call recurrence%restart()
+    else if (changed) then
+      call projected_step(level, now, .false.)
+      anew = .true.
+    else
+      progress%step = conjugate
+      if (level%normal_law%is_compliant()) then
+        call next_sprung_direction(level, now, anew)
+        anew = .false.
+      else
+        call next_direction(level, now, recurrence)
+      end if
+      return
+    end if
+    progress%step = projected
+  end subroutine find_step
+
+  !> Search a step, shorter and shorter until it goes down; if none does the set is fixed.
+  subroutine search_step(level, now, progress, found)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
+    type(progress_t), intent(inout) :: progress
+    !> There is such a step
+    logical, intent(out) :: found
+    real(wp) :: shortest
+
+    shortest = level%options%normal%least_searched*progress%length
+    found = .false.
+    do while (progress%length > shortest)
+      call searched_step(level, now, progress%length, progress%step == searched, found)
+      progress%step = merge(searched, projected, found)
+      if (found) return
+      progress%length = 0.5_wp*progress%length
+    end do
+    progress%length = level%options%normal%searched_length
+    progress%fixed = .true.
+    progress%fixed_start = min(now%residual, 1.0_wp)
+  end subroutine search_step
+
+  !> Compute the share of a step that is taken, and of a searched one the length of the next.
+  real(wp) function share_of_step(level, now, progress, recurrence)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(in) :: now
+    type(progress_t), intent(inout) :: progress
+    type(conjugate_gradient_t), intent(in) :: recurrence
+    real(wp) :: best
+
+    share_of_step = 1.0_wp
+    if (progress%step == searched) then
+      best = steepness(level, now)/curvature(level, now)
+      ! all of it ends where there is no tension
+      share_of_step = min(best, 1.0_wp)
+      progress%length = min(progress%length*min(max(best, 0.5_wp), 2.0_wp), 2.0_wp)
+    else if (progress%step == conjugate .and. level%normal_law%is_compliant()) then
+      share_of_step = find_sprung_step(level, now)
+    else if (progress%step == conjugate) then
+      share_of_step = recurrence%step_length(curvature(level, now))
+    end if
+  end function share_of_step
 
   !> Linearise a compliant law again, which costs no product: in the first iterations, for a new set, and where the linear problem
   !> is solved.

@@ -124,8 +124,8 @@ contains
     if (present(other)) product = dot_single(n, other, part)
   end subroutine sum_row
 
-  !> Compute d = max(p + step (z - mean punch), 0) - p at the active nodes of a row, -p at the others.
-  pure subroutine projected_row(unit, pressure, active, d, total, step, z, punch)
+  !> Compute d = max(p + length z - off punch, 0) - p at the active nodes of a row, -p at the others.
+  pure subroutine projected_row(unit, pressure, active, d, total, step, z, punch, punch_total)
     !> Unit of d and z [Pa], and pressure [Pa]
     real(wp), intent(in) :: unit
     real(wp), intent(in), contiguous :: pressure(:)
@@ -134,12 +134,14 @@ contains
     real(sp), intent(out), contiguous :: d(:)
     !> Sum of p + d
     real(wp), intent(out) :: total
-    !> Length of the step, and its product with the share of the pressure of a punch that is taken off
+    !> Length of the step, and share of the pressure of a punch that is taken off
     real(wp), intent(in), optional :: step(2)
-    !> The preconditioned residual; absent: no step
+    !> The direction; absent: no step
     real(sp), intent(in), optional, contiguous :: z(:)
     !> The pressure of a punch; absent: none is taken off
     real(sp), intent(in), optional, contiguous :: punch(:)
+    !> Sum of the punch where p + d is positive
+    real(wp), intent(out), optional :: punch_total
     real(wp), dimension(size(d)) :: before, aim
     integer :: carries(size(d)), col
 
@@ -156,6 +158,12 @@ contains
       aim(col) = carries(col)*max(aim(col), 0.0_wp)
       total = total + aim(col)
       d(col) = real(aim(col) - before(col), sp)
+    end do
+    if (.not. present(punch_total)) return
+    punch_total = 0.0_wp
+    !$omp simd reduction(+: punch_total)
+    do col = 1, size(d)
+      punch_total = punch_total + merge(real(punch(col), wp), 0.0_wp, aim(col) > 0.0_wp)
     end do
   end subroutine projected_row
 

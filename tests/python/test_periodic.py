@@ -131,6 +131,29 @@ def test_a_map_of_one_period() -> None:
     assert (last["pressure"].values[0] > 0.0).any()
 
 
+@pytest.mark.parametrize(("load", "work"), [(0.02, 5.6), (0.2, 7.0)])
+def test_work_on_rough_surfaces(load: float, work: float) -> None:
+    """Self-affine, H = 0.8, wavelengths of 8 to 64 spacings: the length of steps is searched for."""
+    n = 128
+    number = np.hypot(*np.meshgrid(np.fft.fftfreq(n, 1 / n), np.fft.fftfreq(n, 1 / n)))
+    share = np.where((number >= n / 64) & (number <= n / 8), np.maximum(number, 1.0) ** -1.8, 0.0)
+    noise = np.random.default_rng(1).standard_normal((n, n))
+    heights = np.fft.ifft2(np.fft.fft2(noise) * share).real
+    slope = math.sqrt(2.0) * np.std(np.roll(heights, 1, 0) - heights) / 1e-6
+    lattice = Lattice(1e-6, 0, 0, n, n, cell_angle=math.pi / 2, periodic=True)
+    pressed = Case(
+        body_1=STEEL,
+        body_2=STEEL,
+        gap=(heights - heights.min()) * 0.1 / slope,
+        lattice=lattice,
+        loads={"mean_pressure": load * 0.1 * E_STAR},
+        tolerance=1e-6,
+    ).run()
+    last = pressed.dataset.isel(step=-1)
+    assert float(last["operator_applications"]) < work
+    assert float((last["pressure"].values > 0.0).mean()) == pytest.approx(2.2 * load, rel=0.3)
+
+
 BAD = {
     "nodes_across": ({"nodes_across": 62}, "expected a multiple of four columns .* such as 64, not 62"),
     "nodes_in_radius": (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _STEP, _CURVED = 0.1, 0.25
 _ECHO = 4  # points beyond which the ringing of a cubic spline, 0.27 times as high with each, is left
 _BESIDE_HOLE = 2  # points from a hole that no contact may come to
+_TURNED = "expected the gap, such as heights.max() - heights of heights out of the body"
 
 
 class HeightMap:
@@ -30,15 +32,17 @@ class HeightMap:
     Between the points it is their cubic spline. Near steps, where that would ring, it is a bicubic with
     monotone slopes (Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300) in the range of the
     four heights around. Columns x and rows y (m) have any order; the values at (x, y) are NaN in a hole, inf
-    where nothing can touch. A spline of degree 1 has no holes.
+    where nothing can touch. A `whole` map has no holes.
     """
 
-    def __init__(self, x: Array, y: Array, gap: Array, name: str = "gap", degree: int = 3) -> None:
+    def __init__(
+        self, x: Array, y: Array, gap: Array, name: str = "gap", degree: int = 3, whole: bool = False
+    ) -> None:
         order = np.argsort(x), np.argsort(y)
         self.x, self.y, self.gap = x[order[0]], y[order[1]], gap[np.ix_(*order)]
         there = np.isfinite(self.gap)
         ascending = [len(at) > 1 and np.isfinite(at).all() and np.diff(at).all() for at in (self.x, self.y)]
-        if not all(ascending) or (degree == 1 and not there.all()):
+        if not all(ascending) or (whole and not there.all()):
             raise DeckError(f"{name}: expected numbers at all points of a rectangular grid, without holes")
         if not there.any() or np.isneginf(self.gap).any():
             raise DeckError(f"{name}: expected heights, NaN in holes, and inf where nothing can touch")
@@ -62,7 +66,7 @@ class HeightMap:
             named = listed([str(name) for name in gap.dims], "and")
             raise DeckError(f"{name}: expected the dimensions of x and y, not {named}")
         values = in_si(gap.transpose(*x.dims, *y.dims), name, dimension)
-        return cls(in_si(x, name), in_si(y, name), values, name, degree)
+        return cls(in_si(x, name), in_si(y, name), values, name, degree, whole=degree == 1)
 
     @property
     def holes(self) -> tuple[Array, Array]:
@@ -117,7 +121,7 @@ class HeightMap:
     @cached_property
     def _smooth(self) -> Any:
         """Share of the spline, linear between the points; None without steps and holes."""
-        if not self.near_steps.any():
+        if self._degree == 1 or not self.near_steps.any():
             return None
         from scipy.ndimage import binary_dilation
 
@@ -158,16 +162,18 @@ class HeightMap:
 
     # --- contacts that the data do not bound ----------------------------------------------------------------
 
-    @property
-    def touch_fault(self) -> str:
-        """Sentence about a lowest point at the end of the map; empty if it lies inside."""
+    def touch_fault(self, turned: str = _TURNED) -> str:
+        """Return the sentence about a lowest point at the end of the map; empty if it lies inside.
+
+        `turned` says what is expected of heights that point the other way.
+        """
         low, high = (_is_at_end(values) for values in (self.gap, -np.where(self._there, self.gap, -np.inf)))
         if not low:
             return ""
         if not high:
             return (
                 "the heights point the other way: the lowest point of the map lies at its end, the highest "
-                "inside; expected the gap, such as heights.max() - heights of heights out of the body"
+                f"inside; {turned}"
             )
         return (
             f"the lowest point of the map lies at its end, at {_place(*self.first_touch)}, so that the data "
@@ -203,14 +209,68 @@ class HeightMap:
         """Describe the map and its interpolation."""
         apart = " by ".join(dict.fromkeys(quantity(distance, "m", 3) for distance in self.distances))
         missing = int(np.count_nonzero(~self._there))
+        return (
+            f"map of {len(self.x)} x {len(self.y)} points, {apart} apart"
+            f"{f', {missing} without a height' if missing else ''}; {self.interpolated}"
+        )
+
+    @property
+    def interpolated(self) -> str:
+        """Describe the interpolation."""
         rule = "cubic spline" if self._degree > 1 else "bilinear"
         if special := int(np.count_nonzero(self.near_steps)):
             rule += f", kept in the range of the heights near {special} points at steps and holes"
-        return (
-            f"map of {len(self.x)} x {len(self.y)} points, {apart} apart"
-            f"{f', {missing} without a height' if missing else ''}; {rule}; "
-            f"largest overshoot {quantity(self.overshoot, 'm', 2)}"
-        )
+        return f"{rule}; largest overshoot {quantity(self.overshoot, 'm', 2)}"
+
+
+class Placed(NamedTuple):
+    """A map at its place in the plane: its origin (m) and the angle (rad) of its first axis from x."""
+
+    name: str  # in messages
+    map: HeightMap
+    offset: tuple[float, float] = (0.0, 0.0)
+    angle: float = 0.0
+    turned: str = _TURNED
+    extruded: bool = False  # along the first axis
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """Median distances (m) of its points along its axes."""
+        return tuple(self.map.distances[axis] for axis in self.axes)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes along which it has an end."""
+        return (1,) if self.extruded else (0, 1)
+
+    def is_beyond(self, axis: int, at: Array) -> bool:
+        """Test whether points in its own coordinates lie beyond its ends along an axis."""
+        points, slack = (self.map.x, self.map.y)[axis], 1e-9 * self.map.distances[axis]
+        return bool(at.min() < points[0] - slack or at.max() > points[-1] + slack)
+
+    def own(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return points of the plane in coordinates of the map."""
+        return _turned(x - self.offset[0], y - self.offset[1], -self.angle)
+
+    def in_plane(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return points of the map in coordinates of the plane."""
+        x, y = _turned(x, y, self.angle)
+        return x + self.offset[0], y + self.offset[1]
+
+    @property
+    def touch_fault(self) -> str:
+        """Sentence about a lowest point at the end of the map; empty if it lies inside."""
+        return self.map.touch_fault(self.turned)
+
+    def fault_near(self, distance: float, x: Array, y: Array) -> str:
+        """Return the fault of a contact at some points of the plane."""
+        return self.map.fault_near(distance, *self.own(x, y))
+
+
+def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+    """Return points that are turned about the origin by an angle (rad)."""
+    a, b = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
+    return a * x - b * y, b * x + a * y
 
 
 def _beside_steps(along: Array, heights: Array, slopes: Array) -> Mask:

@@ -10,18 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import netcdf_library
 from ..arrays import Array, Mask, has_entries, reals
-from ..core import memory
 from ..core.contact import shaped
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
-from ..deck.height_map import HeightMap, in_si
+from ..deck.height_map import HeightMap, Placed, in_si
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
+from ..deck.map_file import MOST_POINTS, netcdf_map
 from ..deck.surfaces import Separation
 from ..deck.units import LENGTH, NUMBER, Dimension
 from ..errors import DeckError
-from ..files import reading
 from ..text import listed
 from ..variables import LARGEST
 
@@ -78,15 +76,18 @@ class PlaneField:
     """A quantity over the plane, and the rule of its values.
 
     `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
-    the map, if it is one; `heights`: those (m) of both surfaces, none if only their sum is known.
+    the map, if it is one; `maps`: those of measured surfaces, or itself; `heights`: those (m) of both
+    surfaces, none if only their sum is known.
     """
 
     def __init__(self, source: FieldSource, rule: Rule) -> None:
         self.source, self.rule = source, rule
         self.at_nodes, self.given = isinstance(source, np.ndarray), not isinstance(source, Separation)
         self.map = source if isinstance(source, HeightMap) else None
+        self.maps: tuple[Placed, ...] = (Placed(rule.key, self.map),) if self.map else ()
         self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
         if isinstance(source, Separation):
+            self.maps = source.placed
             self.heights = source.surface_1.height, source.surface_2.height
 
     @property
@@ -146,9 +147,19 @@ class PlaneField:
         shown = "NaN" if np.isnan(value) else f"{value:g}"
         raise DeckError(f"{self.rule.key}: expected {self.rule.expected}; it is {shown} at {where}")
 
-    def fault_near(self, lattice: Lattice, chosen: Mask) -> str:
-        """Return why a contact at nodes of a window is doubtful: near the end of a map, or a hole."""
-        return self.map.fault_near(lattice.spacing, lattice.x[chosen], lattice.y[chosen]) if self.map else ""
+    @property
+    def touch_fault(self) -> tuple[str, str]:
+        """Return a map that faces a flat and has its lowest point at its end, and the fault, or nothing."""
+        if isinstance(self.source, Separation) and not self.source.one_map:
+            return "", ""
+        faults = ((one.name, one.touch_fault) for one in self.maps)
+        return next((found for found in faults if found[1]), ("", ""))
+
+    def fault_near(self, lattice: Lattice, chosen: Mask) -> tuple[str, str]:
+        """Return a map near whose end or hole nodes in contact lie, and the fault, or nothing."""
+        x, y = lattice.x[chosen], lattice.y[chosen]
+        faults = ((one.name, one.fault_near(lattice.spacing, x, y)) for one in self.maps)
+        return next((found for found in faults if found[1]), ("", ""))
 
     def __eq__(self, other: object) -> bool:
         """Test whether two fields are the same; functions are if they are one object."""
@@ -169,7 +180,6 @@ def _takes_numbers(source: Callable[[Any, Any], ArrayLike], x: Array, y: Array) 
 
 
 _NAME = COEFFICIENT.key
-_MOST_POINTS = 1_000_000  # of a map, which is text in the deck of a result
 
 
 def given_coefficient(coefficient: Any, lattice: Lattice | None) -> Any:
@@ -204,7 +214,7 @@ class FrictionField:
                 source = _read_map(source)
             elif isinstance(source, tuple):
                 x, y, values = source
-                source = HeightMap(x, y, values, _NAME, COEFFICIENT.degree)
+                source = HeightMap(x, y, values, _NAME, COEFFICIENT.degree, whole=True)
             self._coefficient = PlaneField(source, COEFFICIENT)
             self.in_deck = mu.in_deck
             if grid := self._coefficient.map:
@@ -216,20 +226,10 @@ class FrictionField:
         return FrictionLaw(mu.over(lattice) if isinstance(mu, PlaneField) else mu, **self._numbers)
 
 
-def _read_map(path: Path) -> Any:
+def _read_map(path: Path) -> HeightMap:
     """Read a map: the only variable of a netCDF file that has the coordinates x and y."""
     try:
-        with reading(path, "a map in netCDF"), netcdf_library.opened_by_xarray(path) as dataset:
-            maps = [v for v in dataset.data_vars.values() if {"x", "y"} <= set(v.coords)]
-            if len(maps) != 1:
-                raise DeckError(
-                    f"expected one variable with the coordinates x and y in {path}, not {len(maps)}"
-                )
-            # the values, their spline, and copies of both
-            memory.require(8 * 8 * maps[0].size, f"the map {path}", "choose a coarser one")
-            return _of_few_points(
-                HeightMap.of(maps[0].load(), _NAME, COEFFICIENT.dimension, COEFFICIENT.degree)
-            )
+        return HeightMap.of(netcdf_map(path), _NAME, COEFFICIENT.dimension, COEFFICIENT.degree)
     except FileNotFoundError:
         raise DeckError(f"{_NAME}: there is no file {path}") from None
     except DeckError as error:
@@ -238,8 +238,6 @@ def _read_map(path: Path) -> Any:
 
 def _of_few_points(source: Any) -> Any:
     """Return a field; refuse a map of more points than the deck of a result can hold."""
-    if isinstance(source, HeightMap) and source.gap.size > _MOST_POINTS:
-        raise DeckError(
-            f"{_NAME}: expected a map of at most {_MOST_POINTS:,} points, not {source.gap.size:,}"
-        )
+    if isinstance(source, HeightMap) and source.gap.size > MOST_POINTS:
+        raise DeckError(f"{_NAME}: expected a map of at most {MOST_POINTS:,} points, not {source.gap.size:,}")
     return source

@@ -15,9 +15,11 @@ from commands import inside
 from hexcontact import Case, DeckError, open_result
 from hexcontact.deck import map_file
 from hexcontact.deck.map_file import read_map
+from hexcontact.plotting import surface
 from hexcontact.problem.preview import case_rows
 from hexcontact.surfaces import Map, Profile
 
+ROOT = Path(__file__).parents[2]
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 X, Y = np.linspace(-400.0, 400.0, 81), np.linspace(-300.0, 300.0, 61)  # um
 BALL = 5.0 - (X**2 + Y[:, None] ** 2) / 20e3  # heights of a ball of 10 mm, a row for each y
@@ -564,8 +566,8 @@ def test_the_deck_of_a_result_needs_no_file(deck: Path, monkeypatch: pytest.Monk
 
 def test_a_map_from_python_is_that_of_the_deck(deck: Path) -> None:
     name = deck.parent / "heights/ball.csv"
-    surface = Map(file=name, units="um", height_units="um", extent=(8e-4, 6e-4), upwards=True, level="mean")
-    made = Case(body_1={**STEEL, "surface": surface}, body_2={"rigid": True}, spacing=8e-6, normal_load=20.0)
+    measured = Map(file=name, units="um", height_units="um", extent=(8e-4, 6e-4), upwards=True, level="mean")
+    made = Case(body_1={**STEEL, "surface": measured}, body_2={"rigid": True}, spacing=8e-6, normal_load=20.0)
     assert made.run().approach[-1] == Case.from_toml(deck).run().approach[-1]
 
 
@@ -599,3 +601,43 @@ def test_a_friction_map_and_a_height_map_are_read_by_one_reader(file: Any) -> No
     found = Case.from_dict(tables)
     assert set(found.deck_tables["friction"]["coefficient"]) == {"x", "y", "values"}
     assert float(found.run().stick_area[-1]) > 0.0
+
+
+def test_a_picture_shows_maps_profiles_or_the_gap_of_a_deck(deck: Path) -> None:
+    done = inside(deck.parent, "plot", deck.name, "--what", "surface")
+    assert done.stdout == "written: ball_surface.png\n"
+    assert (deck.parent / "ball_surface.png").stat().st_size > 1000
+    heights = np.zeros((9, 11))
+    heights[0, 0], heights[3, 4] = np.nan, 2e-9
+    at = {"x": np.linspace(-4e-4, 4e-4, 9).tolist(), "y": np.linspace(-5e-4, 5e-4, 11).tolist()}
+    rough = {"shape": "map", "upwards": False, "holes": "open", "heights": heights.tolist(), **at}
+    profile = {
+        "shape": "profile",
+        "upwards": True,
+        "angle": "90 deg",
+        "y": [-1e-3, 1e-3],
+        "heights": [0.0, 0.0],
+    }
+    ball = {"shape": "sphere", "radius": "10 mm"}
+    made = case([ball, rough], other=profile)
+    figure = surface(made)
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert titles == ["body 1: map", "body 2: profile"]
+    drawn = figure.axes[0].collections[0].get_array()
+    assert np.ma.count_masked(drawn) == 1
+    assert float(drawn.max()) == pytest.approx(2.0)  # nm
+    plain = surface(case(ball, other=None))
+    assert plain.axes[-1].get_ylabel().startswith("gap (")
+    done = inside(deck.parent, "plot", deck.name, "--what", "surface", "--step", "2")
+    assert done.returncode == 2
+    assert "expected one deck, and no other options" in done.stderr
+
+
+def test_the_map_of_the_cases_is_that_of_its_formula() -> None:
+    lines = (ROOT / "cases/turned_surface.csv").read_text().splitlines()
+    found = np.array([[float(cell or "nan") for cell in line.split(",")] for line in lines])
+    x, y = np.arange(-200, 201, 4.0), np.arange(160, -161, -4.0)[:, None]
+    waves = 150 * np.cos(2 * np.pi * x / 60) + 40 * np.cos(2 * np.pi * (y / 97 + x / 230))
+    off = abs(found - (-(x**2 + y**2) / 20 + waves + 2 * x - y))
+    assert np.isnan(off).sum() == 3
+    assert np.nanmax(off) < 0.5 + 1e-9

@@ -317,6 +317,7 @@ class Measured(Surface):
         mean, along, across = self.plane
         if self.level is False:
             return "not levelled"
+        along, across = (round(slope, 9) + 0.0 for slope in (along, across))  # without noise, and without -0
         slopes = f" and slopes of {along:.3g} along x, {across:.3g} along y" * (self.level == "plane")
         return f"levelled: mean of {quantity(mean, 'm', 3)}{slopes} subtracted"
 

@@ -64,7 +64,7 @@ def _gap(axes: Axes, case: Any) -> None:
 def _colored(axes: Axes, x: Array, y: Array, values: Array, words: str, case: Any) -> None:
     """Draw values over the plane, with the window and the point of first touch."""
     shown = np.ma.masked_invalid(values)
-    times, unit = scaled(float(np.ptp(shown)), "m")
+    times, unit = scaled(float(shown.max() - shown.min()), "m")
     scale, length = scaled(max(float(np.ptp(x)), float(np.ptp(y))), "m")
     axes.set_facecolor("0.7")
     drawn = axes.pcolormesh(x * scale, y * scale, times * shown.T, shading="nearest", rasterized=True)

@@ -7,12 +7,13 @@ file, in m, so that it needs no other file.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import PrivateAttr, model_validator
 
 from ..arrays import Array
@@ -20,7 +21,7 @@ from ..errors import DeckError
 from ..text import quantity
 from .faults import MISSING
 from .height_map import HeightMap, Placed
-from .kinds import FileName, Flag, Kind, Quantity, Schema, Several, Text, Word, refuse
+from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import MapFile, read_map
 from .surfaces import Angle, Point, Surface, shape
 from .table_base import meaning, refuse_key
@@ -80,10 +81,22 @@ class Numbers(Kind):
         return found.tolist()
 
 
-_TwoLengths = Annotated[
-    tuple[float, float], Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2)
-]
-_Numbers = Annotated[list[Any], Numbers()]
+if TYPE_CHECKING:
+    HeightFile = Read[Path | None, str | Path | None]
+    TwoLengths = Read[tuple[float, float] | None, Sequence[float | str] | None]
+    Width = Read[float | None, float | str | None]
+    Line = Read[list[Any] | None, ArrayLike | None]
+    Grid = Read[list[Any] | None, ArrayLike | None]
+else:
+    HeightFile = Annotated[Path, FileName()] | None
+    TwoLengths = (
+        Annotated[
+            tuple[float, float], Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2)
+        ]
+        | None
+    )
+    Width = Annotated[float, Quantity(LENGTH, above=0)] | None
+    Line, Grid = Annotated[list[Any], Numbers()] | None, Annotated[list[Any], Numbers(2)] | None
 
 
 class Points(NamedTuple):
@@ -98,9 +111,7 @@ class Points(NamedTuple):
 class Measured(Surface):
     """A surface that was measured at points; heights count from the lowest point, where it touches a flat."""
 
-    file: Annotated[Path, FileName()] | None = meaning(
-        None, "file of the heights, relative to the deck", '"heights.csv"'
-    )
+    file: HeightFile = meaning(None, "file of the heights, relative to the deck", '"heights.csv"')
     variable: Annotated[str, Text()] | None = meaning(
         None, "which variable, column or channel of the file; needed if it has several", '"height"'
     )
@@ -124,7 +135,7 @@ class Measured(Surface):
         "cubic",
         "cubic: a spline, near steps monotone between the points; linear: bilinear between four points",
     )
-    taper: Annotated[float, Quantity(LENGTH, above=0)] | None = meaning(
+    taper: Width = meaning(
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
     extruded: ClassVar[bool] = False
@@ -249,6 +260,10 @@ class Measured(Surface):
         return 0.0
 
     @property
+    def _name(self) -> str:
+        return self.file.name if self.file else ""
+
+    @property
     def _origin(self) -> tuple[float, float]:
         return float(self.offset[0]), float(self.offset[1])
 
@@ -297,6 +312,8 @@ class Measured(Surface):
         order = np.argsort(x), np.argsort(y)
         axes, height = [x[order[0]], y[order[1]]], height[np.ix_(*order)]
         for axis, side in enumerate(self._period):
+            if axis == 0 and self.extruded:
+                continue
             axes[axis], height = _closed(axes[axis], height, axis, side, self.taper)
         return axes[0], axes[1], height
 
@@ -340,10 +357,10 @@ class Measured(Surface):
 class Map(Measured):
     """Measured heights over x and y."""
 
-    extent: _TwoLengths | None = meaning(
+    extent: TwoLengths = meaning(
         None, "distances of the first and the last point (n - 1 spacings) in x and y; for files without them"
     )
-    spacing: _TwoLengths | None = meaning(
+    spacing: TwoLengths = meaning(
         None, "distances of neighboring points in x and y, instead of the extent", '["2 um", "2 um"]'
     )
     center: Point | None = meaning(
@@ -352,11 +369,9 @@ class Map(Measured):
     first_row: Annotated[str, Word(("top", "bottom"))] = meaning(
         "top", "of a file without coordinates: whether its first row has the largest y, or the smallest"
     )
-    x: _Numbers | None = meaning(None, "places along x instead of a file, as in results", "[0.0, 1e-6]")
-    y: _Numbers | None = meaning(None, "places along y", "[0.0, 1e-6]")
-    heights: Annotated[list[Any], Numbers(2)] | None = meaning(
-        None, "heights there, an array over y for each x", "[[0.0, 1e-9], [2e-9, 0.0]]"
-    )
+    x: Line = meaning(None, "places along x instead of a file, as in results", "[0.0, 1e-6]")
+    y: Line = meaning(None, "places along y", "[0.0, 1e-6]")
+    heights: Grid = meaning(None, "heights there, an array over y for each x", "[[0.0, 1e-9], [2e-9, 0.0]]")
     formula: ClassVar[str] = "h = z_max − z of heights, h = g − g_min of a gap, interpolated"
     _placing: ClassVar[tuple[str, ...]] = ("extent", "spacing", "center", "first_row")
 
@@ -386,7 +401,7 @@ class Map(Measured):
         if self.center is not None:
             x, y = (at - (at.min() + at.max()) / 2 + c for at, c in zip((x, y), self.center, strict=True))
         units = f"x and y in {found.units or self.units}, heights in {found.value_units or self.height_units}"
-        return Points(x, y, z, f"{self.file.name}, {units}; {how}")
+        return Points(x, y, z, f"{self._name}, {units}; {how}")
 
     def _of_matrix(self, rows: Array) -> tuple[Array, Array, Array, str]:
         """Return the points of a matrix: columns along x, the first row at the top or at the bottom."""
@@ -445,8 +460,8 @@ class Profile(Measured):
     center: Annotated[float, Quantity(LENGTH)] | None = meaning(
         None, "y of the middle of the points; as in the file if absent"
     )
-    y: _Numbers | None = meaning(None, "places along y instead of a file, as in results", "[0.0, 1e-6]")
-    heights: _Numbers | None = meaning(None, "heights there", "[0.0, 1e-9]")
+    y: Line = meaning(None, "places along y instead of a file, as in results", "[0.0, 1e-6]")
+    heights: Line = meaning(None, "heights there", "[0.0, 1e-9]")
     extruded: ClassVar[bool] = True
     formula: ClassVar[str] = "h as of a map, of t across the direction of extrusion"
     _placing: ClassVar[tuple[str, ...]] = ("center",)
@@ -464,7 +479,7 @@ class Profile(Measured):
             assert found.y is not None
             y = found.y * scale
             units = f"y in {found.units or self.units}, heights in {found.value_units or self.height_units}"
-            about = f"{self.file.name}, {units}"
+            about = f"{self._name}, {units}"
             if self.center is not None:
                 y = y - (y.min() + y.max()) / 2 + self.center
         return Points(np.array([-_LONG, _LONG]), y, np.stack([z, z]), about)
@@ -498,11 +513,6 @@ class Profile(Measured):
     def _height(self, x: Array, y: Array) -> Array:
         a, b = math.cos(self.angle), math.sin(self.angle)
         return super()._height(a * x + b * y, a * y - b * x)
-
-    def _repeated(self, x: Array, y: Array, height: Array) -> tuple[Array, Array, Array]:
-        assert self._period is not None
-        order = np.argsort(y)
-        return x, *_closed(y[order], height[:, order], 1, self._period[1], self.taper)
 
     def _written_points(self) -> dict[str, Any]:
         return {"y": self.points.y.tolist(), "heights": self.points.z[0].tolist()}

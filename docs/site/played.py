@@ -24,7 +24,7 @@ from typer.testing import CliRunner
 from hexcontact.cli.app import app
 
 DOCS = Path(__file__).parents[1]
-PAGES = ("tutorial", "lattice", "surfaces", "reading", "fatigue", "../README")
+PAGES = ("tutorial", "lattice", "surfaces", "maps", "reading", "fatigue", "../README")
 WIDTH = "88"
 # Files begin with a comment that names them; other blocks of these languages are there to be read.
 NAME = re.compile(r"# (\w+\.(?:toml|py))\n")

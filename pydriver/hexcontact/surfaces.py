@@ -1,8 +1,56 @@
-"""The public name of `hexcontact.deck.surfaces`."""
+"""Shapes of surfaces, arguments of bodies, and measured ones.
 
-import sys
+A shape has a height over the plane z = 0, measured away from the other body: zero where the shape would first
+touch a flat, and infinite where it has no surface that could touch.
+"""
 
-from .deck import surfaces
-from .deck.surfaces import *  # noqa: F403
+from .deck.measured import Map, Profile
+from .deck.surfaces import (
+    SHAPES,
+    Cone,
+    Cylinder,
+    Dent,
+    Ellipsoid,
+    Flat,
+    FormulaSurface,
+    Paraboloid,
+    Power,
+    Punch,
+    RectangularPunch,
+    Roller,
+    RoundedPunch,
+    Separation,
+    Sphere,
+    Surface,
+    SurfaceSum,
+    Torus,
+    Waviness,
+    principal_curvatures,
+    shape,
+)
 
-sys.modules[__name__] = surfaces
+__all__ = [
+    "SHAPES",
+    "Cone",
+    "Cylinder",
+    "Dent",
+    "Ellipsoid",
+    "Flat",
+    "FormulaSurface",
+    "Map",
+    "Paraboloid",
+    "Power",
+    "Profile",
+    "Punch",
+    "RectangularPunch",
+    "Roller",
+    "RoundedPunch",
+    "Separation",
+    "Sphere",
+    "Surface",
+    "SurfaceSum",
+    "Torus",
+    "Waviness",
+    "principal_curvatures",
+    "shape",
+]

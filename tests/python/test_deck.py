@@ -200,14 +200,14 @@ WRONG = [
         '"spere"',
         'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
         '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
-        '"torus", "waviness", "dent", "roller" or "formula"; did you mean sphere?',
+        '"torus", "waviness", "dent", "roller", "formula", "map" or "profile"; did you mean sphere?',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
         "{ radius = 1 }",
         'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
         '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
-        '"torus", "waviness", "dent", "roller" or "formula"',
+        '"torus", "waviness", "dent", "roller", "formula", "map" or "profile"',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
@@ -217,8 +217,7 @@ WRONG = [
     (
         '"sphere"',
         '"heights"',
-        'body.1.surface.shape = "heights": this version reads no height maps from files; give the gap '
-        "in Python, as an xarray.DataArray with coordinates x and y: hexcontact.Case(gap=...)",
+        'body.1.surface.shape = "heights": expected shape = "map" for heights over x and y, or "profile"',
     ),
     (
         'fields = ["pressure", "traction_x"]',

@@ -10,8 +10,8 @@ import xarray as xr
 from scipy.interpolate import RectBivariateSpline
 
 from hexcontact import Case, DeckError, Lattice
+from hexcontact.deck.height_map import HeightMap
 from hexcontact.problem import plausibility
-from hexcontact.problem.plane_field import GAP, HeightMap
 from hexcontact.problem.preview import case_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -87,14 +87,14 @@ def test_no_height_leaves_the_range_of_its_neighbours(shape: str) -> None:
     ],
 )
 def test_smooth_heights_have_their_cubic_spline_to_the_bit(heights: np.ndarray) -> None:
-    grid = HeightMap.of(on_grid(1e-6 * heights), GAP)
+    grid = HeightMap.of(on_grid(1e-6 * heights))
     points = between(grid)
     assert not grid.near_steps.any()
     np.testing.assert_array_equal(grid(*points), RectBivariateSpline(grid.x, grid.y, grid.gap).ev(*points))
 
 
 def test_a_step_leaves_the_spline_far_from_it_to_the_bit() -> None:
-    grid = HeightMap.of(on_grid(BALL + np.where(X > 0.2e-3, 4e-6, 0.0)), GAP)
+    grid = HeightMap.of(on_grid(BALL + np.where(X > 0.2e-3, 4e-6, 0.0)))
     points = between(grid)
     far = points[0] < 0.0
     spline = RectBivariateSpline(grid.x, grid.y, grid.gap).ev(*points)

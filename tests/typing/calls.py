@@ -45,6 +45,9 @@ shapes: list[surfaces.Surface] = [
     surfaces.Power(exponent=2, coefficient="0.1 mm^-1"),
     surfaces.Punch(radius="1 mm"),
     surfaces.RoundedPunch(flat_radius=0.0, edge_radius="1 mm"),
+    surfaces.Map(file="heights.csv", extent=["1 mm", 2e-3], units="mm", height_units="um", upwards=True),
+    surfaces.Map(x=np.zeros(2), y=[0.0, 1e-3], heights=np.zeros((2, 2)), upwards=True),
+    surfaces.Profile(y=[0.0, 1e-3], heights=[0.0, 1e-6], upwards=False, angle="30 deg"),
 ]
 heights = ball.height(np.zeros(3), np.zeros(3))
 

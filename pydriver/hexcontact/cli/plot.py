@@ -18,6 +18,7 @@ from .frame import (
     Shown,
     argument,
     beside,
+    case_of,
     command,
     labels_of,
     option,
@@ -51,20 +52,22 @@ def _help() -> str:
     choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
     choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
-    of_a_result, of_a_study, of_a_table = (
+    of_a_result, of_a_study, of_a_table, of_a_deck = (
         "\n".join(f"{name:<{width}}{words}" for kind, name, words in choices if kind == wanted)
-        for wanted in ("result", "study", "table")
+        for wanted in ("result", "study", "table", "deck")
     )
     return (
         f"{_DRAWS}\n\n"
         "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
         f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
-        f"\b\nOf a study:\n{of_a_study}\n\n\b\nOf a table:\n{of_a_table}"
+        f"\b\nOf a study:\n{of_a_study}\n\n\b\nOf a table:\n{of_a_table}\n\n\b\nOf a deck:\n{of_a_deck}"
     )
 
 
 def _kind(entry: Entry) -> str:
-    """Return the kind of the FILE of a figure: a result, a study or a table."""
+    """Return the kind of the FILE of a figure: a result, a study, a table or a deck."""
+    if entry.of_a_deck:
+        return "deck"
     return "study" if entry.of_a_study else "table" if entry.of_a_table else "result"
 
 
@@ -83,7 +86,8 @@ def plot(
     files: Annotated[
         list[Path] | None,
         argument(
-            "FILE", "The result or a table of it, a netCDF file; several for zones, outlines and compliance."
+            "FILE",
+            "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
         ),
     ] = None,
     what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
@@ -136,6 +140,15 @@ def plot(
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
     if not files:
         raise DeckError(f"--what {what}: expected the FILE of a result")
+    if output and format:
+        raise DeckError(f"--format {format}: the name of --output {output} has a format already")
+    if what in figures and figures[what].of_a_deck:
+        options = (step, angle, through, cycle, over, arrows, source)
+        if len(files) > 1 or any(one is not None for one in options):
+            raise DeckError(f"--what {what}: expected one deck, and no other options but --output, --format")
+        picture = output or beside(files[0], f"_{what}.{format or 'png'}")
+        print_output(f"written: {drawn_deck(files[0], what, picture)}")
+        return
     study = study_of(files[0]) if len(files) == 1 else None
     table = read_table(files[0]) if len(files) == 1 and study is None else None
     holds = "study" if study is not None else "table" if table is not None else "result"
@@ -158,8 +171,6 @@ def plot(
         "source": None if source is None else source.value,
     }
     chosen = {name: value for name, value in given.items() if value is not None}
-    if output and format:
-        raise DeckError(f"--format {format}: the name of --output {output} has a format already")
     suffix = f".{format or 'png'}"
     if what == _ALL:
         if len(files) > 1:
@@ -245,6 +256,13 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     except DeckError as error:  # such as no such step, nothing in contact
         raise DeckError(f"cannot draw {about}: {error}") from error
     return _save(figure, about, picture)
+
+
+def drawn_deck(deck: Path, what: str, picture: Path) -> Path:
+    """Draw a picture of a deck that was not run; return its file."""
+    from ..plotting.registry import entries
+
+    return _save(entries()[what].draw(case_of(deck, None)), f"{what} of {deck}", picture)
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:

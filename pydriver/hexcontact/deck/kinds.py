@@ -339,7 +339,7 @@ class FileName(Text):
         return str(value)
 
     def _parse(self, value: object) -> Any:
-        text = super()._parse(value)
+        text = super()._parse(str(value) if isinstance(value, Path) else value)
         return Path(text) if text else None
 
 

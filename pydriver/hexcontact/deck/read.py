@@ -68,8 +68,8 @@ def assemble(
         refuse_deep(merged, source.name)
     source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included))
     merged = copy.deepcopy(merged)
-    for table, key, _ in _named_files(merged):
-        if key == "map":  # read when the case is built, from any folder
+    for table, key, number in _named_files(merged):
+        if number is None:  # read when the case is built, from any folder
             table[key] = str((folder / table[key]).absolute())
     return Assembled(merged, None, source, list(_read_series(merged, folder)))
 
@@ -124,19 +124,28 @@ def _over(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str, int]]:
-    """Yield the tables that name files, their keys, and the indices of their entries of [[load]]."""
-    loads = data.get("load")
-    places = [(load, "series", "file") for load in (loads if isinstance(loads, list) else ())]
-    for number, (outer, name, key) in enumerate([*places, (data.get("friction"), "coefficient", "map")]):
-        table = outer.get(name) if isinstance(outer, Mapping) else None
-        if isinstance(table, dict) and isinstance(table.get(key), str) and (table[key] or key == "file"):
-            yield table, key, number
+def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str, int | None]]:
+    """Yield the tables that name files, their keys, and the indices of their entries of [[load]], if any."""
+
+    def below(outer: Any, name: str) -> Any:
+        return outer.get(name) if isinstance(outer, Mapping) else None
+
+    loads, bodies = data.get("load"), data.get("body")
+    series = [below(load, "series") for load in (loads if isinstance(loads, list) else ())]
+    surfaces = [below(below(bodies, number), "surface") for number in ("1", "2")]
+    shapes = [one for given in surfaces for one in (given if isinstance(given, list) else [given])]
+    for number, table in enumerate(series):
+        if isinstance(table, dict) and isinstance(table.get("file"), str):
+            yield table, "file", number
+    maps = [(below(data.get("friction"), "coefficient"), "map"), *((one, "file") for one in shapes)]
+    for table, key in maps:
+        if isinstance(table, dict) and isinstance(table.get(key), str) and table[key]:
+            yield table, key, None
 
 
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
     """Replace the names of files by their rows, and yield the mistakes in them."""
-    found = [(number, table) for table, key, number in _named_files(data) if key == "file"]
+    found = [(number, table) for table, _, number in _named_files(data) if number is not None]
     if len(found) > MOST_SERIES:
         raise DeckError(f"load: expected at most {MOST_SERIES} files of series")
     for number, series in found:

@@ -83,7 +83,7 @@ _IGNORED = ("time", "step")  # columns of files that are no deck keys
 _MOST_SENTENCES = 10
 _LONGEST_LABEL = 1000  # characters
 _EXPECTED = "a CSV or netCDF file of loads"
-_MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # cells without a value, in small letters
+MISSING_CELLS = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # cells without a value, in small letters
 _SEPARATORS = ("\t", ";", ",")
 _THOUSANDS = r"[+-]?\d{1,3}(?:[ ']\d{3})+(?:\.\d*)?"
 _NUMBER = r"[+-]?\.?\d"  # its beginning
@@ -266,7 +266,7 @@ def _noise(cells: Sequence[Any], cell: Any) -> str:
 
 def _value(key: str, cell: Any, unit: str) -> Any:
     if isinstance(cell, str):
-        if cell.lower() in _MISSING:
+        if cell.lower() in MISSING_CELLS:
             return ""
         text = cell = spelled(cell)
         if re.fullmatch(_THOUSANDS, text):
@@ -312,7 +312,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
                 problems.append(f"{path}: unknown column {shown(column.header)}{hint}")
     else:
         for key, header in columns.items():
-            name, unit = _split(str(header))
+            name, unit = split_header(str(header))
             if name not in headers:
                 there = [*map(shown, headers[:_MOST_SENTENCES])]
                 there += ["others"] * (len(headers) > _MOST_SENTENCES)
@@ -333,7 +333,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
     return chosen
 
 
-def _split(header: str) -> tuple[str, str]:
+def split_header(header: str) -> tuple[str, str]:
     """Return a header without its unit, and the unit."""
     name = header.strip()
     opening = {"]": "[", ")": "("}.get(name[-1:], "")
@@ -355,7 +355,7 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if lines and (above := [remark for remark in remarks if remark[0] < lines[0][0]]):
         split = _cells(lines[0][1], separator or _separator(*(line for _, line in lines[:3])))
-        if all(_number(cell) is not None or cell.lower() in _MISSING for cell in split):
+        if all(_number(cell) is not None or cell.lower() in MISSING_CELLS for cell in split):
             lines.insert(0, above[-1])
     if not lines:
         raise DeckError(f"{path}: is empty; expected a line of headers such as normal_load [N], and rows")
@@ -378,7 +378,7 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
     ]
     if problems:
         raise DeckError("\n".join(problems[:_MOST_SENTENCES]))
-    names, numbers = [_split(header) for header in headers], [number for number, _ in lines[1:]]
+    names, numbers = [split_header(header) for header in headers], [number for number, _ in lines[1:]]
     if len(rows) > 1 and not any(unit for _, unit in names) and _are_units(*rows[:2]):
         names = [(name, unit.strip("[]() -")) for (name, _), unit in zip(names, rows[0], strict=True)]
         del rows[0], numbers[0]
@@ -408,7 +408,7 @@ def _are_units(row: list[str], below: list[str]) -> bool:
     """Return whether a row holds words above numbers, such as the units below headers."""
     words = [(cell, number) for cell, number in zip(row, below, strict=True) if cell not in ("", "-")]
     return bool(words) and all(
-        cell.lower() not in _MISSING and not re.match(_NUMBER, cell) and _number(number) is not None
+        cell.lower() not in MISSING_CELLS and not re.match(_NUMBER, cell) and _number(number) is not None
         for cell, number in words
     )
 

@@ -23,6 +23,7 @@ from ..arrays import Array, Mask
 from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
+from .height_map import Placed
 from .kinds import (
     Flag,
     Formula,
@@ -131,6 +132,15 @@ class Surface(Argument):
 
     def beside(self, modulus: float) -> Surface:
         """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
+        return self
+
+    @property
+    def measured(self) -> tuple[Any, ...]:
+        """The maps and profiles among its shapes (`Measured`)."""
+        return ()
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
         return self
 
     def candidate(self, x: ArrayLike, y: ArrayLike) -> Mask:
@@ -502,8 +512,7 @@ def _axes(angle: float) -> tuple[Array, Array]:
 
 
 _REFUSED = {
-    "heights": "this version reads no height maps from files; "
-    "give the gap in Python, as an xarray.DataArray with coordinates x and y: hexcontact.Case(gap=...)",
+    "heights": 'expected shape = "map" for heights over x and y, or "profile"',
     "python": "the gap of this case was given in Python and is not in the deck; run the script it came from",
 }
 
@@ -535,6 +544,15 @@ class SurfaceSum(Surface):
     def beside(self, modulus: float) -> Surface:
         """Return the sum of shapes of the modulus."""
         return SurfaceSum(parts=tuple(part.beside(modulus) for part in self.parts))
+
+    @property
+    def measured(self) -> tuple[Any, ...]:
+        """Those of all shapes."""
+        return tuple(one for part in self.parts for one in part.measured)
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the sum of shapes over a window that repeats."""
+        return SurfaceSum(parts=tuple(part.repeating(sides) for part in self.parts))
 
     def written(self, defaults: bool = True) -> Any:
         """Return the shapes with their keys."""
@@ -617,6 +635,8 @@ class Separation:
             If the two surfaces nowhere face each other (two punches side by side).
         """
         one, two = self.surface_1, self.surface_2
+        if one.measured or two.measured:
+            return self._first_of_points()
         known = Flat | FormulaSurface | SurfaceSum  # whose heights count as they are given
         if isinstance(one, known) or any(one.tilt) or one.offset == two.offset:
             return (*two.offset, 0.0)
@@ -648,6 +668,36 @@ class Separation:
 
     def _sum(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.surface_1.height(x, y) + self.surface_2.height(x, y)
+
+    def _first_of_points(self) -> tuple[float, float, float]:
+        """Return the point of measured surfaces at which the bodies touch first, and the sum of heights."""
+        pairs = ((self.surface_1, self.surface_2), (self.surface_2, self.surface_1))
+        near = [(one, other.offset) for surface, other in pairs for one in surface.measured]
+        x, y = np.concatenate([one.points_near(offset) for one, offset in near], axis=1)
+        heights = self._sum(x, y)
+        lowest = int(np.argmin(heights))
+        if not math.isfinite(heights[lowest]):
+            raise DeckError("the two surfaces nowhere face each other: their offsets put them side by side")
+        return float(x[lowest]), float(y[lowest]), float(heights[lowest])
+
+    def repeating(self, sides: tuple[float, float] | None) -> Separation:
+        """Return the gap over a window that repeats with two sides (m) along x and y; None: others."""
+        return Separation(self.surface_1.repeating(sides), self.surface_2.repeating(sides))
+
+    @property
+    def one_map(self) -> bool:
+        """Whether one measured surface faces a plane, and neither is tilted."""
+        both = (self.surface_1, self.surface_2)
+        single = [one for one in both if one.measured == (one,) and not any(one.tilt)]
+        return len(single) == 1 and any(isinstance(one, Flat) and not any(one.tilt) for one in both)
+
+    @cached_property
+    def placed(self) -> tuple[Placed, ...]:
+        """The measured maps of both bodies."""
+        bodies = ((1, self.surface_1), (2, self.surface_2))
+        return tuple(
+            one.placed(f"body.{number}.surface") for number, surface in bodies for one in surface.measured
+        )
 
     def _search(self) -> tuple[float, float]:
         """Return the point of the smallest sum of heights, searched from the best one between the centers."""

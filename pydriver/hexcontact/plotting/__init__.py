@@ -20,6 +20,7 @@ from .zones import contact_boundary, outlines, zones
 from .history import compliance, history, loop, torsion
 from .below import fatigue, lines, stress, trailing_edge
 from .overview import overview
+from .surface import surface
 from .registry import entries
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "pressure_field",
     "section",
     "stress",
+    "surface",
     "torsion",
     "tractions",
     "trailing_edge",

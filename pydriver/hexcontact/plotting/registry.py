@@ -62,7 +62,7 @@ class Entry:
     @property
     def of_a_result(self) -> bool:
         """Whether it shows a result."""
-        return not (self.of_a_study or self.of_a_table)
+        return not (self.of_a_study or self.of_a_table or self.of_a_deck)
 
     @property
     def of_a_study(self) -> bool:
@@ -73,6 +73,11 @@ class Entry:
     def of_a_table(self) -> bool:
         """Whether it shows a table [[stress]] or [[fatigue]]."""
         return "table" in self.options
+
+    @property
+    def of_a_deck(self) -> bool:
+        """Whether it shows a deck."""
+        return "case" in self.options
 
     @property
     def of_several(self) -> bool:

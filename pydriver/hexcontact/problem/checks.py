@@ -74,10 +74,11 @@ _SOME_PERIOD = Period(1.0, math.inf)  # for means in a deck that is refused anyw
 
 
 class Repeating(NamedTuple):
-    """The window of a case that repeats, with what its loads refer to."""
+    """The window of a case that repeats, with what its loads refer to, and the surfaces over it."""
 
     lattice: Lattice
     period: Period
+    surfaces: Separation
 
 
 def _repeating(
@@ -88,10 +89,18 @@ def _repeating(
         lattice, faults = window.repeating(tables["grid"])
         if faults:
             return None, faults
-    heights = PlaneField(tables["body"].separation if gap is None else gap, GAP).over(lattice)
-    if fault := window.seam_fault(heights):
+    try:
+        surfaces = tables["body"].separation.repeating(window.sides(lattice))
+        heights = PlaneField(surfaces if gap is None else gap, GAP).over(lattice)
+        fault = window.seam_fault(heights)
+    except DeckError as error:
+        if gap is not None:
+            raise
+        fault = str(error)
+    if fault:
         return None, [Mistake(("grid", "boundary"), "periodic", fault)]
-    return Repeating(lattice, Period(lattice.size * lattice.cell_area, float(heights.mean()))), []
+    period = Period(lattice.size * lattice.cell_area, float(heights.mean()))
+    return Repeating(lattice, period, surfaces), []
 
 
 def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
@@ -269,6 +278,10 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
         yield ("bulk", "body"), f"expected an elastic body; body {bulk.body} is rigid"
     if (grid := tables.get("grid")) and grid.periodic:
         return
+    for number, body in (("1", bodies.body_1), ("2", bodies.body_2)):
+        if body.surface and any(one.taper for one in body.surface.measured):
+            sentence = 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
+            yield ("body", number, "surface"), sentence
     if not gap_given and bodies.separation.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:
@@ -284,6 +297,12 @@ def _touching_problems(gap: Separation) -> Found:
     except DeckError as error:
         yield ("body", "2", "surface"), str(error)
         return
+    if gap.one_map and any(one.extruded for one in gap.placed):
+        sentence = (
+            "a profile and a flat touch along a line, so the contact has no end; expected a surface of the "
+            'other body that bounds it, or a window that repeats, grid.boundary = "periodic"'
+        )
+        yield (*gap.placed[0].name.split("."),), sentence
     if gap.curvature is None:
         return
     smaller, larger, _ = principal_curvatures(gap.curvature)

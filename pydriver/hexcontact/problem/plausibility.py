@@ -180,8 +180,8 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
         "spacings": known.spacings(case.lattice),
     }
-    if grid := case.height_map:
-        along = np.array(grid.distances) / case.lattice.spacing
+    if case.maps:
+        along = np.concatenate([one.distances for one in case.maps]) / case.lattice.spacing
         found |= {
             "spacings_between_points": float(along.max()),
             "points_between_nodes": float(1.0 / along.min()),
@@ -284,9 +284,16 @@ def row(case: Problem) -> str:
 
 
 def unjudged(case: Problem) -> str:
-    """Return a note on limits that the warnings do not check; empty without one."""
+    """Return a note on limits that the warnings do not check, and on filled holes; empty without one."""
     if not case.gap_given:
-        return ""
+        bodies = ((1, case.body_1), (2, case.body_2))
+        maps = [(number, one) for number, b in bodies if b.surface for one in b.surface.measured]
+        filled = [
+            f"{one.holes_found} holes of the {one.shape} of body {number} are filled, not measured"
+            for number, one in maps
+            if one.holes == "fill" and one.holes_found
+        ]
+        return "; ".join(filled)
     return (
         "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
         "of each body at the edge of the contact, also where surfaces conform"

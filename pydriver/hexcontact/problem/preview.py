@@ -10,7 +10,7 @@ import functools
 import math
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -149,6 +149,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("body 1", _body(case.body_1)),
         ("body 2", _body(case.body_2)),
         ("gap", str(case.height_map or "")),
+        *_maps(case),
         ("pair", f"E* = {modulus}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"),
         ("interface", interface),
         ("friction", _friction(case)),
@@ -246,9 +247,19 @@ def _body(body: Body) -> str:
     return f"{stiffness}; {_surface(body.surface)}"
 
 
+def _maps(case: Problem) -> Iterator[Row]:
+    """Yield rows about the measured surfaces."""
+    for number, body in ((1, case.body_1), (2, case.body_2)):
+        for one in body.surface.measured if body.surface else ():
+            for place, words in enumerate(one.rows(case.lattice.spacing)):
+                yield (f"{one.shape} of body {number}" if not place else "", words)
+
+
 def _surface(surface: Surface | None) -> str:
     if surface is None:
         return "flat"
+    if surface.measured == (surface,):
+        return str(surface)
     if isinstance(surface, SurfaceSum):
         return " + ".join(map(_surface, surface.parts))
     given = [surface.shape]

@@ -136,9 +136,10 @@ class Problem:
         self.friction_coefficient = coulomb(deck.friction, deck.interface) or 0.0
         self._friction = FrictionField(deck.friction, deck.interface)
         self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
-        self._gap = PlaneField(deck.body.separation if gap is None else gap, GAP)
-        # a gap that was measured on a grid; whether it was given in Python: the surfaces are unknown
-        self.height_map, self.gap_given = self._gap.map, self._gap.given
+        surfaces = repeating.surfaces if repeating else deck.body.separation
+        self._gap = PlaneField(surfaces if gap is None else gap, GAP)
+        # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
+        self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         self.pair = ElasticPair.from_materials(
             one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
@@ -168,6 +169,9 @@ class Problem:
             data["body"]["1"]["surface"] = {"shape": FROM_PYTHON}
         if self._friction.varies:
             data["friction"]["coefficient"] = self._friction.in_deck
+        for number, body in (("1", self.body_1), ("2", self.body_2)):
+            if body.surface and body.surface.measured:
+                data["body"][number]["surface"] = body.surface.written(defaults=False)
         return dict(data)
 
     @cached_property
@@ -236,14 +240,16 @@ class Problem:
 
     def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
-        if self.period is None and (fault := self._gap.fault_near(lattice, contact)):
-            raise DeckError(f"gap: the contact of load step {number} {fault}")
+        name, fault = self._gap.fault_near(lattice, contact) if self.period is None else ("", "")
+        if fault:
+            raise DeckError(f"{name}: the contact of load step {number} {fault}")
 
     def holes_near(self, contact: Estimate) -> int:
-        """Return the number of holes of a height map within the bounds of an estimated contact."""
-        if self.height_map is None:
+        """Return the number of holes of height maps within the bounds of an estimated contact."""
+        holes = [one.in_plane(*one.map.holes) for one in self.maps]
+        if not holes:
             return 0
-        at = window.pattern_of(self.deck.grid).coordinates(*self.height_map.holes)
+        at = window.pattern_of(self.deck.grid).coordinates(*np.concatenate(holes, axis=1))
         inside = [(low <= c) & (c <= high) for c, (low, high) in zip(at, contact.bounds, strict=True)]
         return int(np.count_nonzero(inside[0] & inside[1]))
 
@@ -352,8 +358,10 @@ class Problem:
             self.initial_gap(lattice)
             self._check_interface(source, lattice)
             return lattice
-        if lattice is None and not grid.center and self.height_map and (fault := self.height_map.touch_fault):
-            raise DeckError(f"gap: {fault}")
+        if lattice is None and not grid.center:
+            name, fault = self._gap.touch_fault
+            if fault:
+                raise DeckError(f"{name}: {fault}")
         touch = self._gap.first_touch or (0.0, 0.0)
         center = grid.center or touch
         self._center = center if self._gap.given else touch
@@ -383,7 +391,10 @@ class Problem:
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
-        if problems := window.check(grid, lattice, estimate):
+        problems = window.check(grid, lattice, estimate)
+        if self.window_fixed and not self.gap_given:
+            problems += window.check_maps(grid, lattice, self.maps)
+        if problems:
             raise deck_error(problems, source)
         return lattice
 

@@ -19,6 +19,7 @@ from ..arrays import Array, Mask, reals
 from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
 from ..core.lattice import Lattice, Pattern
 from ..deck.faults import MISSING, Mistake
+from ..deck.height_map import Placed
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
@@ -358,6 +359,13 @@ def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     return replace(centered(spacing, center, (n_row, n_col), pattern), periodic=True), problems
 
 
+def sides(lattice: Lattice) -> tuple[float, float] | None:
+    """Return the sides (m) of a window along x and y; None if they lie in other directions."""
+    first, second = lattice.basis * [[lattice.n_col], [lattice.n_row]]
+    straight = max(abs(first[1]), abs(second[0])) < _RIGHT * min(abs(first[0]), abs(second[1]))
+    return (abs(float(first[0])), abs(float(second[1]))) if straight else None
+
+
 def seam_fault(gap: Array) -> str:
     """Return the fault of a gap (m) with a step between opposite sides of its period; empty without one.
 
@@ -414,13 +422,49 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     return lattice
 
 
+def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
+    """Return the faults of a given window that reaches beyond maps of heights."""
+    if isinstance(grid.extent, tuple):
+        key, center = "extent", grid.center
+        middle = lattice.origin + np.array([np.mean(lattice.cols), np.mean(lattice.rows)]) @ lattice.basis
+        x, y = _rectangle(center or tuple(middle), grid.extent)
+    else:
+        key, (col, row) = "window", np.meshgrid(lattice.cols[[0, -1]], lattice.rows[[0, -1]])
+        x, y = (lattice.origin + np.stack([col.ravel(), row.ravel()], axis=1) @ lattice.basis).T
+    problems = []
+    for one in maps:
+        at, own = np.stack(one.own(x, y)), (one.map.x, one.map.y)
+        beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
+        if not beyond:
+            continue
+        theirs, ours = (
+            " and ".join(
+                f"{'xy'[i]} from {readable(ends[i].min())} to {readable(ends[i].max())}" for i in beyond
+            )
+            for ends in (at, own)
+        )
+        sizes, of_map = np.ptp(at, axis=1), [float(np.ptp(points)) for points in own]
+        swapped = not one.extruded and sizes[0] <= of_map[1] and sizes[1] <= of_map[0]
+        sentence = (
+            f"the window is larger than the map of {one.name}: {theirs}, the map {ours} only; expected "
+        )
+        sentence += "a smaller one, or heights of a larger part" + "; are x and y swapped?" * bool(swapped)
+        problems.append(Mistake(("grid", key), getattr(grid, key), sentence))
+    return problems
+
+
+def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tuple[Array, Array]:
+    """Return the corners (m) of a rectangle."""
+    x = center[0] + extent[0] / 2 * np.array([-1, 1, -1, 1])
+    y = center[1] + extent[1] / 2 * np.array([-1, -1, 1, 1])
+    return x, y
+
+
 def _corners(
     center: tuple[float, float], extent: tuple[float, float], pattern: Pattern
 ) -> tuple[Array, Array]:
     """Return the bounds of a rectangle in lattice coordinates."""
-    x = center[0] + extent[0] / 2 * np.array([-1, 1, -1, 1])
-    y = center[1] + extent[1] / 2 * np.array([-1, -1, 1, 1])
-    coordinates = np.stack(pattern.coordinates(x, y))
+    coordinates = np.stack(pattern.coordinates(*_rectangle(center, extent)))
     return coordinates.min(axis=1), coordinates.max(axis=1)
 
 

@@ -1,0 +1,326 @@
+"""Heights measured on a rectangular grid: their interpolation, with steps, holes and ends of the data."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from ..arrays import Array, Mask, reals
+from ..errors import DeckError
+from ..text import listed, quantity
+from .units import LENGTH, Dimension, UnitError, to_si
+
+if TYPE_CHECKING:
+    import xarray
+
+
+# Departure of a spline from the range of two neighbouring heights, over the largest difference nearby: 0.2
+# beside a step, 0.17 beside the kink of a flat, at most 0.01 for waves of six points and more. The part that
+# curvature explains is left out: 1/4 of the second differences (a parabola has 1/6, by control points).
+_STEP, _CURVED = 0.1, 0.25
+_ECHO = 4  # points beyond which the ringing of a cubic spline, 0.27 times as high with each, is left
+_BESIDE_HOLE = 2  # points from a hole that no contact may come to
+_TURNED = "expected the gap, such as heights.max() - heights of heights out of the body"
+
+
+class HeightMap:
+    """A gap that was measured at the points of a rectangular grid, inf beyond them and in cells beside holes.
+
+    Between the points it is their cubic spline. Near steps, where that would ring, it is a bicubic with
+    monotone slopes (Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300) in the range of the
+    four heights around. Columns x and rows y (m) have any order; the values at (x, y) are NaN in a hole, inf
+    where nothing can touch. A `whole` map has no holes.
+    """
+
+    def __init__(
+        self, x: Array, y: Array, gap: Array, name: str = "gap", degree: int = 3, whole: bool = False
+    ) -> None:
+        order = np.argsort(x), np.argsort(y)
+        self.x, self.y, self.gap = x[order[0]], y[order[1]], gap[np.ix_(*order)]
+        there = np.isfinite(self.gap)
+        ascending = [len(at) > 1 and np.isfinite(at).all() and np.diff(at).all() for at in (self.x, self.y)]
+        if not all(ascending) or (whole and not there.all()):
+            raise DeckError(f"{name}: expected numbers at all points of a rectangular grid, without holes")
+        if not there.any() or np.isneginf(self.gap).any():
+            raise DeckError(f"{name}: expected heights, NaN in holes, and inf where nothing can touch")
+        # the map ends where its points do
+        rows, cols = (_span(np.asarray(there.any(axis=axis))) for axis in (1, 0))
+        self.x, self.y, self.gap, there = self.x[rows], self.y[cols], self.gap[rows, cols], there[rows, cols]
+        self._degree, self._there = degree, there
+        self._filled = self.gap if there.all() else self.gap[_nearest(there)]
+        row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
+        self.first_touch = float(self.x[row]), float(self.y[col])  # point (m) where the gap is smallest
+        # median distances (m) of its points along x and y
+        self.distances = float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
+
+    @classmethod
+    def of(
+        cls, gap: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH, degree: int = 3
+    ) -> Self:
+        """Return the map of an array with the coordinates x and y, each along a dimension."""
+        x, y = gap.coords["x"], gap.coords["y"]
+        if sorted(map(str, gap.dims)) != sorted(map(str, x.dims + y.dims)):
+            named = listed([str(name) for name in gap.dims], "and")
+            raise DeckError(f"{name}: expected the dimensions of x and y, not {named}")
+        values = in_si(gap.transpose(*x.dims, *y.dims), name, dimension)
+        return cls(in_si(x, name), in_si(y, name), values, name, degree, whole=degree == 1)
+
+    @property
+    def holes(self) -> tuple[Array, Array]:
+        """Coordinates (m) x and y of the points without a height."""
+        row, col = np.nonzero(np.isnan(self.gap))
+        return self.x[row], self.y[col]
+
+    # --- interpolation --------------------------------------------------------------------------------------
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Return the gap (m) at points of the plane."""
+        # a node at the end of the map belongs to it, whatever the rounding of its coordinates
+        (low, high), (left, right) = (
+            (points[0] - slack, points[-1] + slack)
+            for points, slack in zip((self.x, self.y), 1e-9 * np.array(self.distances), strict=True)
+        )
+        inside = (low <= x) & (x <= high) & (left <= y) & (y <= right)
+        found = np.where(inside, self._spline.ev(x, y), np.inf)
+        if self._smooth is not None:
+            share = np.clip(self._smooth.ev(x, y), 0.0, 1.0)
+            near = inside & (share < 1.0 - 1e-9)
+            inner = np.asarray(x)[near], np.asarray(y)[near]
+            monotone = np.clip(self._bicubic(np.stack(inner, axis=-1)), *self._range(*inner))
+            found[near] = share[near] * found[near] + (1.0 - share[near]) * monotone
+        if not self._there.all():
+            found[inside & (self._through(~self._there).ev(x, y) > 1e-9)] = np.inf
+        return found
+
+    def _through(self, values: Array, degree: int = 1) -> Any:
+        """Return the spline through values at the points."""
+        from scipy.interpolate import RectBivariateSpline
+
+        kx, ky = (min(degree, len(along) - 1) for along in (self.x, self.y))
+        return RectBivariateSpline(self.x, self.y, values.astype(float), kx=kx, ky=ky)
+
+    @cached_property
+    def _spline(self) -> Any:
+        return self._through(self._filled, self._degree)
+
+    @cached_property
+    def near_steps(self) -> Mask:
+        """Points beside steps, at which the spline leaves the range of the heights, and in holes."""
+        found = ~self._there
+        if self._degree > 1:
+            x, y, heights = self.x, self.y, self._filled
+            if len(x) > 2:  # two points have a line between them
+                found |= _beside_steps(x, heights, self._spline(x, y, dx=1))
+            if len(y) > 2:
+                found |= _beside_steps(y, heights.T, self._spline(x, y, dy=1).T).T
+        return found
+
+    @cached_property
+    def _smooth(self) -> Any:
+        """Share of the spline, linear between the points; None without steps and holes."""
+        if self._degree == 1 or not self.near_steps.any():
+            return None
+        from scipy.ndimage import binary_dilation
+
+        return self._through(np.asarray(~binary_dilation(self.near_steps, iterations=_ECHO)))
+
+    @cached_property
+    def _bicubic(self) -> Any:
+        from scipy.interpolate import CubicHermiteSpline, NdPPoly, PchipInterpolator
+
+        x, y, values = self.x, self.y, self._filled
+        of_x, of_y = (PchipInterpolator(at, values, axis=k)(at, 1) for k, at in enumerate((x, y)))
+        twist = PchipInterpolator(y, of_x, axis=1)(y, 1)
+        along_x, across = (CubicHermiteSpline(x, *pair).c for pair in ((values, of_x), (of_y, twist)))
+        coefficients: Any = CubicHermiteSpline(y, along_x, across, axis=2).c
+        return NdPPoly(coefficients.transpose(2, 0, 3, 1), (x, y))
+
+    def _range(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return the smallest and the largest of the four heights around points of the map."""
+        row, col = (
+            np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(along) - 2)
+            for along, at in ((self.x, x), (self.y, y))
+        )
+        around = [self._filled[row + i, col + j] for i in (0, 1) for j in (0, 1)]
+        return np.minimum.reduce(around), np.maximum.reduce(around)
+
+    @cached_property
+    def overshoot(self) -> float:
+        """Largest departure (m) from the range of the four heights around, in the middles of cells."""
+        x, y = (along[:-1] + np.diff(along) / 2 for along in (self.x, self.y))
+        around = [self._filled[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)]
+        found = np.array(self._spline(x, y))
+        if self._smooth is not None:
+            row, col = np.nonzero(self._smooth(x, y) < 1.0 - 1e-9)
+            found[row, col] = self(x[row], y[col])
+        beyond = np.maximum(found - np.maximum.reduce(around), np.minimum.reduce(around) - found)
+        largest = float(beyond[np.isfinite(beyond)].max(initial=0.0))
+        return largest if largest > 1e-12 * np.ptp(self._filled) else 0.0  # rounding
+
+    # --- contacts that the data do not bound ----------------------------------------------------------------
+
+    def touch_fault(self, turned: str = _TURNED) -> str:
+        """Return the sentence about a lowest point at the end of the map; empty if it lies inside.
+
+        `turned` says what is expected of heights that point the other way.
+        """
+        low, high = (_is_at_end(values) for values in (self.gap, -np.where(self._there, self.gap, -np.inf)))
+        if not low:
+            return ""
+        if not high:
+            return (
+                "the heights point the other way: the lowest point of the map lies at its end, the highest "
+                f"inside; {turned}"
+            )
+        return (
+            f"the lowest point of the map lies at its end, at {_place(*self.first_touch)}, so that the data "
+            "do not bound the contact; expected heights of a larger part, or center where the contact lies"
+        )
+
+    def fault_near(self, distance: float, x: Array, y: Array) -> str:
+        """Return the fault of a contact at some points: near a hole, or within a distance (m) of the end."""
+        inside = [along[0] + distance <= at for along, at in ((self.x, x), (self.y, y))]
+        inside += [at <= along[-1] - distance for along, at in ((self.x, x), (self.y, y))]
+        if not np.all(inside):
+            return (
+                "reaches the end of the height map; expected heights of a larger part, or a function that "
+                "says what lies beyond"
+            )
+        if not (holes := np.isnan(self.gap)).any():
+            return ""
+        at = tuple(
+            np.rint(np.interp(p, c, np.arange(len(c)))).astype(int) for p, c in ((x, self.x), (y, self.y))
+        )
+        hole = [index[at] for index in _nearest(holes)]
+        apart = np.maximum(*(abs(of - to) for of, to in zip(at, hole, strict=True)))
+        if not apart.size or apart.min() > _BESIDE_HOLE:
+            return ""
+        row, col = (index[apart.argmin()] for index in hole)
+        return (
+            f"comes within {_BESIDE_HOLE} points of a hole of the height map, at "
+            f"{_place(self.x[row], self.y[col])}; fill it, as by gap.interpolate_na, or set it to inf if "
+            "nothing can touch there"
+        )
+
+    def __str__(self) -> str:
+        """Describe the map and its interpolation."""
+        apart = " by ".join(dict.fromkeys(quantity(distance, "m", 3) for distance in self.distances))
+        missing = int(np.count_nonzero(~self._there))
+        return (
+            f"map of {len(self.x)} x {len(self.y)} points, {apart} apart"
+            f"{f', {missing} without a height' if missing else ''}; {self.interpolated}"
+        )
+
+    @property
+    def interpolated(self) -> str:
+        """Describe the interpolation."""
+        rule = "cubic spline" if self._degree > 1 else "bilinear"
+        if special := int(np.count_nonzero(self.near_steps)):
+            rule += f", kept in the range of the heights near {special} points at steps and holes"
+        return f"{rule}; largest overshoot {quantity(self.overshoot, 'm', 2)}"
+
+
+class Placed(NamedTuple):
+    """A map at its place in the plane: its origin (m) and the angle (rad) of its first axis from x."""
+
+    name: str  # in messages
+    map: HeightMap
+    offset: tuple[float, float] = (0.0, 0.0)
+    angle: float = 0.0
+    turned: str = _TURNED
+    extruded: bool = False  # along the first axis
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """Median distances (m) of its points along its axes."""
+        return tuple(self.map.distances[axis] for axis in self.axes)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes along which it has an end."""
+        return (1,) if self.extruded else (0, 1)
+
+    def is_beyond(self, axis: int, at: Array) -> bool:
+        """Test whether points in its own coordinates lie beyond its ends along an axis."""
+        points, slack = (self.map.x, self.map.y)[axis], 1e-9 * self.map.distances[axis]
+        return bool(at.min() < points[0] - slack or at.max() > points[-1] + slack)
+
+    def own(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return points of the plane in coordinates of the map."""
+        return _turned(x - self.offset[0], y - self.offset[1], -self.angle)
+
+    def in_plane(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return points of the map in coordinates of the plane."""
+        x, y = _turned(x, y, self.angle)
+        return x + self.offset[0], y + self.offset[1]
+
+    @property
+    def touch_fault(self) -> str:
+        """Sentence about a lowest point at the end of the map; empty if it lies inside."""
+        return self.map.touch_fault(self.turned)
+
+    def fault_near(self, distance: float, x: Array, y: Array) -> str:
+        """Return the fault of a contact at some points of the plane."""
+        return self.map.fault_near(distance, *self.own(x, y))
+
+
+def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+    """Return points that are turned about the origin by an angle (rad)."""
+    a, b = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
+    return a * x - b * y, b * x + a * y
+
+
+def _beside_steps(along: Array, heights: Array, slopes: Array) -> Mask:
+    """Return which points of lines bound an interval where a spline overshoots more than by curvature."""
+    from scipy.ndimage import maximum_filter1d
+
+    size = np.diff(along)[:, None]
+    rise = np.diff(heights, axis=0)
+    bend = np.diff(rise / size, axis=0)
+    bend = np.concatenate([bend[:1], bend, bend[-1:]]) if len(bend) else np.zeros_like(heights)
+    ends = np.stack([heights[:-1], heights[1:]])
+    inner = ends + np.stack([slopes[:-1], -slopes[1:]]) * size / 3.0  # control points of Bezier
+    bends = np.stack([bend[:-1], bend[1:]]) * size * _CURVED
+    below = ends.min(axis=0) - inner.min(axis=0) - np.maximum(bends.min(axis=0), 0.0)
+    above = inner.max(axis=0) - ends.max(axis=0) + np.minimum(bends.max(axis=0), 0.0)
+    local = np.maximum(maximum_filter1d(abs(rise), 5, axis=0), 1e-6 * np.ptp(heights))
+    steep = np.maximum(below, above) > _STEP * local
+    found = np.zeros(heights.shape, bool)
+    found[:-1] |= steep
+    found[1:] |= steep
+    return found
+
+
+def _nearest(chosen: Mask) -> tuple[Any, ...]:
+    """Return the indices of the chosen point that is nearest to each point of a grid."""
+    from scipy.ndimage import distance_transform_edt
+
+    return tuple(distance_transform_edt(~chosen, return_distances=False, return_indices=True))
+
+
+def _span(chosen: Mask) -> slice:
+    at = np.flatnonzero(chosen)
+    return slice(at[0], at[-1] + 1)
+
+
+def _is_at_end(values: Array) -> bool:
+    """Return whether the least of some values, which may be missing, is on the rim of their grid alone."""
+    inner = values[1:-1, 1:-1]
+    return not np.isfinite(inner).any() or bool(np.nanmin(values) < np.nanmin(inner))
+
+
+def _place(x: float, y: float) -> str:
+    return f"x = {x:.4g} m, y = {y:.4g} m"
+
+
+def in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
+    """Return values in SI, converted from the attribute `units`; without it they are in SI."""
+    units = str(values.attrs.get("units", dimension.unit))
+    try:
+        return reals(values, name) * (1.0 if units in ("", "1") else to_si(f"1 {units}", dimension))
+    except UnitError:
+        expected = "lengths" if dimension is LENGTH else dimension.name
+        raise DeckError(f"{name}: {values.name or 'values'} in {units}: expected {expected}") from None

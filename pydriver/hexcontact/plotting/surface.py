@@ -1,0 +1,100 @@
+"""Surfaces of a deck before it is run: measured maps and profiles, else the gap, with the window."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..arrays import Array
+from ..deck.measured import Measured
+from ..text import scaled
+from .registry import figure
+from .style import EDGED, EXACT, new_figure, set_title
+
+_WIDTH, _HEIGHT = 4.8, 4.2  # inches of a panel
+_POINTS = 201  # along a side of the gap, if no surface was measured
+
+
+@figure("surface", "measured surfaces, or the gap, and the window, of a deck", needs="a deck")
+def surface(case: Any) -> Figure:
+    """Draw the measured surfaces of a case, each as it lies in the plane, or the gap if there are none.
+
+    Parameters
+    ----------
+    case : hexcontact.Case
+        A case.
+    """
+    body = case.deck.body
+    maps = [
+        (number, one)
+        for number, part in ((1, body.body_1), (2, body.body_2))
+        for one in (part.surface.measured if part.surface else ())
+    ]
+    canvas = new_figure(_WIDTH * max(len(maps), 1), _HEIGHT)
+    canvas.set_layout_engine("compressed")
+    panels = canvas.subplots(1, max(len(maps), 1), squeeze=False)[0]
+    for axes, (number, one) in zip(panels, maps, strict=False):
+        axes.set_title(f"body {number}: {one}")
+        (_line if one.extruded else _map)(axes, one, case)
+    if not maps:
+        _gap(panels[0], case)
+    set_title(canvas, case.title)
+    return canvas
+
+
+def _map(axes: Axes, one: Measured, case: Any) -> None:
+    """Draw the heights of a map as far as it is measured; points without one are gray."""
+    found = one.placed("").map
+    (x, y), height = (found.x + one.offset[0], found.y + one.offset[1]), -found.gap  # type: ignore[operator]
+    _colored(axes, x, y, height if one.upwards else -height, "height" if one.upwards else "gap", case)
+
+
+def _gap(axes: Axes, case: Any) -> None:
+    """Draw the gap over the rectangle about the window."""
+    u, v = _window(case)
+    x, y = (np.linspace(at.min(), at.max(), _POINTS) for at in (u, v))
+    gap = case.deck.body.separation(*np.meshgrid(x, y, indexing="ij"))
+    _colored(axes, x, y, gap, "gap", case)
+
+
+def _colored(axes: Axes, x: Array, y: Array, values: Array, words: str, case: Any) -> None:
+    """Draw values over the plane, with the window and the point of first touch."""
+    shown = np.ma.masked_invalid(values)
+    times, unit = scaled(float(shown.max() - shown.min()), "m")
+    scale, length = scaled(max(float(np.ptp(x)), float(np.ptp(y))), "m")
+    axes.set_facecolor("0.7")
+    drawn = axes.pcolormesh(x * scale, y * scale, times * shown.T, shading="nearest", rasterized=True)
+    axes.figure.colorbar(drawn, ax=axes, label=f"{words} ({unit})")
+    u, v = _window(case)
+    axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
+    touch = case.deck.body.separation.first_touch
+    axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
+    axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})", aspect="equal")
+    axes.legend(loc="upper right", labelcolor="w", fontsize=8)
+
+
+def _window(case: Any) -> tuple[Array, Array]:
+    """Return the closed outline of the window (m)."""
+    lattice = case.lattice
+    col, row = (at[[0, 0, -1, -1, 0]] for at in (lattice.cols, lattice.rows))
+    corners = lattice.origin + np.stack([col[[0, 2, 3, 1, 0]], row], axis=1) @ lattice.basis
+    return corners[:, 0], corners[:, 1]
+
+
+def _line(axes: Axes, one: Measured, case: Any) -> None:
+    """Draw a profile across its direction, with the width of the window."""
+    placed = one.placed("")
+    y, height = placed.map.y, -placed.map.gap[0] if one.upwards else placed.map.gap[0]
+    scale, length = scaled(float(np.ptp(y)), "m")
+    times, unit = scaled(float(np.ptp(height[np.isfinite(height)])), "m")
+    axes.plot(scale * y, times * height)
+    _, across = placed.own(*_window(case))
+    for end in (across.min(), across.max()):
+        axes.axvline(scale * end, color=EXACT, lw=0.8, ls="--")
+    words = "height" if one.upwards else "gap"
+    angle = math.degrees(one.direction)
+    axes.set(ylabel=f"{words} ({unit})", xlabel=f"across {angle:.3g}° from x ({length}); dashed: window")

@@ -5,6 +5,7 @@ touch a flat, and infinite where it has no surface that could touch.
 """
 
 from .deck.measured import Map, Profile
+from .deck.rough import Rough
 from .deck.surfaces import (
     SHAPES,
     Cone,
@@ -44,6 +45,7 @@ __all__ = [
     "Punch",
     "RectangularPunch",
     "Roller",
+    "Rough",
     "RoundedPunch",
     "Separation",
     "Sphere",

@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
 from ..variables import BULK_STRESS, FIELDS, LOADS
-from . import measured  # noqa: F401 (its shapes)
+from . import measured, rough  # noqa: F401 (their shapes)
 from .below import Fatigue, Stress
 from .faults import Mistake
 from .interface import Friction, Interface

@@ -105,6 +105,8 @@ class Surface(Argument):
 
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
+    as_given: ClassVar[bool] = False
+    """Whether its heights count as they are given, wherever it would first touch."""
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the height (m) at points of the plane.
@@ -157,6 +159,10 @@ class Surface(Argument):
         """Distance (m) from the center beyond which nothing can touch; infinite for most shapes."""
         return math.inf
 
+    def rows(self, spacing: float) -> Iterator[str]:
+        """Yield lines about its data, beside the spacing (m) of a lattice."""
+        yield from ()
+
     def _height(self, x: Array, y: Array) -> Array:
         raise NotImplementedError
 
@@ -192,6 +198,8 @@ def shape(word: str) -> Callable[[type[_S]], type[_S]]:
 @shape("flat")
 class Flat(Surface):
     """A plane."""
+
+    as_given: ClassVar[bool] = True
 
     formula: ClassVar[str] = "h = 0"
 
@@ -474,6 +482,8 @@ class Roller(Surface):
 class FormulaSurface(Surface):
     """Any height, such as that of several pads."""
 
+    as_given: ClassVar[bool] = True
+
     expression: Annotated[str, HeightFormula()] = meaning(
         ..., "height h in m, of x and y in m", '"min(x**2, (x - 1e-3)**2)/2e-2 + y**2/2e-2"'
     )
@@ -519,6 +529,8 @@ _REFUSED = {
 
 class SurfaceSum(Surface):
     """Several shapes on one body, whose heights add up."""
+
+    as_given: ClassVar[bool] = True
 
     parts: tuple[Surface, ...] = ()
 
@@ -637,10 +649,9 @@ class Separation:
         one, two = self.surface_1, self.surface_2
         if one.measured or two.measured:
             return self._first_of_points()
-        known = Flat | FormulaSurface | SurfaceSum  # whose heights count as they are given
-        if isinstance(one, known) or any(one.tilt) or one.offset == two.offset:
+        if one.as_given or any(one.tilt) or one.offset == two.offset:
             return (*two.offset, 0.0)
-        if isinstance(two, known) or any(two.tilt):
+        if two.as_given or any(two.tilt):
             return (*one.offset, 0.0)
         x, y = self.quadratic[1] if self.quadratic else self._search()
         return x, y, float(self._sum(x, y))

@@ -248,9 +248,9 @@ def _body(body: Body) -> str:
 
 
 def _maps(case: Problem) -> Iterator[Row]:
-    """Yield rows about the measured surfaces."""
-    for number, body in ((1, case.body_1), (2, case.body_2)):
-        for one in body.surface.measured if body.surface else ():
+    """Yield rows about measured and rough surfaces."""
+    for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2)):
+        for one in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
             for place, words in enumerate(one.rows(case.lattice.spacing)):
                 yield (f"{one.shape} of body {number}" if not place else "", words)
 

@@ -136,8 +136,8 @@ class Problem:
         self.friction_coefficient = coulomb(deck.friction, deck.interface) or 0.0
         self._friction = FrictionField(deck.friction, deck.interface)
         self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
-        surfaces = repeating.surfaces if repeating else deck.body.separation
-        self._gap = PlaneField(surfaces if gap is None else gap, GAP)
+        self.surfaces = repeating.surfaces if repeating else deck.body.separation
+        self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns

@@ -1,0 +1,140 @@
+"""Random surfaces that are self-affine between two wavelengths.
+
+Power spectral density over the wave vector k: constant for 2π/longest <= k < 2π/rolloff, then falling like
+k^(-2(1 + H)) up to 2π/shortest, zero elsewhere (B. N. J. Persson et al., J. Phys.: Condens. Matter 17, 2005, R1).
+Amplitudes are Gaussian. Longer waves come first from the random numbers, so that a shorter `shortest` adds waves
+and changes none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import PrivateAttr
+
+from ..arrays import Array
+from ..errors import DeckError
+from ..text import quantity
+from .kinds import Quantity, Whole
+from .measured import TwoLengths
+from .surfaces import PositiveLength, PositiveNumber, Surface, shape
+from .table_base import meaning
+from .units import NUMBER, readable
+
+_POINTS = 8  # of the grid in the shortest wave; a cubic spline between them
+_MOST_POINTS = 2**26
+_OF_LONGEST = 4  # longest waves in the period of a surface of which none is given
+_EVEN = 1e-9  # rounding of a wave of just the shortest or the longest length
+
+
+@shape("rough")
+class Rough(Surface):
+    """A self-affine rough surface; heights count from its highest point."""
+
+    hurst: Annotated[float, Quantity(NUMBER, above=0, at_most=1)] = meaning(..., "Hurst exponent H")
+    shortest: PositiveLength = meaning(..., "shortest wavelength")
+    longest: PositiveLength = meaning(..., "longest wavelength")
+    rolloff: PositiveLength | None = meaning(
+        None, "wavelength above which the spectrum is constant; default: longest", '"50 um"'
+    )
+    rms_height: PositiveLength | None = meaning(None, "root mean square of the heights, or", '"0.5 um"')
+    rms_slope: PositiveNumber | None = meaning(None, "root mean square of the slope", "0.05")
+    seed: Annotated[int, Whole(0)] = meaning(0, "seed of the random numbers: another one, another surface")
+    period: TwoLengths = meaning(
+        None,
+        "lengths along x and y after which it repeats; default: those of a window that repeats, "
+        f"else {_OF_LONGEST} longest",
+    )
+    formula: ClassVar[str] = "h = Σ of random waves between shortest and longest"
+    as_given: ClassVar[bool] = True
+    _sides: tuple[float, float] | None = PrivateAttr(None)
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Require one root mean square."""
+        if ("rms_height" in data) == ("rms_slope" in data):
+            found = "not both" if "rms_height" in data else "one of them"
+            yield "rms_height", f"expected rms_height or rms_slope, {found}"
+
+    def model_post_init(self, context: Any) -> None:
+        """Refuse wavelengths in another order, and more waves than fit."""
+        super().model_post_init(context)
+        rolloff = self.longest if self.rolloff is None else self.rolloff
+        if not self.shortest < rolloff <= self.longest:
+            raise DeckError("shortest, rolloff, longest: expected wavelengths that increase")
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
+        if sides is None:
+            raise DeckError(
+                'a rough surface repeats along x and y only; expected grid.lattice = "rectangular", and '
+                "grid.direction = 0"
+            )
+        other = self.model_copy()
+        for key in ("_heights", "_step"):
+            other.__dict__.pop(key, None)
+        other._sides = self.period or sides
+        return other
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Lengths (m) along x and y after which it repeats."""
+        side = _OF_LONGEST * self.longest
+        return self._sides or self.period or (side, side)
+
+    @cached_property
+    def _heights(self) -> Array:
+        """Depth (m) below the highest point at the points of a grid over the period."""
+        shape = [2 * math.ceil(_POINTS * side / self.shortest / 2) for side in self.sides]
+        if math.prod(shape) > _MOST_POINTS:
+            raise DeckError(
+                f"a rough surface with {shape[0]} x {shape[1]} points in its period of {self._in_words}; "
+                f"expected at most {_MOST_POINTS:,}: a smaller period, or a longer shortest wave"
+            )
+        along, across = np.meshgrid(*(np.fft.fftfreq(n, 1 / n) for n in shape), indexing="ij")
+        wave = np.hypot(along / self.sides[0], across / self.sides[1])
+        half = (across > 0) | ((across == 0) & (along > 0))
+        chosen = half & (wave * self.longest > 1 - _EVEN) & (wave * self.shortest < 1 + _EVEN)
+        if not chosen.any():
+            raise DeckError(f"no wave between shortest and longest fits in a period of {self._in_words}")
+        k, m, n = (values[chosen] for values in (wave, along, across))
+        order = np.lexsort((m, n, np.round(k / k.max(), 12)))
+        corner = 1.0 / (self.longest if self.rolloff is None else self.rolloff)
+        size = np.maximum(k / corner, 1.0) ** (-1.0 - self.hurst)
+        random = np.random.default_rng(self.seed).standard_normal((len(k), 2)) @ [1.0, 1.0j]
+        amplitude = np.empty(len(k), complex)
+        amplitude[order] = size[order] * random
+        # z = Re sum a exp(i k r): half of |a|^2 each
+        power = np.abs(amplitude) ** 2 / 2
+        if self.rms_height is not None:
+            scale = self.rms_height / math.sqrt(power.sum())
+        else:
+            assert self.rms_slope is not None
+            scale = self.rms_slope / (2 * math.pi * math.sqrt((k**2 * power).sum()))
+        spectrum = np.zeros(shape, complex)
+        spectrum[chosen] = scale * amplitude
+        heights = (np.fft.ifft2(spectrum) * math.prod(shape)).real
+        return np.asarray(heights.max() - heights)
+
+    def _height(self, x: Array, y: Array) -> Array:
+        from scipy.ndimage import map_coordinates
+
+        at = np.broadcast_arrays(x, y)
+        places = [of * n / side for of, n, side in zip(at, self._heights.shape, self.sides, strict=True)]
+        return np.asarray(map_coordinates(self._heights, places, order=3, mode="grid-wrap"))
+
+    @property
+    def _in_words(self) -> str:
+        return " by ".join(readable(side) for side in self.sides)
+
+    def rows(self, spacing: float) -> Iterator[str]:
+        """Yield lines about its period, and its shortest wave beside the spacing of a lattice."""
+        yield f"repeats after {self._in_words}"
+        yield (
+            f"the shortest wave has {self.shortest / spacing:.3g} spacings of {quantity(spacing, 'm', 3)}; "
+            "the contact area needs about 16"
+        )

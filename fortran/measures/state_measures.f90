@@ -26,6 +26,9 @@ module hc_state_measures
     real(wp) :: area = 0.0_wp, radius = 0.0_wp, area_fit = 0.0_wp, radius_fit = 0.0_wp
     !> Half-axes of the ellipse with the moments of the area to the edge [m]
     real(wp) :: semi_major = 0.0_wp, semi_minor = 0.0_wp
+    !> In a window that repeats, where the edge stays unknown: a fifth of the cells along it. The distance from the limit of fine
+    !> lattices was at most 0.18 of them, with 4 to 32 spacings in the shortest wave of rough surfaces [m^2]
+    real(wp) :: area_error = 0.0_wp
   end type zone_measures_t
 
   !> Quantities of a state that a load history records.
@@ -258,6 +261,7 @@ contains
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))
+        found%contact%area_error = 0.2_wp*lattice%cell_area()*count(contact .and. .not. all_around(contact))
         return
       end if
       allocate (x, y, mold=initial_gap)
@@ -268,6 +272,15 @@ contains
       found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
     end associate
   end subroutine measure_contact
+
+  !> Find the nodes whose neighbors along rows and columns are all in a zone of a window that repeats.
+  pure function all_around(zone) result(inside)
+    !> Nodes of the zone
+    logical, intent(in) :: zone(:, :)
+    logical :: inside(size(zone, 1), size(zone, 2))
+
+    inside = cshift(zone, 1, dim=1) .and. cshift(zone, -1, dim=1) .and. cshift(zone, 1, dim=2) .and. cshift(zone, -1, dim=2)
+  end function all_around
 
   !> Measure the cells of a zone alone; its edge stays unknown.
   pure type(zone_measures_t) function cells_of(lattice, n_node) result(found)

@@ -178,7 +178,7 @@ RESULTS = {
     "cone": cone,
     "fine": lambda: sphere(half=90, spacing=0.012),
 }
-FRICTIONLESS = [name for name, entry in entries().items() if entry.of_a_result and not entry.needs]
+FRICTIONLESS = [name for name, entry in entries().items() if entry.shows == "result" and not entry.needs]
 results = pytest.mark.parametrize("make", RESULTS)
 
 

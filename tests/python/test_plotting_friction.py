@@ -913,7 +913,7 @@ def worn() -> xarray.Dataset:
 SUITABLE = {
     name: {"torque": torsion, "wear": worn}.get("wear" if name == "worn_depth" else entry.needs, dissimilar)
     for name, entry in entries().items()
-    if entry.of_a_result
+    if entry.shows == "result"
 }
 
 
@@ -984,7 +984,7 @@ NEEDS_FRICTION = {
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, entry in entries().items() if entry.needs and entry.of_a_result]
+    "name", [name for name, entry in entries().items() if entry.needs and entry.shows == "result"]
 )
 def test_what_needs_friction_says_so(name: str) -> None:
     without = frictionless()

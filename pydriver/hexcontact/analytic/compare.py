@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 CIRCULAR = 0.999  # least ratio of the axes of a circular contact
-_SMALL = 1e-6  # share of the sliding load that is no load, and no change of a load
+_SMALL = 1e-6  # share of the sliding load, or of a motion, that is none, and no change of it
 _ASIDE = 1e-3  # largest distance from the line of the load, as a share of the sliding load, or shift
 _BEFORE_SLIDING = (
     0.999  # share of the sliding load beyond which the rigid motion does not follow from the load
@@ -234,7 +234,7 @@ class ClosedForms:
             twisted = np.abs(twist).max() * hertz.radius > _ASIDE * alike.sliding_shift
             return None if twisted else PartialSlip(alike, *line, hertz)
         contact = SuperposedContact(*law, self.gamma, pressed.contact)
-        slides = abs(line[2][-1]) > (1.0 - _STEADY) * contact.sliding_load
+        slides = abs(line[2][-1]) > (1.0 - _SMALL) * contact.sliding_load
         return None if slides or twist.any() else Sheared(contact, *line)
 
     def partial_slip(self, number: int) -> PartialSlip | None:
@@ -336,9 +336,6 @@ def _curve(loads: Sequence[float], first: Callable[[float], Array]) -> tuple[Arr
     return np.array(motion), fine
 
 
-_STEADY = 1e-6  # share of the sliding load, or of a motion, that is none
-
-
 @dataclass(frozen=True)
 class Exact:
     """Values and fields of a closed solution for a load step."""
@@ -406,7 +403,7 @@ def _shear(closed: ClosedForms, number: int) -> list[Exact]:
     if slip is None or pressed is None:
         return []
     contact, values = slip.contact, {}
-    if abs(slip.turns[-1]) < (1.0 - _STEADY) * contact.sliding_load:
+    if abs(slip.turns[-1]) < (1.0 - _SMALL) * contact.sliding_load:
         if not pressed.rim:
             values["stick_radius_fit"] = float(contact.stick_radius(slip.swing))
         if not isinstance(slip, PartialSlip) or is_circular(slip.ellipse):
@@ -427,7 +424,7 @@ def _torsion(closed: ClosedForms, number: int) -> list[Exact]:
     """Return Lubkin's twist, if it holds up to this step and the contact does not slide."""
     torque = float(closed.dataset["torque"][-1]) if "torque" in closed.dataset else 0.0
     loop = closed.torsion(number) if torque else None
-    if loop is None or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
+    if loop is None or abs(loop[1][-1] - torque) > _SMALL * abs(torque):
         return []
     return [Exact("Lubkin", {"twist": float(loop[0][-1])})]
 
@@ -464,12 +461,12 @@ def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
 def _pressed_only(dataset: xarray.Dataset, sliding: float) -> bool:
     """Test whether a growing normal load is the only load."""
     loads = dataset["normal_load"].values
-    if (np.diff(loads) < -_STEADY * loads[-1]).any():
+    if (np.diff(loads) < -_SMALL * loads[-1]).any():
         return False
     scale = sliding if math.isfinite(sliding) else float(loads[-1])
     for axis in "xy":
         name = f"tangential_load_{axis}"
-        if name in dataset and np.abs(dataset[name].values).max() > _STEADY * scale:
+        if name in dataset and np.abs(dataset[name].values).max() > _SMALL * scale:
             return False
     turned = np.abs(dataset["twist"].values).max() if "twist" in dataset else 0.0
     return bool(turned == 0.0)

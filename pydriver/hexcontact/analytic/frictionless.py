@@ -8,8 +8,7 @@ The axisymmetric solutions come from one theorem (Galin, Sneddon): with
 
     P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
 
-Contacts over an ellipse are in :mod:`hexcontact.analytic.frictionless`, those with friction in
-:mod:`hexcontact.analytic.friction`.
+Contacts with friction are in :mod:`hexcontact.analytic.friction`.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def _help() -> str:
     """Return the help, with a line for each figure: this imports the packages that draw."""
     from ..plotting.registry import entries
 
-    choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
+    choices = [(entry.shows, name, entry.help) for name, entry in entries().items()]
     choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
     of_a_result, of_a_study, of_a_table = (
@@ -61,11 +61,6 @@ def _help() -> str:
         f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n"
         f"\b\nOf a study:\n{of_a_study}\n\n\b\nOf a table:\n{of_a_table}"
     )
-
-
-def _kind(entry: Entry) -> str:
-    """Return the kind of the FILE of a figure: a result, a study or a table."""
-    return "study" if entry.of_a_study else "table" if entry.of_a_table else "result"
 
 
 class _WithFigures(TyperCommand):
@@ -141,7 +136,7 @@ def plot(
     holds = "study" if study is not None else "table" if table is not None else "result"
     if holds != "result" and what == "overview":
         what = holds
-    shows = "result" if what == _ALL else _kind(figures[what])
+    shows = "result" if what == _ALL else figures[what].shows
     if holds != shows:
         words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
         kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
@@ -256,7 +251,7 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
 
     lines, written = [], False
     for what, entry in entries().items():
-        if entry.needs == SEVERAL_RUNS or not entry.of_a_result:
+        if entry.needs == SEVERAL_RUNS or entry.shows != "result":
             continue
         own = {name: value for name, value in chosen.items() if {name, f"{name}s"} & entry.options.keys()}
         arguments = _arguments(entry, 1, own)

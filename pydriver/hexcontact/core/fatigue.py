@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, number, reals
+from ..arrays import Array, checked, number, numbers, reals
 from ..errors import DeckError
 from . import flat
 
@@ -91,7 +91,7 @@ def findley(stress: ArrayLike, slope: float) -> CriticalPlane:
     slope : float
         Influence of the normal stress, 0.2 to 0.4 for ductile metals.
     """
-    return CriticalPlane(*flat.findley(_history(stress, 6), _finite(slope)))
+    return CriticalPlane(*flat.findley(_history(stress, 6), *checked(slope=slope)))
 
 
 def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_stress: float) -> CriticalPlane:
@@ -107,7 +107,7 @@ def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_st
         G and sigma_y [Pa].
     """
     moduli = _positive(shear_modulus, "shear_modulus"), _positive(yield_stress, "yield_stress")
-    return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), _finite(slope), *moduli))
+    return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), *checked(slope=slope), *moduli))
 
 
 def crossland(stress: ArrayLike, slope: float) -> Array:
@@ -120,7 +120,7 @@ def crossland(stress: ArrayLike, slope: float) -> Array:
     slope : float
         Influence of the hydrostatic stress: (t - b/sqrt(3))/(b/3) from the limits of torsion t and bending b.
     """
-    return np.asarray(flat.crossland(_history(stress, 6), _finite(slope)))
+    return np.asarray(flat.crossland(_history(stress, 6), *checked(slope=slope)))
 
 
 def dang_van(stress: ArrayLike, slope: float) -> Array:
@@ -133,7 +133,7 @@ def dang_van(stress: ArrayLike, slope: float) -> Array:
     slope : float
         Influence of the hydrostatic stress: 3 (t/b - 1/2) from the limits of torsion t and bending b.
     """
-    return np.asarray(flat.dang_van(_history(stress, 6), _finite(slope)))
+    return np.asarray(flat.dang_van(_history(stress, 6), *checked(slope=slope)))
 
 
 def ruiz(traction: ArrayLike, slip: ArrayLike, stress: ArrayLike) -> Ruiz:
@@ -174,9 +174,7 @@ def life(
         Cycles; inf beyond 1e30, 0 below one half, NaN for NaN.
     """
     names = {"young_modulus": young_modulus, "strength": strength, "b": b, "ductility": ductility, "c": c}
-    return np.asarray(
-        flat.life(reals(value, "value"), **{name: number(v, name) for name, v in names.items()})
-    )
+    return np.asarray(flat.life(reals(value, "value"), **numbers(names)))
 
 
 def _history(history: ArrayLike, components: int) -> Array:
@@ -187,10 +185,6 @@ def _history(history: ArrayLike, components: int) -> Array:
             f"a history of shape {array.shape}: expected (..., times, {components}), a time or more"
         )
     return array
-
-
-def _finite(slope: float) -> float:
-    return number(slope, "slope", "a finite number", np.isfinite)
 
 
 def _positive(value: float, name: str) -> float:

@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Mask, integer, number, reals
+from ..arrays import Array, Mask, checked
 from ..errors import DeckError
 from . import flat
-
-_LENGTH = "a positive length in meters"
 
 
 class Nodes(NamedTuple):
@@ -83,17 +81,7 @@ class Lattice:
     periodic: bool = False
 
     def __post_init__(self) -> None:
-        if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:
-            raise DeckError(f"spacing = {self.spacing!r}: expected {_LENGTH}")
-        number(self.cell_ratio, "cell_ratio", "a positive number", lambda ratio: 0 < ratio < np.inf)
-        kind = "an angle in radians between 0 and pi"
-        number(self.cell_angle, "cell_angle", kind, lambda angle: 0 < angle < np.pi)
-        number(self.direction, "direction", "an angle in radians", lambda angle: abs(angle) <= np.pi)
-        for name in ("row_first", "col_first", "n_row", "n_col"):
-            integer(getattr(self, name), name)
-        origin = reals(self.origin, "origin")
-        if origin.shape != (2,) or not np.isfinite(origin).all():
-            raise DeckError(f"origin = {self.origin!r}: expected two finite lengths in meters")
+        checked(**{name: value for name, value in vars(self).items() if name != "periodic"})
         if self.n_row < 1 or self.n_col < 1:
             raise DeckError(
                 f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"

@@ -19,7 +19,7 @@ from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError
 from . import fields
 from .fields import Region, region
-from .stress import Fields, Loaded, NearSurface, add_bulk, source_of, summed, window_over
+from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, source_of, summed, window_over
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -153,13 +153,6 @@ def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple
                 block_of[:, some] = np.moveaxis(stress, 0, 1)
             start = plane * where.lattice.size + row * n_col
             yield slice(start, start + len(block_of)), block_of
-
-
-def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
-    """Return fields (step, component, n_row, n_col) on a window that covers theirs."""
-    if whole == lattice:
-        return values
-    return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
 
 
 def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteria) -> xarray.Dataset:

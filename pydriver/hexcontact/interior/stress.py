@@ -386,9 +386,15 @@ def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region,
         f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes in {len(loads)} steps",
         "choose a smaller box, or one nearer to the window, fewer depths or steps",
     )
-    moved = np.array([[lattice.embed(field, whole) for field in step] for step in loads], dtype=float)
-    found = fields.on_planes(whole, moved, body, nu, depths, components=components)
+    found = fields.on_planes(whole, embedded(lattice, whole, loads), body, nu, depths, components=components)
     return np.moveaxis(found[..., rows, cols], 2, -1)
+
+
+def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
+    """Return fields (step, component, n_row, n_col) on a window that covers theirs."""
+    if whole == lattice:
+        return values
+    return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
 
 
 def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, slice, slice]:

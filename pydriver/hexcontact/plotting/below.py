@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,18 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
 from ..deck.below import Fatigue
 from ..errors import NotInResult
 from ..interior.files import tables_of
-from ..interior.stress import LOADED, Loaded, below, bodies_of
+from ..interior.stress import bodies_of
 from ..result.export import kept_steps
-from ..result.result import Result, at_hand
-from ..result.step import nodal
+from ..result.result import Result, as_result, at_hand
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, visible, worded
-from ..variables import EDGES, spelled
+from ..variables import spelled
 from .maps import Part, mesh_of
 from .registry import figure
 from .report_data import mapped_steps
@@ -39,6 +37,8 @@ from .style import (
     legend_under,
     mark_largest,
     new_figure,
+    new_panels,
+    panels_of,
     set_title,
     shades,
     titled,
@@ -65,7 +65,7 @@ def stress(
     depth = np.linspace(0.0, _DEPTH * cut.line.length, _POINTS // 2)
     x, y = cut.line.points(along)
     points = np.stack(np.broadcast_arrays(x[None], y[None], depth[:, None]), axis=-1)
-    found = _below(view, points, "von_mises_stress")
+    found = _below(result, step, points, "von_mises_stress")
     values = found["von_mises_stress"].values
 
     canvas, axes = drawing(None, 5.6, 3.4, equal=True)
@@ -111,7 +111,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     points = np.stack([x, y, np.full(2, depth)], axis=-1)
     names = ("stress_xx", "stress_yy", "stress_xy")
     along = np.array([math.cos(angle) ** 2, math.sin(angle) ** 2, math.sin(2.0 * angle)])
-    found = [_below(view, points, *names) for view in views]
+    found = [_below(result, view.number, points, *names) for view in views]
     stress = np.array(
         [sum(c * one[name].values for c, name in zip(along, names, strict=True)) for one in found]
     )
@@ -133,15 +133,11 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     return canvas
 
 
-def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
+def _below(result: Result | xarray.Dataset, step: int, points: Array, *names: str) -> xarray.Dataset:
     """Return stresses of a load step at points of body 1, or of body 2 if body 1 is rigid."""
-    wanted = LOADED if is_compliant(view.data.attrs) else (*LOADED, *EDGES)
-    fields = {name: view.data[name].values for name in wanted if view.has(name)}
-    bodies = bodies_of(str(view.data.attrs.get("deck", "")))
-    body = 2 if bodies and bodies[0].rigid else 1
-    given = view.lattice, [fields], bodies, body, view.friction
-    of = Loaded(*given, surface=lambda _: nodal(view.data, view.lattice).traction_field("edges"))
-    return below(of, {"points": points}, names)
+    result = as_result(result)
+    bodies = bodies_of(result.deck)
+    return result.stress(*names, step=step, body=2 if bodies and bodies[0].rigid else 1, points=points)
 
 
 _MARGIN = 1.5  # width of the map over that of the contact
@@ -157,7 +153,7 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     step : int, optional
         Number of the load step whose contact and stick area are outlined; by default the last of the cycle.
     """
-    result = result if isinstance(result, Result) else Result(result)
+    result = as_result(result)
     tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}
     surface = next((name for name, table in tables.items() if table.where.get("depths") == (0.0,)), None)
     section = next((name for name, table in tables.items() if table.plane), None)
@@ -177,18 +173,12 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     view = StepView.of(result, int(cycle[-1]) if step is None else step)
 
     columns = len(drawn) if len(drawn) < 4 else 2
-    rows = -(-len(drawn) // columns)
-    canvas = new_figure(3.6 * columns + 0.2, 3.9 * rows + 0.3)
-    panels = canvas.subplots(rows, columns, squeeze=False).ravel()
+    canvas, panels = new_panels(len(drawn), columns, 3.6 + 0.2 / columns, 3.9, 0.3)
     for axes, (table, field) in zip(panels, drawn, strict=True):
-        values, factor, scale = colored_values(field)
-        levels: Any = LEVELS
-        if field.name == first != "life":  # common to panels of the same parameter
-            levels = MaxNLocator(LEVELS).tick_values(lowest * factor, highest * factor)
+        limits = (lowest, highest) if field.name == first != "life" else None  # of all its panels
         draw = _draw_surface if table == surface else _draw_section
-        colored = draw(axes, view, field, values, levels)
+        draw(axes, view, field, limits)
         axes.set_title(f"{'surface' if table == surface else 'section'} of body {tables[table].body}")
-        canvas.colorbar(colored, ax=axes, location="bottom", shrink=0.9, **scale)
     legend_under(canvas, handles_of(*panels))
     set_title(canvas, title_of(result.dataset))
     return canvas
@@ -200,15 +190,24 @@ def _first_of(found: xarray.Dataset, name: str) -> xarray.DataArray:
     return found[name if name in found else min(others, key=lambda other: other == "life")]
 
 
-def colored_values(field: xarray.DataArray) -> tuple[Array, float, dict[str, Any]]:
-    """Return values in a unit, its factor and the options of the color scale; life as a power of ten."""
+def _color(
+    axes: Axes, x: Array, y: Array, field: xarray.DataArray, limits: tuple[Any, Any] | None = None
+) -> Callable[[], None]:
+    """Draw a parameter in colors with their scale; return what marks its largest value, or the least life.
+
+    Life is drawn as a power of ten. The worst value is bright.
+    """
     factor, label = _scale(field)
-    values = np.squeeze(field.values) * factor
-    scale: dict[str, Any] = {"label": label, "ticks": MaxNLocator(6)}
-    if field.name == "life":
+    values, life = np.squeeze(field.values) * factor, field.name == "life"
+    options: dict[str, Any] = {"label": label, "ticks": MaxNLocator(6)}
+    if life:
         values = np.log10(np.clip(values, 1.0, _ENDLESS))
-        scale["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
-    return values, factor, scale
+        options["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
+    levels: Any = MaxNLocator(LEVELS).tick_values(*(factor * end for end in limits)) if limits else LEVELS
+    drawn = axes.contourf(x, y, values, levels, cmap="viridis_r" if life else "viridis")
+    axes.figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9, **options)
+    words = ("least life",) if life else ()
+    return lambda: mark_largest(axes, x, y, -values if life else values, *words)
 
 
 def _scale(field: xarray.DataArray) -> tuple[float, str]:
@@ -225,24 +224,10 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     return factor, titled(named, unit)
 
 
-def map_of(field: xarray.DataArray) -> str:
-    """Return the colors of a parameter: the worst value is bright."""
-    return "viridis_r" if field.name == "life" else "viridis"
-
-
-def mark_worst(axes: Axes, x: Array, y: Array, field: xarray.DataArray, values: Array) -> None:
-    """Mark the largest value of a parameter, or the least life."""
-    if field.name == "life":
-        mark_largest(axes, x, y, -values, "least life")
-    else:
-        mark_largest(axes, x, y, values)
-
-
-def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: Array, levels: Any) -> Any:
+def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, limits: Any) -> None:
     """Draw a map of the surface with the outlines of contact and stick area."""
     part = Part.around([view], _MARGIN)
-    x, y = field["x"].values * part.factor, field["y"].values * part.factor
-    drawn = axes.contourf(x, y, values, levels, cmap=map_of(field))
+    mark = _color(axes, field["x"].values * part.factor, field["y"].values * part.factor, field, limits)
     part.show(axes)
     meshes = [("contact area", "white", mesh_of(view, view.pressure, True))]
     if view.friction != 0.0 and view.has("zone"):
@@ -251,20 +236,18 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: A
         look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": EDGED}
         for polygon in mesh.outlines():
             axes.plot(*(polygon * part.factor).T, label=f"{name} in step {view.number}", **look)
-    mark_worst(axes, x, y, field, values)
-    return drawn
+    mark()
 
 
-def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, values: Array, levels: Any) -> Any:
+def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, limits: Any) -> None:
     """Draw a section, with contact and stick as bars above the surface."""
     x, y = field["x"].values, field["y"].values
     along, depth, words = section_of(field)
-    drawn = axes.contourf(along, depth, values, levels, cmap=map_of(field))
+    mark = _color(axes, along, depth, field, limits)
     draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
-    mark_worst(axes, along, depth, field, values)
+    mark()
     axes.set_ylim(depth.max(), depth.min() - 0.06 * np.ptp(depth))
     axes.set(**words, aspect="equal")
-    return drawn
 
 
 def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
@@ -277,7 +260,7 @@ def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
     return along * factor, field["depth"].values * factor, words
 
 
-_COLUMNS = 3  # panels beside each other
+_COLUMNS = 3  # panels, or maps, beside each other
 _LEGEND = 10  # curves of a legend at most
 _NAMES = {
     "von_mises_stress": "von Mises stress",
@@ -298,7 +281,7 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "bl
 @figure("lines", "tables along a line, or at points by step", needs="[[stress]] or [[fatigue]]")
 def lines(result: Result | xarray.Dataset) -> Figure:
     """Draw the tables [[stress]] and [[fatigue]] of the deck along lines, and at points over the steps."""
-    result = result if isinstance(result, Result) else Result(result)
+    result = as_result(result)
     names = [name for name, table in tables_of(result.deck).items() if table.line or table.points]
     if not names:
         raise NotInResult("the deck has no table [[stress]] or [[fatigue]] of a line or of points")
@@ -332,7 +315,7 @@ def _draw_table(
     part: SubFigure, name: str, found: xarray.Dataset, panels: Sequence[Sequence[str]], columns: int
 ) -> None:
     """Draw the panels of a table, with its name and place above."""
-    grid = part.subplots(-(-len(panels) // columns), columns, squeeze=False).ravel()
+    grid = panels_of(part, len(panels), columns)
     on_line = "distance" in found.sizes
     steps: list[int] = found["step"].values.tolist() if "step" in found.coords else []
     points = np.stack([np.ravel(found[axis]) for axis in ("x", "y", "depth")], axis=1)
@@ -345,7 +328,7 @@ def _draw_table(
         labels = [", ".join(_length(place) for place in point) for point in points.tolist()]
     else:
         place, words = np.arange(1.0, len(points) + 1.0), "point"
-    for axes, names in zip(grid, panels, strict=False):
+    for axes, names in zip(grid, panels, strict=True):
         curves = np.concatenate([found[name].values.reshape(-1, len(points)) for name in names])
         _draw_curves(axes, place, curves.T if steps and not on_line else curves, found[names[0]], len(names))
         axes.set_xlabel(words)
@@ -353,12 +336,10 @@ def _draw_table(
             axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         if len(names) > 1:
             _legend_beside(axes, [_named(name).removesuffix(" stress") for name in names])
-    for axes in grid[len(panels) :]:
-        axes.set_visible(False)
     if len(labels) > _LEGEND:
-        color_scale(part, grid[: len(panels)].tolist(), labels, shades(len(labels)))
+        color_scale(part, grid, labels, shades(len(labels)))
     elif len(labels) > 1:
-        _legend_beside(grid[len(panels) - 1], labels, None if on_line else "x, y, depth")
+        _legend_beside(grid[-1], labels, None if on_line else "x, y, depth")
     at = f"step {steps[0]}" if len(steps) == 1 else ""
     about = (visible(name).replace("$", r"\$"), f"body {found.attrs['body']}", at, where)
     part.suptitle(", ".join(filter(None, about)), fontsize=9)
@@ -415,9 +396,6 @@ def _named(name: str) -> str:
     return f"${head}_{{{last}}}$" if head else _NAMES.get(name, spelled(name))
 
 
-_BESIDE = 3  # maps beside each other
-
-
 @figure("table", "the file of one table of stresses or fatigue", needs="a table")
 def table(table: xarray.Dataset) -> Figure:
     """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth.
@@ -435,36 +413,25 @@ def table(table: xarray.Dataset) -> Figure:
     if {"distance", "point"} & table.sizes.keys():
         return draw_tables([(name, table)], title)
     fields = [_worst(field) for field in table.data_vars.values() if field.attrs["units"] != "rad"]
-    columns = min(_BESIDE, len(fields))
-    rows = -(-len(fields) // columns)
     places = [_places(field) for field in fields]
     height = max(float(np.ptp(along) / np.ptp(across)) for across, along, _ in places)
-    canvas = new_figure(3.6 * columns + 0.2, (2.9 * height + 1.5) * rows + 0.4)
-    panels = canvas.subplots(rows, columns, squeeze=False).ravel()
-    for axes, field, (across, along, words) in zip(panels, fields, places, strict=False):
-        values, _, scale = colored_values(field)
-        drawn = axes.contourf(across, along, values, LEVELS, cmap=map_of(field))
-        mark_worst(axes, across, along, field, values)
+    columns = min(_COLUMNS, len(fields))
+    canvas, panels = new_panels(len(fields), columns, 3.6 + 0.2 / columns, 2.9 * height + 1.5, 0.4)
+    for axes, field, (across, along, words) in zip(panels, fields, places, strict=True):
+        _color(axes, across, along, field)()
         axes.set(**words, aspect="equal", title=_place(field))
         if words["ylabel"].startswith("depth"):
             axes.invert_yaxis()
-        canvas.colorbar(drawn, ax=axes, location="bottom", shrink=0.9, **scale)
-    for axes in panels[len(fields) :]:
-        axes.set_visible(False)
     set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
     return canvas
 
 
 def _worst(field: xarray.DataArray) -> xarray.DataArray:
     """Return a field at the step and depth of the value that counts."""
-    word = "least" if field.name == "life" else "largest"
-    for name in ("step", "depth"):
-        if name in field.sizes:
-            values = np.where(np.isfinite(field), field, np.nan)
-            axes = tuple(k for k, dimension in enumerate(field.dims) if dimension != name)
-            ends = np.nanmin(values, axis=axes) if word == "least" else np.nanmax(values, axis=axes)
-            field = field.isel({name: int(np.nanargmin(ends) if word == "least" else np.nanargmax(ends))})
-    return field
+    values = np.where(np.isfinite(field), field, np.nan)
+    worst = np.nanargmin(values) if field.name == "life" else np.nanargmax(values)
+    at = dict(zip(field.dims, np.unravel_index(worst, values.shape), strict=True))
+    return field.isel({name: int(at[name]) for name in ("step", "depth") if name in at})
 
 
 def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:

@@ -80,9 +80,7 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
 
 def begins_at_zero(names: Sequence[str]) -> bool:
     """Return whether quantities are 0 before the first load step, so that curves begin at step 0."""
-    shown = names_where(lambda v: not v.is_field and (v.title or v.summary))
-    if "mean_gap" in names:
-        return False
+    shown = names_where(lambda v: not v.is_field and (v.title or v.summary) and v.before == 0.0)
     return all(name.removesuffix("_fit") in shown for name in names)
 
 

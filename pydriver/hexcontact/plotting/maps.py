@@ -26,7 +26,7 @@ from ..result.view import Results, StepView, as_list, dataset_of, title_of
 from ..text import scaled
 from ..variables import MAPS, VARIABLES
 from .registry import figure, styled
-from .style import EXACT, drawing, legend_above, set_title
+from .style import EXACT, drawing, legend_above, panels_of, set_title
 
 if TYPE_CHECKING:
     import xarray
@@ -224,10 +224,8 @@ def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tup
     height = rows * (float(np.clip((cell - 0.2) * part.aspect, 0.6, most)) + 0.17 * lines + 0.24) + 0.95
     figure = Figure(figsize=(cell * columns + 0.6, height), layout="compressed")
     cast(Any, figure.get_layout_engine()).set(h_pad=0.1)  # between a title and the panel above
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in panels.flat[count:]:
-        axes.set_visible(False)
-    for number, (axes, label) in enumerate(zip(panels.flat, labels, strict=False)):
+    panels = panels_of(figure, count, columns, sharex=True, sharey=True)
+    for number, (axes, label) in enumerate(zip(panels, labels, strict=True)):
         part.show(axes)
         axes.set_title(label)
         if number + columns < count:  # axis labels only at the lower and left panels
@@ -236,7 +234,7 @@ def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tup
             axes.tick_params(labelbottom=True)
         if number % columns:
             axes.set_ylabel("")
-    return figure, list(panels.flat[:count])
+    return figure, panels
 
 
 DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node

@@ -60,19 +60,9 @@ class Entry:
         return inspect.signature(self.draw).parameters
 
     @property
-    def of_a_result(self) -> bool:
-        """Whether it shows a result."""
-        return not (self.of_a_study or self.of_a_table)
-
-    @property
-    def of_a_study(self) -> bool:
-        """Whether it shows a study."""
-        return "study" in self.options
-
-    @property
-    def of_a_table(self) -> bool:
-        """Whether it shows a table [[stress]] or [[fatigue]]."""
-        return "table" in self.options
+    def shows(self) -> str:
+        """What it shows: a "result", a "study", or a "table" [[stress]] or [[fatigue]]."""
+        return next((kind for kind in ("study", "table") if kind in self.options), "result")
 
     @property
     def of_several(self) -> bool:

@@ -218,12 +218,12 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         largest = max(peak(name, histories) for name in names)
         factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
         values = {
-            word: rounded([0.0, *(factor * float(history[name]) for history in histories)], 5)
-            for name, word in names.items()
+            word: rounded([factor * float(v) for v in (VARIABLES[n].before, *(h[n] for h in histories))], 5)
+            for n, word in names.items()
         }
         return {"unit": unit, "curves": values}
 
-    steps = [0, *(history["step"] for history in histories)]  # all quantities are 0 before the first
+    steps = [0, *(history["step"] for history in histories)]
     panels = panels_of(histories)
     over: dict[str, Any] = {"x": steps, "xlabel": "load step"}
     charts = [{"title": title, **over, **curves_of(names)} for title, names in panels.items()]

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import DeckError
-from ..result.view import last_steps
+from ..result.view import last_steps, parameters_of
 from ..text import quantity, scaled
 from ..variables import SUMMARY, VARIABLES, spelled
 from .registry import figure
-from .style import COMPUTED, color_scale, legend_under, new_figure, set_title, shades, titled
+from .style import COMPUTED, color_scale, legend_under, new_panels, set_title, shades, titled
 
 if TYPE_CHECKING:
     import xarray
@@ -63,8 +63,7 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
         If there is no such name, or no case is done.
     """
     study = last_steps(study)
-    parameters = [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
-    numbers = [name for name in parameters if study[name].dtype.kind in "fi" and study[name].ndim == 1]
+    numbers = [n for n in parameters_of(study) if study[n].dtype.kind in "fi" and study[n].ndim == 1]
     if not numbers or (over and over not in numbers):
         expected = f"expected {' or '.join(numbers)}" if numbers else "none of its parameters is a number"
         raise DeckError(f"over = {over!r}: {expected}")
@@ -78,9 +77,7 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
     others = [dim for dim in study["status"].dims if dim != along]
     curves = study.stack(curve=others) if others else study.expand_dims("curve")
     labels = [_label(study, others, place) for place in curves["curve"].values] if others else [""]
-    columns = min(len(names), 2)
-    canvas = new_figure(3.4 * columns, 2.1 * -(-len(names) // columns) + 0.5)
-    panels = [canvas.add_subplot(-(-len(names) // columns), columns, k + 1) for k in range(len(names))]
+    canvas, panels = new_panels(len(names), min(len(names), 2), 3.4, 2.1, 0.5)
     colors = shades(len(labels)) if others else [COMPUTED]
     for axes, name in zip(panels, names, strict=True):
         _draw(axes, curves, name, over, labels, colors, joined=along != "case")

@@ -6,6 +6,7 @@ The quantities are those of `hexcontact.variables`. `Layout` has dimensions, coo
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import uuid
@@ -202,15 +203,30 @@ class Layout:
             return values
         return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
 
-    def complete_fixed(self, known: dict[str, NDArray[Any]], step: Step) -> None:
-        """Complete the `known` part of the fields of all steps, on the whole window, by those of `step`."""
-        for name in FIXED:
-            if name in self.variables and name in step.fields:
-                before = known.get(name)
-                if before is None:
-                    known[name] = self.padded(name, step)
-                elif (unknown := np.isnan(before)).any():
-                    known[name] = np.where(unknown, self.padded(name, step), before)
+    def fill(self, columns: Mapping[str, Any], steps: Iterable[Step], lock: Any = None) -> None:
+        """Fill columns of `fields` from the steps, which are read once; the lock is held to write."""
+        lock = lock or contextlib.nullcontext()
+        fixed: dict[str, NDArray[Any]] = {}  # fields of all steps, as far as they are known
+        block: list[Step] = []
+        for position, step in enumerate(steps):
+            block.append(step)
+            if len(block) == self.block or position == len(self.steps) - 1:
+                first = position - len(block) + 1
+                with lock:
+                    for name in (name for name in columns if name not in FIXED):
+                        values = [self.field(name, first + place, one) for place, one in enumerate(block)]
+                        whole = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
+                        columns[name][first : position + 1] = whole
+                block.clear()
+            for name in FIXED:
+                if name in columns and name in step.fields:
+                    if name not in fixed:
+                        fixed[name] = self.padded(name, step)
+                    elif (unknown := np.isnan(fixed[name])).any():
+                        fixed[name] = np.where(unknown, self.padded(name, step), fixed[name])
+        with lock:
+            for name, field in fixed.items():
+                columns[name][...] = field
 
 
 def _union(windows: Sequence[Lattice]) -> Lattice:
@@ -279,14 +295,9 @@ def assemble(
     values = {
         name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
         for name in layout.fields
-        if name not in FIXED
     }
-    fixed: dict[str, NDArray[Any]] = {}
-    for position, step in enumerate(steps):
-        for name, array in values.items():
-            array[position] = layout.field(name, position, step)
-        layout.complete_fixed(fixed, step)
-    values |= fixed | layout.histories() | layout.coordinates() | layout.trials
+    layout.fill(values, steps)
+    values |= layout.histories() | layout.coordinates() | layout.trials
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

@@ -13,7 +13,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,6 @@ from ..errors import DeckError
 from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
 from ..variables import (
-    FIXED,
     INTERFACE,
     LARGEST,
     NOT_KEPT,
@@ -388,18 +387,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             for column, values in given:
                 column[...] = values
             write_mesh(file, layout.window)
-        fixed: dict[str, NDArray[Any]] = {}
-        of_all_steps = {name: columns.pop(name) for name in FIXED if name in columns}
-        block: list[Step] = []
-        for position, step in enumerate(steps):
-            block.append(step)
-            if len(block) == layout.block or position == len(layout.steps) - 1:
-                _write_block(columns, layout, position - len(block) + 1, block)
-                block.clear()
-            layout.complete_fixed(fixed, step)
-        with LOCK:
-            for name, column in of_all_steps.items():
-                column[...] = fixed[name]
+        layout.fill(columns, steps, LOCK)
 
 
 @contextlib.contextmanager
@@ -416,17 +404,6 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
-
-
-def _write_block(
-    columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
-) -> None:
-    """Write the fields of load steps, of which `first` is the place of the first."""
-    with LOCK:
-        for name, column in columns.items():
-            values = [layout.field(name, first + place, step) for place, step in enumerate(steps)]
-            block = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
-            column[first : first + len(values)] = block
 
 
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:

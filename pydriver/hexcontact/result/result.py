@@ -583,6 +583,11 @@ class Result:
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
 
 
+def as_result(result: Result | xarray.Dataset) -> Result:
+    """Return a result by its dataset, or itself."""
+    return result if isinstance(result, Result) else Result(result)
+
+
 def at_hand(
     result: Result, kept: list[int], names: list[str] | None = None, anew: bool = False
 ) -> Iterator[tuple[str, xarray.Dataset]]:

@@ -213,6 +213,11 @@ def dataset_of(result: AnyResult) -> xarray.Dataset:
     return cast("xarray.Dataset", getattr(result, "dataset", result))
 
 
+def parameters_of(study: xarray.Dataset) -> list[str]:
+    """Return the names of the parameters of a study."""
+    return [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
+
+
 def last_steps(study: xarray.Dataset) -> xarray.Dataset:
     """Return the result of a study with the last load step of each case only."""
     if "step" not in study.dims:

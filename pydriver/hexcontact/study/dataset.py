@@ -24,7 +24,7 @@ from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import Lock, reading, replacing, require_ordinary, require_utf8, text_of
 from ..netcdf_library import attributes
 from ..result.netcdf import check_seal, missing_stresses, stress_files
-from ..result.view import last_steps
+from ..result.view import last_steps, parameters_of
 from ..text import quantity, text_table, visible
 from ..variables import CONVENTIONS, SUMMARY, VARIABLES
 from .backend import Outcome, holds
@@ -300,11 +300,6 @@ def read_study(path: Path) -> xarray.Dataset:
         found.load()
     with reading(path), netcdf_library.opened_by_xarray(path, group="study") as about:
         return found.assign_attrs(title=about.attrs.get("title", ""))
-
-
-def parameters_of(study: xarray.Dataset) -> list[str]:
-    """Return the names of the parameters of a study."""
-    return [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
 
 
 def table_of(study: xarray.Dataset) -> pandas.DataFrame:

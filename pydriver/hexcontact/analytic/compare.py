@@ -174,13 +174,7 @@ class PartialSlip(Sheared):
 
 
 class ClosedForms:
-    """The closed solutions for a result.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The whole result.
-    """
+    """The closed solutions for a whole result."""
 
     def __init__(self, dataset: xarray.Dataset) -> None:
         self.dataset = dataset
@@ -477,19 +471,11 @@ _HEADERS = ("", "solution", "exact", "computed", "error")
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a comparison.
+    """A line of a comparison: names of quantity and closed solution, both values (SI), and the error.
 
-    Attributes
-    ----------
-    quantity : str
-        Name of the quantity.
-    solution : str
-        Name of the closed solution.
-    exact, computed : float
-        The two values, SI; NaN for a field.
-    error : float
-        Their relative difference. For a field, the root mean square of the difference over the nodes in
-        contact, relative to the largest value; for a vector relative to the largest of all components.
+    The error is the relative difference. For a field the values are NaN, and the error is the root mean
+    square of the difference over the nodes in contact, relative to the largest value; for a vector relative
+    to the largest of all components.
     """
 
     quantity: str
@@ -502,14 +488,8 @@ class Entry:
 class Comparison(Sequence[Entry]):
     """Comparison of a load step with closed solutions; printed, a table.
 
-    Parameters
-    ----------
-    entries : sequence of Entry
-        The lines.
-    step : int
-        Number of the load step.
-    note : str
-        A remark on them, or the reason why there are none.
+    ``entries`` are the lines, ``step`` is the number of the load step, and ``note`` a remark on them, or the
+    reason why there are none.
     """
 
     def __init__(self, entries: Sequence[Entry], step: int, note: str = "") -> None:

@@ -72,14 +72,9 @@ def method_code(method: str, iteration: Iteration = "newton") -> int:
 class ElasticPair:
     """Compliance constants of two bodies in contact.
 
-    Attributes
-    ----------
-    lambda_1
-        Normal compliance ``1/(pi E*)`` [1/Pa].
-    lambda_2
-        Coupling of normal and tangential displacements, ``beta*lambda_1`` [1/Pa].
-    lambda_5
-        Additional tangential compliance, ``gamma*lambda_1`` [1/Pa].
+    ``lambda_1`` is the normal compliance ``1/(pi E*)``, ``lambda_2`` is the coupling of normal and tangential
+    displacements, ``beta*lambda_1``, and ``lambda_5`` is the additional tangential compliance,
+    ``gamma*lambda_1``, all in 1/Pa.
     """
 
     lambda_1: float
@@ -104,17 +99,8 @@ class ElasticPair:
     ) -> ElasticPair:
         """Return the constants of two materials; ``None`` for both numbers of a body means rigid.
 
-        Parameters
-        ----------
-        young_modulus_1, young_modulus_2
-            Young's moduli [Pa].
-        poisson_ratio_1, poisson_ratio_2
-            Poisson's ratios, above -1 and at most 0.5.
-
-        Raises
-        ------
-        DeckError
-            A number out of its range, or two rigid bodies.
+        Young's moduli are in Pa, Poisson's ratios above -1 and at most 0.5. DeckError for a number out of its
+        range, or two rigid bodies.
         """
         bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
         constants = flat.elastic_constants(
@@ -147,16 +133,8 @@ class ElasticPair:
 class FlexibilityOperator(Handle):
     """Operator from tractions on the lattice to relative surface displacements.
 
-    Parameters
-    ----------
-    lattice
-        Lattice and window.
-    pair
-        Elastic constants.
-    method
-        ``"fft"`` for convolutions, ``"direct"`` for an explicit matrix.
-    threads
-        Threads to use; 0: the default of OpenMP.
+    The method is ``"fft"`` for convolutions, or ``"direct"`` for an explicit matrix; with 0 threads it takes
+    the default of OpenMP.
     """
 
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
@@ -166,17 +144,10 @@ class FlexibilityOperator(Handle):
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return the closing of the gap and the displacement of body 1 over body 2 along x and y.
+        """Return the closing of the gap and the displacement of body 1 over body 2 along x and y (m).
 
-        Parameters
-        ----------
-        pressure, traction_x, traction_y
-            Tractions on body 1, shape ``(n_row, n_col)`` [Pa]; an absent one is zero.
-
-        Returns
-        -------
-        tuple of ndarray
-            ``(w, s_x, s_y)``, shape ``(n_row, n_col)`` each [m].
+        Tractions on body 1 (Pa) have the shape ``(n_row, n_col)``, and so have the results; an absent one is
+        zero.
         """
         zero = np.zeros(self.lattice.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
@@ -307,23 +278,10 @@ class NormalContact(Contact):
         tolerance: float = 1e-8,
         max_sweeps: int = 200,
     ) -> NormalSolution:
-        """Solve for a normal load or for an approach.
+        """Solve for a normal load (N), not negative, or for an approach of the remote parts (m).
 
-        Parameters
-        ----------
-        normal_load
-            Load that presses the bodies together, not negative [N].
-        approach
-            Approach of the remote parts instead [m].
-        tolerance
-            Bound of the residuals.
-        max_sweeps
-            Iterations on each lattice at most (direct: active sets).
-
-        Returns
-        -------
-        NormalSolution
-            Check ``converged``, since other solutions are returned, too, and ``touches_rim``.
+        Residuals are at most `tolerance`; iterations on each lattice (direct: active sets) are at most
+        `max_sweeps`. Check ``converged``, since other solutions are returned, too, and ``touches_rim``.
         """
         if (normal_load is None) == (approach is None):
             raise DeckError("expected either a normal load or an approach")

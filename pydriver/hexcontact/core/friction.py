@@ -85,33 +85,12 @@ class FrictionLaw:
 class ContactState(NormalSolution):
     """The end of a load step, from which the next one starts.
 
-    Arrays have the shape ``(n_row, n_col)``; names are those of `hexcontact.variables`.
+    Arrays over the nodes, numbers and their units are those of `hexcontact.variables` by their names; a zone
+    is 0 separated, 1 stick, 2 slip. ``residual_tangential`` is for the slip of the whole step, and may be
+    above the tolerance after halving.
 
     Attributes
     ----------
-    pressure, traction_x, traction_y : ndarray
-        Tractions on body 1 [Pa].
-    gap : ndarray
-        Gap [m].
-    relative_displacement_x, relative_displacement_y : ndarray
-        Displacement of body 1 relative to body 2, less the rigid motion [m].
-    slip_increment_x, slip_increment_y, accumulated_slip : ndarray
-        Slip of the step, and length of the whole slip path [m].
-    dissipation_density : ndarray
-        Dissipated energy by area [J/m2].
-    zone : ndarray of int8
-        0 separated, 1 stick, 2 slip.
-    normal_load, tangential_load_x, tangential_load_y, torque : float
-        Resultants of the tractions [N], [N m].
-    approach, shift_x, shift_y, twist : float
-        Rigid motions of the remote parts [m], [rad].
-    bulk_strain_xx, bulk_strain_yy, bulk_strain_xy : float
-        Bulk strain of body 1 less that of body 2.
-    dissipated_energy, dissipated_energy_path_error : float
-        Dissipated energy, and bound on its error by the size of the load steps [J].
-    residual_normal, residual_tangential, residual_force, residual_shear_force, residual_torque : float
-        Residuals of the contact conditions and of the prescribed loads. That of the friction conditions is
-        for the slip of the whole step, and may be above the tolerance after halving.
     converged : bool
         All residuals are within the tolerance, in each part of a step that was halved.
     sliding : bool
@@ -122,8 +101,6 @@ class ContactState(NormalSolution):
         Reason why the solver stopped; empty if it converged.
     sweeps, cuts : int
         Number of active sets, and of halvings of the step.
-    operator_applications : float
-        All work of the step, in applications of the full operator.
     """
 
     traction_x: Array
@@ -159,14 +136,8 @@ class FrictionalContact(Contact):
 
     Parameters
     ----------
-    lattice
-        Lattice and window of the nodes that may come into contact.
-    pair
-        Elastic constants.
-    initial_gap
-        Gap before loading, shape ``(n_row, n_col)`` [m].
-    candidate
-        False where a node cannot touch, shape ``(n_row, n_col)``; default: all can.
+    lattice, pair, initial_gap, candidate, method, threads, interface, rim_warning
+        As of `NormalContact`.
     friction_coefficient
         Coefficient of friction mu, at least 0; ``inf``: no slip; or one for each node, ``(n_row, n_col)``;
         or a `FrictionLaw`.
@@ -174,18 +145,8 @@ class FrictionalContact(Contact):
         Bound of the shear traction, which is at most ``min(mu * pressure, shear_limit)`` [Pa].
     coupling
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
-    method
-        ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
     iteration
         Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
-    threads
-        Threads to use; 0: the default of OpenMP.
-    interface
-        Coefficient c [Pa/m^m] and exponent m of a compliant interface, p = c (-gap)^m, and the stiffness of
-        its tangential springs [Pa/m], 0 without them; default: bodies do not penetrate.
-    rim_warning
-        Warn (`hexcontact.RimWarning`) of a solution with contact at the rim of the window, unless all
-        nodes touch that can and others cannot: the body ends there, like a punch.
     """
 
     def __init__(
@@ -337,16 +298,9 @@ class FrictionalContact(Contact):
         return HeldState.copied({**fields, "zone": np.asarray(state.zone)}, known)
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
-        """Return a state of a smaller window on the window of this problem.
+        """Return a state of a smaller window, `lattice`, on the window of this problem.
 
         At new nodes the relative displacement follows from the tractions and the rigid motions.
-
-        Parameters
-        ----------
-        state
-            State on the smaller window.
-        lattice
-            The smaller window.
         """
         start = state.held
         handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)

@@ -99,23 +99,7 @@ class Lattice:
         cell_angle: float = math.pi / 3,
         direction: float = 0.0,
     ) -> Lattice:
-        """Return the smallest window whose parallelogram covers a rectangle.
-
-        Parameters
-        ----------
-        spacing
-            Distance of neighboring nodes along x [m].
-        center
-            Center of the rectangle [m].
-        length_x, length_y
-            Full sides of the rectangle [m].
-        origin
-            Position of node (0, 0) [m].
-        cell_ratio, cell_angle
-            Length of the second basis vector over that of the first, and its angle from it [rad].
-        direction
-            Angle of the first basis vector from x [rad].
-        """
+        """Return the smallest window whose parallelogram covers a rectangle of a center and sides [m]."""
         pattern = Pattern(origin, cell_ratio, cell_angle, direction)
         unit = pattern.window(spacing, 0, 0, 1, 1)
         half = 0.5 * np.array([length_x, length_y])
@@ -203,17 +187,7 @@ class Lattice:
         return replace(self, row_first=row, col_first=col, n_row=extent[1], n_col=extent[0])
 
     def embed(self, field: NDArray[np.generic], other: Lattice, fill: float = 0.0) -> NDArray[np.generic]:
-        """Return a field of this window on another one of the same lattice.
-
-        Parameters
-        ----------
-        field
-            Values over this window, shape ``(n_row, n_col)``.
-        other
-            The other window.
-        fill
-            Value at nodes outside this window.
-        """
+        """Return a field of this window on another one of the same lattice, whose other nodes are filled."""
         result = np.full(other.shape, fill, dtype=field.dtype)
         row, col = self.row_first - other.row_first, self.col_first - other.col_first
         top, left = max(row, 0), max(col, 0)
@@ -231,23 +205,8 @@ def linear(
 ) -> Array:
     """Interpolate values at the nodes of a lattice linearly on its triangles.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_row, n_col)
-        Values at the nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
-    x, y : array_like
-        Points, m.
-    outside : float
-        Value at nodes outside the window.
-
-    Returns
-    -------
-    ndarray
-        Values at the points, in their shape.
+    `basis` has the basis vectors of the lattice as rows (m), `start` is the position of node [0, 0] (m), and
+    `outside` the value at nodes outside the window. The result has the shape of the points x, y (m).
     """
     nodes = Nodes(np.asarray(basis), start, np.shape(values))
     return np.asarray(flat.field_between_nodes(nodes, values, outside, x, y))

@@ -398,17 +398,7 @@ def _named(name: str) -> str:
 
 @figure("table", "the file of one table of stresses or fatigue", needs="a table")
 def table(table: xarray.Dataset) -> Figure:
-    """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth.
-
-    Parameters
-    ----------
-    table : xarray.Dataset
-        The dataset of a file of stresses or fatigue parameters.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth."""
     title, _, name = str(table.attrs["title"]).rpartition(": ")
     if {"distance", "point"} & table.sizes.keys():
         return draw_tables([(name, table)], title)

@@ -48,14 +48,8 @@ class Result:
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; ``result.dataset`` is the
-    `xarray.Dataset` of all.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset or callable
-        As `assemble` makes it or `hexcontact.open_result` reads it; or what makes it when it is first used.
-    path : str
-        Its file; empty if there is none.
+    `xarray.Dataset` of all. It is made from that, or from what makes it when it is first used, and the path
+    of its file, empty if there is none.
     """
 
     def __init__(self, dataset: xarray.Dataset | Callable[[], xarray.Dataset], path: str = "") -> None:
@@ -145,25 +139,15 @@ class Result:
         return lattice_of(self.dataset)
 
     def step(self, number: int) -> xarray.Dataset:
-        """Return one load step.
-
-        Parameters
-        ----------
-        number : int
-            Number of the step, the first is 1; -1 is the last one.
-
-        Raises
-        ------
-        IndexError
-            If there is no such step.
-        """
+        """Return a load step by its number, from 1; -1 is the last one; IndexError if there is none."""
         return step_of(self.dataset, number)
 
     def traction_field(self, number: int = -1, source: str | None = None) -> TractionField:
         """Return pressure and shear traction of a load step at any point: p, q_x, q_y of x and y (m).
 
         They go to zero like square roots at the edge of the contact, and keep to friction up to the edge of
-        the stick area, both between the nodes. ``field.at_nodes()`` has the values at the nodes.
+        the stick area, both between the nodes. ``field.at_nodes()`` has the values at the nodes. DeckError if
+        pressure or gap were not kept, IndexError if there is no such step.
 
         Parameters
         ----------
@@ -173,11 +157,6 @@ class Result:
             ``"edges"``, or ``"nodes"``: the solution at the nodes, joined linearly. By default the edges,
             if the gap was kept and they are sharp; ``field.source`` is the one taken. Of unknown laws of
             friction the shear traction is that of the nodes (``field.sheared``).
-
-        Raises
-        ------
-        DeckError, IndexError
-            If pressure or gap were not kept, or there is no such step.
         """
         return self._nodal(number).traction_field(source)
 
@@ -215,28 +194,11 @@ class Result:
     # --- between the nodes ----------------------------------------------------------------------------------
 
     def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1, source: str | None = None) -> Array:
-        """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
+        """Return a field (SI), such as "pressure", at points of the plane x, y (m, broadcast) in a load step.
 
-        Parameters
-        ----------
-        name : str
-            Name of the field, such as "pressure". The zone at a point is that of the nearest node.
-        x, y : array_like
-            Points (m), broadcast.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
-        source : str, optional
-            As of `traction_field`.
-
-        Returns
-        -------
-        ndarray
-            Values (SI). Outside the window tractions and slip are 0, other fields NaN.
-
-        Raises
-        ------
-        DeckError, IndexError
-            If there is no such field in the output, or no such step.
+        Tractions go to the edges, others are linear on the triangles; the zone is that of the nearest node.
+        Outside the window tractions and slip are 0, other fields NaN. Step and source are as of
+        `traction_field`. DeckError or IndexError if there is no such field in the output, or no such step.
         """
         return self._nodal(step).at(name, x, y, source)
 
@@ -260,24 +222,16 @@ class Result:
             Names of fields, such as "pressure"; default: all of the output.
         start, end : tuple of float
             Ends of the line, m.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
+        step, source : int, str, optional
+            As of `traction_field`; the attribute ``tractions`` is the source taken.
         points : int, optional
             Number of evenly spaced points instead.
-        source : str, optional
-            As of `traction_field`; the attribute ``tractions`` is the one taken.
 
         Returns
         -------
         xarray.Dataset
-            Dimension ``distance`` (m) from the start; ``x`` and ``y`` (m) are coordinates.
-
-        Raises
-        ------
-        DeckError
-            If there is no such field in the output, or the line has no length.
-        IndexError
-            If there is no such step.
+            Dimension ``distance`` (m) from the start; ``x`` and ``y`` (m) are coordinates. DeckError or
+            IndexError if there is no such field or step, or the line has no length.
         """
         return self._nodal(step).profile(*names, start=start, end=end, points=points, source=source)
 
@@ -290,31 +244,15 @@ class Result:
         points: int | None = None,
         source: str | None = None,
     ) -> xarray.Dataset:
-        """Return fields along a line across the whole contact.
+        """Return fields along a line across the whole contact; other arguments and result as of `profile`.
 
         Parameters
         ----------
-        *names : str
-            Names of fields, such as "pressure"; default: all of the output.
         angle : float
             Direction of the line from x, rad.
         through : tuple of float, optional
             A point on it (m), from which ``distance`` counts; default: the node next to the center of
-            pressure.
-        step, points, source : int, int and str, optional
-            As for `profile`.
-
-        Returns
-        -------
-        xarray.Dataset
-            As for `profile`.
-
-        Raises
-        ------
-        DeckError
-            If there is no such field in the output, or nothing is in contact.
-        IndexError
-            If there is no such step.
+            pressure, DeckError if nothing is in contact.
         """
         along: dict[str, Any] = {"angle": angle, "through": through, "points": points, "source": source}
         return self._nodal(step).section(*names, **along)
@@ -389,6 +327,9 @@ class Result:
     ) -> xarray.Dataset:
         """Return fatigue parameters (SI) over a closed cycle, see docs/fatigue.md.
 
+        DeckError if a name, a constant or the body is wrong, the segments are no closed cycle, or fields of
+        its steps were not kept; ResourceError if there is not enough memory.
+
         Parameters
         ----------
         *parameters : str
@@ -403,14 +344,6 @@ class Result:
         **given
             Constants of the parameters, as in the table [[fatigue]] of a deck: ``findley_slope`` and others,
             in SI or text with a unit; and the region as of `stress`, by default the nodes of the surface.
-
-        Raises
-        ------
-        DeckError
-            If a name, a constant or the body is wrong, the segments are no closed cycle, or fields of its
-            steps were not kept.
-        ResourceError
-            If there is not enough memory.
         """
         constants = {key: given.pop(key) for key in [*given] if key in Criteria.model_fields}
         criteria = Criteria.parse({"parameters": parameters, **constants}, NOWHERE)
@@ -496,25 +429,12 @@ class Result:
         return Quantities([str(name) for name in self.dataset.variables])
 
     def to_dataframe(self, *names: str, step: int | None = None) -> pandas.DataFrame:
-        """Return quantities as a table; ``attrs["units"]`` of it has their units.
+        """Return quantities (SI) as a table; ``attrs["units"]`` of it has their units.
 
-        Parameters
-        ----------
-        *names : str
-            Names of quantities; default: all with one value by step. A line of the table is a load step, with
-            fields a node of a load step.
-        step : int, optional
-            Number of one step; -1 is the last one; default: all.
-
-        Returns
-        -------
-        pandas.DataFrame
-            SI units. The index is ``step``, or ``step, row, col`` with columns ``x`` and ``y``.
-
-        Raises
-        ------
-        KeyError, IndexError
-            If there is no such quantity, or no such step.
+        By default these are all with one value by step: a line is a load step, with fields a node of a load
+        step, and the index is ``step``, or ``step, row, col`` with columns ``x`` and ``y``. `step` is the
+        number of one, -1 the last; default: all. KeyError or IndexError if there is no such quantity, or no
+        such step.
         """
         data = self.dataset if step is None else self.dataset.sel(step=[int(self.step(step)["step"])])
         chosen = [self[name].name for name in names] or list(self.history.columns)
@@ -540,20 +460,14 @@ class Result:
             closed solutions are found from the deck and the load history: Hertz, Sneddon and others for the
             pressure, Cattaneo, Mindlin and Deresiewicz for shear, Lubkin for torsion, Spence for dissimilar
             bodies. The table has those that hold.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
-        name : str
-            Name of a given solution.
+        step, name : int, str
+            Number of the load step, the first is 1, -1 the last one; and name of a given solution.
 
         Returns
         -------
         Comparison
             A table: quantity, solution, exact, computed, error. Empty, with a reason, if none is known.
-
-        Raises
-        ------
-        KeyError, IndexError
-            If there is no such quantity, or no such step.
+            KeyError or IndexError if there is no such quantity, or no such step.
         """
         from ..analytic.compare import compare
 

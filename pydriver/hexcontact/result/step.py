@@ -184,19 +184,11 @@ def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None
 
 
 class PressureField:
-    """The pressure of a solution at any point.
+    """The pressure of a solution at any point, from pressure (Pa) and gap (m) at the nodes.
 
     Near the edge of the contact its square is interpolated, which is linear in the distance; elsewhere, and
-    where the contact ends at nodes that can never touch, the pressure itself is.
-
-    Parameters
-    ----------
-    pressure, gap : ndarray, shape (n_row, n_col)
-        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where the bodies cannot touch.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
+    where the contact ends at nodes that can never touch (the gap is NaN), the pressure itself is. `basis` has
+    the basis vectors of the lattice as rows (m), `start` is the position of node [0, 0] (m).
     """
 
     def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:

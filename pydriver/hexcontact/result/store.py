@@ -51,23 +51,10 @@ _LACKING = {*LACKING, None}
 
 
 def open_result(path: str | os.PathLike[str]) -> Result:
-    """Open the result of a run, finished or not.
+    """Open the result of a run, finished or not; fields of a finished one are read at their first use.
 
-    Parameters
-    ----------
-    path : path
-        The output file, which may be missing if the journal of an unfinished run is beside it; or the folder
-        of a journal.
-
-    Returns
-    -------
-    Result
-        Fields of a finished run are read from the file at their first use.
-
-    Raises
-    ------
-    DeckError
-        If there is no such file, or it is damaged, of another kind or of another version.
+    `path` is the output file, which may be missing if the journal of an unfinished run is beside it; or the
+    folder of a journal. DeckError if there is no such file, or it is damaged, of another kind or version.
     """
     target = Path(path)
     for _ in range(2):  # again if a run that just finished deleted its journal meanwhile

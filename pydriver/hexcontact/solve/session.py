@@ -153,13 +153,7 @@ class Session:
         return pandas.DataFrame([dict(step.history) for step in self._steps], index=numbers)
 
     def result(self) -> Result:
-        """Return all finished steps as a result.
-
-        Raises
-        ------
-        DeckError
-            If there is none.
-        """
+        """Return all finished steps as a result; DeckError if there is none."""
         from ..result.result import Result
 
         _ = self.step
@@ -181,15 +175,10 @@ class Session:
 
     @_one_at_a_time
     def __next__(self) -> Step:
-        """Solve the next load step of the case.
+        """Solve the next load step of the case; StopIteration after the last, or if `advance` applied others.
 
-        Raises
-        ------
-        StopIteration
-            If all loads of the case are done, or `advance` applied others.
-        DeckError, ConvergenceError, ResourceError
-            As `hexcontact.Case.run`. If an interim output cannot be written, the step is finished all the
-            same.
+        Errors as of `hexcontact.Case.run`. If an interim output cannot be written, the step is finished all
+        the same.
         """
         if self._whole:
             raise StopIteration
@@ -224,6 +213,12 @@ class Session:
     ) -> Step:
         """Advance to other loads or motions, at most one of each pair; the others do not change.
 
+        Return the last step. DeckError if the loads are wrong, such as more than friction can carry, or the
+        contact outgrows a fixed window; ConvergenceError if a step does not converge, or the bodies slide:
+        the steps before it are done; ResourceError if there is not enough memory or disk: for an interim
+        output (DeckError, too) the step is finished all the same; TypeError if there is no such load, with
+        the nearest.
+
         Parameters
         ----------
         normal_load, approach : float, optional
@@ -236,28 +231,8 @@ class Session:
             Bulk stress (Pa) of the body that [bulk] names.
         mean_pressure, mean_gap, mean_traction_x, mean_traction_y : float, optional
             Loads over the area (Pa), or mean of the gap (m), of a window that repeats.
-        steps : int
-            Number of equal increments.
-        label : str
-            Name of the segment in the result.
-
-        Returns
-        -------
-        Step
-            The last one.
-
-        Raises
-        ------
-        DeckError
-            If the loads are wrong, such as more than friction can carry, or the contact outgrows a fixed
-            window.
-        ConvergenceError
-            If a step does not converge, or the bodies slide; the steps before it are done.
-        ResourceError
-            If there is not enough memory or disk. For an interim output (DeckError, too) the step is finished
-            all the same.
-        TypeError
-            If there is no such load; it names the nearest.
+        steps, label : int, str
+            Number of equal increments, and name of the segment in the result.
         """
         given = {name: value for name, value in locals().items() if name != "self"}
         self._check_open()
@@ -293,18 +268,7 @@ class Session:
 
     @_one_at_a_time
     def back(self, steps: int = 1) -> None:
-        """Undo the last steps.
-
-        Parameters
-        ----------
-        steps : int
-            Number of steps.
-
-        Raises
-        ------
-        DeckError
-            If there are fewer, or the session writes a file.
-        """
+        """Undo the last steps; DeckError if there are fewer, or the session writes a file."""
         self._check_open()
         if self._store is not None:
             raise DeckError("a session that writes a file cannot go back; start it without an output")

@@ -86,6 +86,9 @@ __all__ = ["Outcome", "PlannedCase", "Study", "run_study"]
 class Study:
     """Cases of one deck with different values of some keys; the constructor checks all of them.
 
+    ``plan`` has cases and parameters, ``output`` is the file of the result. DeckError with a sentence for
+    each fault of the study or of a case.
+
     Parameters
     ----------
     deck : path or mapping
@@ -102,18 +105,6 @@ class Study:
         Leave out wrong cases, with the status ``invalid`` in the result.
     **keys
         Other keys of a study file: title, combine, samples, seed, steps, dask.
-
-    Attributes
-    ----------
-    plan : Plan
-        Cases and parameters.
-    output : Path
-        File of the result.
-
-    Raises
-    ------
-    DeckError
-        With a sentence for each fault of the study or of a case.
     """
 
     def __init__(
@@ -148,23 +139,17 @@ class Study:
         check: bool | CheckLevel = True,
         skip_invalid: bool = False,
     ) -> Self:
-        """Read a study file.
+        """Read a study file; DeckError with a sentence for each fault of the study, its deck or a case.
 
         Parameters
         ----------
-        path : path
-            The study file.
-        output : path, optional
-            File of the result; default: that of the study file, else its name with .nc in this folder.
+        path, output : path
+            The study file, and the file of the result; default: that of the study file, else its name with
+            .nc in this folder.
         check : bool or str
             Check every case, its window by a coarse solution; ``"decks"``: without the windows.
         skip_invalid : bool
             Leave out wrong cases, with the status ``invalid`` in the result.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each fault of the study, its deck or a case.
         """
         data, text = read_toml(path, "a study")
         if "body" in data and "parameter" not in data:
@@ -228,9 +213,11 @@ class Study:
         listener: Listener | None = None,
         cancel: threading.Event | None = None,
     ) -> xarray.Dataset:
-        """Run the missing cases and combine the results.
+        """Run the missing cases, write the result to `output` and return it.
 
-        In a script this belongs under ``if __name__ == "__main__":``, since it starts processes.
+        In a script this belongs under ``if __name__ == "__main__":``, since it starts processes. DeckError if
+        another run holds the study, the output is another file, or Dask is not installed; ResourceError if
+        the result cannot be written.
 
         Parameters
         ----------
@@ -243,19 +230,7 @@ class Study:
         listener : Listener, optional
             Receives the progress, besides the log.
         cancel : threading.Event, optional
-            Set by another thread, it ends the run; finished cases stay.
-
-        Returns
-        -------
-        xarray.Dataset
-            The result, also written to `output`; if it was canceled, that of the finished cases, not written.
-
-        Raises
-        ------
-        DeckError
-            If another run holds the study, the output is another file, or Dask is not installed.
-        ResourceError
-            If the result cannot be written.
+            Set by another thread, it ends the run; finished cases stay, and their result is not written.
         """
         listener, cancel = Listeners(Log(), listener or Listener()), cancel or threading.Event()
         refuse_foreign(self.output)
@@ -306,21 +281,9 @@ class Study:
         return LocalPool, jobs
 
     def run_case(self, number: int, retry: bool = False, listener: Listener | None = None) -> Outcome:
-        """Run one case in this process unless it is done; for job arrays.
+        """Run a case by its number in this process unless it is done, for job arrays; return its outcome.
 
-        Parameters
-        ----------
-        number : int
-            Number of the case, as in the names of the files.
-        retry : bool
-            Also if it would fail again.
-        listener : Listener, optional
-            Receives the progress, besides the log.
-
-        Returns
-        -------
-        Outcome
-            Outcome of this run, or of the one before.
+        With `retry` it runs also if it would fail again; the listener receives the progress, besides the log.
         """
         known = {self.folder.number(case): case for case in self.cases}
         if number not in known:
@@ -340,10 +303,7 @@ class Study:
     def collect(self) -> xarray.Dataset:
         """Combine the finished cases, write the result to `output`, and return it.
 
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written.
+        DeckError or ResourceError if it cannot be written.
         """
         dataset = self._combined()
         study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)

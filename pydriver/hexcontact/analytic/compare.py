@@ -28,19 +28,9 @@ from ..deck.surfaces import Punch, Surface
 from ..errors import DeckError
 from ..text import TextTable, html_table, quantity, text_table
 from ..variables import VARIABLES, spelled
-from . import friction
+from . import friction, hertz_gap
 from .friction import LubkinTorsion, MindlinContact, SuperposedContact
 from .frictionless import EllipticContact, cone, flat_punch, power_law, rounded_punch
-from .hertz_gap import (
-    SIMILAR,
-    QuadraticGap,
-    attribute_of,
-    friction_of,
-    is_compliant,
-    is_strained,
-    is_worn,
-    pressure_is_frictionless,
-)
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -178,19 +168,19 @@ class ClosedForms:
 
     def __init__(self, dataset: xarray.Dataset) -> None:
         self.dataset = dataset
-        self.friction = friction_of(dataset.attrs)
-        self.modulus = attribute_of(dataset.attrs, "effective_modulus")
-        self.gamma = attribute_of(dataset.attrs, "tangential_compliance_ratio")
-        self.beta = attribute_of(dataset.attrs, "dundurs_beta")
+        self.friction = hertz_gap.friction_of(dataset.attrs)
+        self.modulus = hertz_gap.attribute_of(dataset.attrs, "effective_modulus")
+        self.gamma = hertz_gap.attribute_of(dataset.attrs, "tangential_compliance_ratio")
+        self.beta = hertz_gap.attribute_of(dataset.attrs, "dundurs_beta")
         self.static = dataset.attrs.get("algorithm") == "static"
         self.deck = recorded(str(dataset.attrs.get("deck", "")))
-        similar = abs(self.beta) <= SIMILAR
-        self.apply = similar and 0.0 < self.friction < math.inf and not is_strained(dataset)
+        similar = abs(self.beta) <= hertz_gap.SIMILAR
+        self.apply = similar and 0.0 < self.friction < math.inf and not hertz_gap.is_strained(dataset)
 
     @cached_property
-    def gap(self) -> QuadraticGap | None:
+    def gap(self) -> hertz_gap.QuadraticGap | None:
         """The gap, if it is a quadratic form."""
-        return QuadraticGap.of(self.dataset)
+        return hertz_gap.QuadraticGap.of(self.dataset)
 
     @property
     def surface(self) -> Surface | None:
@@ -278,7 +268,7 @@ class History:
         self.steps = slice(last if static else 0, last + 1)
         self.dataset = dataset
         self.normal_load = float(dataset["normal_load"].values[last])
-        self.is_worn = is_worn(dataset.isel(step=self.steps))
+        self.is_worn = hertz_gap.is_worn(dataset.isel(step=self.steps))
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.dataset:
@@ -348,17 +338,17 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
     load = float(so_far["normal_load"][-1])
     if not load > 0.0:
         return [], "nothing is pressed in this load step"
-    if is_compliant(so_far.attrs):
+    if hertz_gap.is_compliant(so_far.attrs):
         return [], "no closed-form solution is known for a compliant interface"
-    if is_worn(so_far):
+    if hertz_gap.is_worn(so_far):
         return [], "no closed-form solution is known for worn surfaces"
     closed = ClosedForms(so_far)
     known = [*_normal(closed, load), *_shear(closed, number), *_torsion(closed, number)]
-    known += [] if is_strained(so_far) else _dissimilar(closed, load)
+    known += [] if hertz_gap.is_strained(so_far) else _dissimilar(closed, load)
     if known:
         note = "the gap was given in Python; the solutions are those of its values at the nodes"
         return known, note if "surface" in closed.deck.given else ""
-    if pressure_is_frictionless(so_far.attrs):
+    if hertz_gap.pressure_is_frictionless(so_far.attrs):
         return [], "no closed-form solution is known for these surfaces"
     return [], (
         "no closed-form solution is known for dissimilar bodies with friction under these loads; there are "
@@ -372,7 +362,7 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
 def _normal(closed: ClosedForms, load: float) -> list[Exact]:
     """Return the contact without friction."""
     pressed = closed.pressed
-    if pressed is None or not pressure_is_frictionless(closed.dataset.attrs):
+    if pressed is None or not hertz_gap.pressure_is_frictionless(closed.dataset.attrs):
         return []
     contact = pressed.contact(load)
     values = {"max_pressure": contact.max_pressure, "approach": contact.approach + pressed.lowest}
@@ -430,7 +420,7 @@ def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
     """Return closed solutions for dissimilar bodies under a growing normal load alone."""
     beta, mu, attributes = closed.beta, closed.friction, closed.dataset.attrs
     goodman = attributes.get("coupling") == "goodman"
-    if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(closed.dataset, mu * load):
+    if mu == 0.0 or abs(beta) <= hertz_gap.SIMILAR or not _pressed_only(closed.dataset, mu * load):
         return []
     hertz = closed.gap.contact(load) if closed.gap is not None else None
     incremental = attributes.get("algorithm") == "incremental"

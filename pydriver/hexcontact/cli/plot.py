@@ -14,18 +14,7 @@ from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
-from .frame import (
-    Shown,
-    argument,
-    beside,
-    command,
-    labels_of,
-    option,
-    output_to,
-    print_output,
-    steps_of,
-    steps_option,
-)
+from . import frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +58,7 @@ class _WithFigures(TyperCommand):
     help = property(lambda _: _help(), lambda _, __: None)
 
 
-@command(
+@frame.command(
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
     cls=_WithFigures,
@@ -77,47 +66,51 @@ class _WithFigures(TyperCommand):
 def plot(
     files: Annotated[
         list[Path] | None,
-        argument(
+        frame.argument(
             "FILE", "The result or a table of it, a netCDF file; several for zones, outlines and compliance."
         ),
     ] = None,
-    what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
+    what: Annotated[str, frame.option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
         str | None,
-        steps_option(
+        frame.steps_option(
             "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
             "10,20,30 or 10-30 or all. The label of a segment is its last step."
         ),
     ] = None,
     angle: Annotated[
         str | None,
-        option(
+        frame.option(
             "--angle", metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."
         ),
     ] = None,
     through: Annotated[
         str | None,
-        option("--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
+        frame.option(
+            "--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."
+        ),
     ] = None,
     cycle: Annotated[
         str | None,
-        option(
+        frame.option(
             "--cycle", metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."
         ),
     ] = None,
     over: Annotated[
         str | None,
-        option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
+        frame.option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
     ] = None,
     arrows: Annotated[
-        Arrows | None, option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step.")
+        Arrows | None,
+        frame.option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step."),
     ] = None,
-    source: Shown = None,
+    source: frame.Shown = None,
     output: Annotated[
-        Path | None, output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE.")
+        Path | None,
+        frame.output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."),
     ] = None,
     format: Annotated[
-        Format | None, option("--format", "-f", help="Format where --output names none.")
+        Format | None, frame.option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
@@ -144,8 +137,10 @@ def plot(
     results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
-        "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
-        "cycle": None if cycle is None else steps_of(cycle, [""] * cycles, "cycle"),
+        "step": None
+        if step is None
+        else frame.steps_of(step, frame.labels_of(results[0]) if results else [""]),
+        "cycle": None if cycle is None else frame.steps_of(cycle, [""] * cycles, "cycle"),
         "angle": None if angle is None else angle_of(angle),
         "through": None if through is None else point_of(through),
         "over": over,
@@ -159,15 +154,15 @@ def plot(
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
-        first = output or beside(files[0], suffix)
-        print_output("\n".join(all_pictures(results[0], first, chosen)))
+        first = output or frame.beside(files[0], suffix)
+        frame.print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
     if study is not None:
         files, results = [study], [read_study(study)]
     elif table is not None:
         results = [table]
-    picture = output or beside(files[0], f"_{what}{suffix}")
-    print_output(f"written: {picture_of(results, what, picture, chosen)}")
+    picture = output or frame.beside(files[0], f"_{what}{suffix}")
+    frame.print_output(f"written: {picture_of(results, what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------

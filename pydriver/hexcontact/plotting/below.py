@@ -21,28 +21,11 @@ from ..result.result import Result, as_result, at_hand
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, visible, worded
 from ..variables import spelled
+from . import style
 from .maps import Part, mesh_of
 from .registry import figure
 from .report_data import mapped_steps
 from .sections import Cut, Point
-from .style import (
-    COMPUTED,
-    EDGED,
-    EXACT,
-    GUIDE,
-    color_scale,
-    drawing,
-    handles_of,
-    legend_below,
-    legend_under,
-    mark_largest,
-    new_figure,
-    new_panels,
-    panels_of,
-    set_title,
-    shades,
-    titled,
-)
 from .zones import draw_zone_bars
 
 if TYPE_CHECKING:
@@ -68,19 +51,19 @@ def stress(
     found = _below(result, step, points, "von_mises_stress")
     values = found["von_mises_stress"].values
 
-    canvas, axes = drawing(None, 5.6, 3.4, equal=True)
+    canvas, axes = style.drawing(None, 5.6, 3.4, equal=True)
     to_stress, unit = scaled(float(values.max()), "Pa")
     length = cut.lengths[0]
     drawn = axes.contourf(cut.along(along), depth * length, values * to_stress, LEVELS)
     canvas.colorbar(drawn, ax=axes, label=f"von Mises stress in body {found.attrs['body']} ({unit})")
-    mark_largest(axes, *np.meshgrid(cut.along(along), depth * length), values)
+    style.mark_largest(axes, *np.meshgrid(cut.along(along), depth * length), values)
     place = np.linspace(0.0, cut.line.length, 8 * _POINTS)
     draw_zone_bars(axes, view, cut.line.points(place), cut.along(place), -0.02 * depth[-1] * length)
     axes.legend(loc="lower right", labelcolor="white", handlelength=1.2)
     cut.show(axes)
     axes.set(ylabel=f"depth ({cut.lengths[1]})", aspect="equal", xlim=cut.along(along)[[0, -1]])
     axes.set_ylim(depth[-1] * length, -0.05 * depth[-1] * length)
-    set_title(canvas, view.title)
+    style.set_title(canvas, view.title)
     return canvas
 
 
@@ -116,20 +99,20 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
         [sum(c * one[name].values for c, name in zip(along, names, strict=True)) for one in found]
     )
 
-    canvas = new_figure(5.2, 3.0)
+    canvas = style.new_figure(5.2, 3.0)
     axes = canvas.add_subplot()
     to_stress, unit = scaled(float(abs(stress).max()), "Pa")
     numbers = [view.number for view in views]
-    for end, (color, mark) in enumerate(((COMPUTED, "o"), (EXACT, "s"))):
+    for end, (color, mark) in enumerate(((style.COMPUTED, "o"), (style.EXACT, "s"))):
         label = f"end at $x$ = {worded(float(x[end]), 'm')}".replace("-", "\u2212")
         axes.plot(numbers, stress[:, end] * to_stress, f"-{mark}", color=color, ms=3.0, label=label)
-    axes.axhline(0.0, color=GUIDE, lw=0.7)
+    axes.axhline(0.0, color=style.GUIDE, lw=0.7)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     symbol = r"$\sigma_{xx}$" if angle == 0.0 else r"$\sigma$ along the section"
     axes.set(xlabel="load step", ylabel=f"{symbol} in body {found[0].attrs['body']} ({unit})")
-    legend_below(axes, ncols=2, fontsize=8)
+    style.legend_below(axes, ncols=2, fontsize=8)
     deep = f"{worded(depth, 'm')} deep" if depth else "at the surface"
-    set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
+    style.set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
     return canvas
 
 
@@ -173,14 +156,14 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     view = StepView.of(result, int(cycle[-1]) if step is None else step)
 
     columns = len(drawn) if len(drawn) < 4 else 2
-    canvas, panels = new_panels(len(drawn), columns, 3.6 + 0.2 / columns, 3.9, 0.3)
+    canvas, panels = style.new_panels(len(drawn), columns, 3.6 + 0.2 / columns, 3.9, 0.3)
     for axes, (table, field) in zip(panels, drawn, strict=True):
         limits = (lowest, highest) if field.name == first != "life" else None  # of all its panels
         draw = _draw_surface if table == surface else _draw_section
         draw(axes, view, field, limits)
         axes.set_title(f"{'surface' if table == surface else 'section'} of body {tables[table].body}")
-    legend_under(canvas, handles_of(*panels))
-    set_title(canvas, title_of(result.dataset))
+    style.legend_under(canvas, style.handles_of(*panels))
+    style.set_title(canvas, title_of(result.dataset))
     return canvas
 
 
@@ -207,7 +190,7 @@ def _color(
     drawn = axes.contourf(x, y, values, levels, cmap="viridis_r" if life else "viridis")
     axes.figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9, **options)
     words = ("least life",) if life else ()
-    return lambda: mark_largest(axes, x, y, -values if life else values, *words)
+    return lambda: style.mark_largest(axes, x, y, -values if life else values, *words)
 
 
 def _scale(field: xarray.DataArray) -> tuple[float, str]:
@@ -221,7 +204,7 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     else:
         power = 3 * math.floor(math.log10(largest) / 3) if largest > 0.0 else 0
         factor, unit = 10.0**-power, f"$10^{{{power}}}$ " * (power != 0) + units.replace("Pa2", "Pa²")
-    return factor, titled(named, unit)
+    return factor, style.titled(named, unit)
 
 
 def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, limits: Any) -> None:
@@ -233,7 +216,7 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, limits: A
     if view.friction != 0.0 and view.has("zone"):
         meshes.append(("stick area", "red", view.stick_mesh()))
     for name, color, mesh in meshes:
-        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": EDGED}
+        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": style.EDGED}
         for polygon in mesh.outlines():
             axes.plot(*(polygon * part.factor).T, label=f"{name} in step {view.number}", **look)
     mark()
@@ -293,12 +276,12 @@ def draw_tables(shown: Sequence[tuple[str, xarray.Dataset]], title: str) -> Figu
     panels = [_panels(found) for _, found in shown]
     rows = [-(-len(of_table) // _COLUMNS) for of_table in panels]
     columns = min(_COLUMNS, max(map(len, panels)))
-    canvas = new_figure(3.7 * columns + 0.6, sum(2.5 * n + 0.35 for n in rows) + 0.4)
+    canvas = style.new_figure(3.7 * columns + 0.6, sum(2.5 * n + 0.35 for n in rows) + 0.4)
     heights = [2.5 * n + 0.35 for n in rows]
     parts = canvas.subfigures(len(shown), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (name, found), of_table in zip(parts, shown, panels, strict=True):
         _draw_table(part, name, found, of_table, columns)
-    set_title(canvas, title)
+    style.set_title(canvas, title)
     return canvas
 
 
@@ -315,7 +298,7 @@ def _draw_table(
     part: SubFigure, name: str, found: xarray.Dataset, panels: Sequence[Sequence[str]], columns: int
 ) -> None:
     """Draw the panels of a table, with its name and place above."""
-    grid = panels_of(part, len(panels), columns)
+    grid = style.panels_of(part, len(panels), columns)
     on_line = "distance" in found.sizes
     steps: list[int] = found["step"].values.tolist() if "step" in found.coords else []
     points = np.stack([np.ravel(found[axis]) for axis in ("x", "y", "depth")], axis=1)
@@ -337,7 +320,7 @@ def _draw_table(
         if len(names) > 1:
             _legend_beside(axes, [_named(name).removesuffix(" stress") for name in names])
     if len(labels) > _LEGEND:
-        color_scale(part, grid, labels, shades(len(labels)))
+        style.color_scale(part, grid, labels, style.shades(len(labels)))
     elif len(labels) > 1:
         _legend_beside(grid[-1], labels, None if on_line else "x, y, depth")
     at = f"step {steps[0]}" if len(steps) == 1 else ""
@@ -351,7 +334,7 @@ def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArra
     units = str(field.attrs["units"])
     largest = float(abs(finite).max()) if finite.size else 0.0
     factor, unit = scaled(largest, units) if " " not in units else (1.0, units)
-    colors = _COLORS if len(curves) in (1, quantities) else shades(len(curves))
+    colors = _COLORS if len(curves) in (1, quantities) else style.shades(len(curves))
     look: dict[str, Any] = {"lw": 1.2}
     if "distance" not in field.dims:
         look |= {"marker": "o" if place.size <= 60 else "", "ms": 3.0}
@@ -364,8 +347,8 @@ def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArra
     if field.name == "life":
         axes.set_yscale("log")
     else:
-        axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
-    axes.set_ylabel(titled(named, unit))
+        axes.axhline(0.0, color=style.GUIDE, lw=0.6, zorder=0)
+    axes.set_ylabel(style.titled(named, unit))
     axes.grid(color="0.9", lw=0.5)
 
 
@@ -406,13 +389,13 @@ def table(table: xarray.Dataset) -> Figure:
     places = [_places(field) for field in fields]
     height = max(float(np.ptp(along) / np.ptp(across)) for across, along, _ in places)
     columns = min(_COLUMNS, len(fields))
-    canvas, panels = new_panels(len(fields), columns, 3.6 + 0.2 / columns, 2.9 * height + 1.5, 0.4)
+    canvas, panels = style.new_panels(len(fields), columns, 3.6 + 0.2 / columns, 2.9 * height + 1.5, 0.4)
     for axes, field, (across, along, words) in zip(panels, fields, places, strict=True):
         _color(axes, across, along, field)()
         axes.set(**words, aspect="equal", title=_place(field))
         if words["ylabel"].startswith("depth"):
             axes.invert_yaxis()
-    set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
+    style.set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
     return canvas
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -311,27 +311,21 @@ class _Field:
         return parts[0] if self.vector is None else np.asarray(np.hypot(*parts))
 
 
-_FIELDS = {
-    "pressure": _Field("pressure $p$", "Pa", "map of the contact pressure"),
-    "traction": _Field(
-        "shear traction $|q|$",
-        "Pa",
-        "map of the size of the shear traction, with arrows",
-        ("traction_x", "traction_y"),
-    ),
-    "traction_x": _Field("shear traction $q_x$", "Pa", "map of its component along x"),
-    "traction_y": _Field("shear traction $q_y$", "Pa", "map of its component along y"),
-    "slip_increment": _Field(
-        "slip in the step",
-        "m",
-        "map of the slip of body 1 in the step, with arrows",
-        ("slip_increment_x", "slip_increment_y"),
-    ),
-}
-for _title, (_name, *_others) in MAPS.items():
-    if not _others and _name not in _FIELDS:
-        _row = VARIABLES[_name]
-        _FIELDS[_name] = _Field(_title[0].lower() + _title[1:], _row.units, f"map of the {_row.long_name}")
+def _fields() -> Iterator[tuple[str, _Field]]:
+    """Yield the fields with a map by their names: lengths of vectors, and each with a symbol or alone."""
+    for title, names in MAPS.items():
+        words, row = title[0].lower() + title[1:], VARIABLES[names[0]]
+        if len(names) == 2:
+            label = f"{words} $|{row.symbol[0]}|$" if row.symbol else words
+            about = f"map of the size of the {words}, with arrows"
+            yield names[0].removesuffix("_x"), _Field(label, row.units, about, (names[0], names[1]))
+        for name in names if row.symbol or len(names) == 1 else ():
+            row = VARIABLES[name]
+            label = f"{words} ${row.symbol}$" if row.symbol else words
+            yield name, _Field(label, row.units, f"map of the {row.long_name}")
+
+
+_FIELDS = dict(_fields())
 
 
 def draw_field(

@@ -88,6 +88,9 @@ def integer(value: Any, name: str, expected: str = "an integer") -> int:
     return found
 
 
+positive = partial(number, expected="a positive number", fits=lambda value: 0.0 < value < math.inf)
+
+
 def word(value: Any, name: str, allowed: Collection[str]) -> str:
     """Return an argument that is one of a few words."""
     if not isinstance(value, str) or value not in allowed:
@@ -112,7 +115,7 @@ _ARGUMENTS: dict[str, Callable[[Any, str], Any]] = {
     "entry": partial(word, allowed=("implicit", "interpolated")),
     **dict.fromkeys(("lambda_1", "lambda_2", "lambda_5", "young_modulus", "poisson_ratio"), number),
     "spacing": partial(number, expected="a positive length in meters", fits=lambda v: 0 < v < math.inf),
-    "cell_ratio": partial(number, expected="a positive number", fits=lambda v: 0 < v < math.inf),
+    **dict.fromkeys(("cell_ratio", "shear_modulus", "yield_stress"), positive),
     "cell_angle": partial(
         number, expected="an angle in radians between 0 and pi", fits=lambda v: 0 < v < math.pi
     ),

@@ -21,7 +21,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, number, reals
+from ..arrays import Array, positive, reals
 from ..core import flat
 from ..errors import DeckError
 
@@ -67,8 +67,7 @@ class AxisymmetricContact:
 def require_positive(**values: float) -> None:
     """Refuse values, given by their names, that are not positive numbers."""
     for name, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise DeckError(f"{name} is {value!r}; expected a positive number")
+        positive(value, name)
 
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
@@ -77,9 +76,7 @@ def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
-    found = number(value, name, "a positive number")
-    require_positive(**{name: found})
-    return name, found
+    return name, positive(value, name)
 
 
 # ----------------------------------------------------------------------------------- power laws

@@ -19,12 +19,12 @@ Tension and pressure of 200 MPa in turn, for Smith, Watson & Topper: sigma^2/E o
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, checked, number, numbers, reals
+from ..arrays import Array, checked, number, numbers, positive, reals
 from ..errors import DeckError
 from . import flat
 
@@ -39,6 +39,9 @@ __all__ = [
     "ruiz",
     "smith_watson_topper",
 ]
+
+
+_RATIO: Any = ("a number above -1 and at most 0.5", lambda found: -1.0 < found <= 0.5)
 
 
 class CriticalPlane(NamedTuple):
@@ -63,7 +66,7 @@ class Ruiz(NamedTuple):
 
 def smith_watson_topper(stress: ArrayLike, young_modulus: float, poisson_ratio: float) -> CriticalPlane:
     """Return the largest sigma_n,max times half the range of normal strain [Pa]; moduli are E and nu."""
-    moduli = _positive(young_modulus, "young_modulus"), _ratio(poisson_ratio)
+    moduli = positive(young_modulus, "young_modulus"), number(poisson_ratio, "poisson_ratio", *_RATIO)
     return CriticalPlane(*flat.smith_watson_topper(_history(stress, 6), *moduli))
 
 
@@ -80,7 +83,7 @@ def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_st
 
     The slope is the influence of the normal stress; G and sigma_y are the shear modulus and the yield stress.
     """
-    moduli = _positive(shear_modulus, "shear_modulus"), _positive(yield_stress, "yield_stress")
+    moduli = checked(shear_modulus=shear_modulus, yield_stress=yield_stress)
     return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), *checked(slope=slope), *moduli))
 
 
@@ -133,12 +136,3 @@ def _history(history: ArrayLike, components: int) -> Array:
             f"a history of shape {array.shape}: expected (..., times, {components}), a time or more"
         )
     return array
-
-
-def _positive(value: float, name: str) -> float:
-    return number(value, name, "a positive number", lambda found: 0.0 < found < np.inf)
-
-
-def _ratio(value: float) -> float:
-    kind = "a number above -1 and at most 0.5"
-    return number(value, "poisson_ratio", kind, lambda found: -1.0 < found <= 0.5)

@@ -138,15 +138,6 @@ _INVARIANTS = tuple(name for name in STRESSES if STRESSES[name].units == "Pa" an
 _DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
 
 
-def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
-    """Return the checked names of quantities; by default the six stresses and von Mises'."""
-    for name in components:
-        if not isinstance(name, str) or name not in STRESSES:
-            hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
-            raise DeckError(f"{name!r} is no quantity below the surface{hint}")
-    return tuple(components) or (*TENSOR, "von_mises_stress")
-
-
 def bodies_of(deck: str) -> Bodies:
     """Return the two bodies of a deck; none if the deck does not define them."""
     known = recorded(deck)
@@ -158,18 +149,6 @@ def bodies_of(deck: str) -> Bodies:
             "there is no stress to compute below the window of a full contact, which has no end"
         )
     return bodies.body_1, bodies.body_2
-
-
-def material(bodies: Bodies, body: int) -> tuple[float, float]:
-    """Return Poisson's ratio and shear modulus (Pa) of a body."""
-    if integer(body, "body") not in (1, 2):
-        raise DeckError(f"body = {body}: expected 1 or 2")
-    if not bodies:
-        raise NotInResult("the result does not say what the bodies are made of")
-    one = bodies[body - 1]
-    if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
-        raise NotInResult(f"body {body} is rigid: there is no stress to compute in it")
-    return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,40 +165,41 @@ class Loaded:
     @property
     def material(self) -> tuple[float, float]:
         """Poisson's ratio and shear modulus (Pa) of the body."""
-        return material(self.bodies, self.body)
+        if integer(self.body, "body") not in (1, 2):
+            raise DeckError(f"body = {self.body}: expected 1 or 2")
+        if not self.bodies:
+            raise NotInResult("the result does not say what the bodies are made of")
+        one = self.bodies[self.body - 1]
+        if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
+            raise NotInResult(f"body {self.body} is rigid: there is no stress to compute in it")
+        return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
     def tractions(self, source: str | None = None) -> tuple[Array, str]:
-        """Return the tractions of the steps, and their source."""
-        return tractions(self.lattice, self.steps, self.bodies, self.friction, source)
+        """Return the tractions (step, 3, n_row, n_col; Pa) of the steps, and their source."""
+        if source is not None and source not in SOURCES:
+            raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+        at_nodes = nodal_tractions(self.steps)
+        if (source or source_of(self.steps)) == "nodes":
+            return at_nodes, "nodes"
+        if missing := [name for name in EDGES if any(name not in step for step in self.steps)]:
+            raise NotInResult(
+                f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not "
+                "kept"
+            )
+        law = _law_of(self.friction)
+        constants = [(body.young_modulus, body.poisson_ratio) for body in self.bodies]
+        pair = ElasticPair.from_materials(*constants[0], *constants[1])
+        corrected = [
+            _edges(self.lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
+            for one, step in zip(at_nodes, self.steps, strict=True)
+        ]
+        return np.array(corrected), "edges"
 
 
 def nodal_tractions(steps: Sequence[Fields]) -> Array:
     """Return pressure and shear tractions of some steps as the core takes them, (step, 3, n_row, n_col)."""
     zero = np.zeros_like(np.asarray(steps[0]["pressure"], dtype=float))
     return np.array([[np.asarray(step.get(name, zero), dtype=float) for name in TRACTIONS] for step in steps])
-
-
-def tractions(
-    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, friction: float, source: str | None
-) -> tuple[Array, str]:
-    """Return the tractions (step, 3, n_row, n_col; Pa) of load steps, and their source."""
-    if source is not None and source not in SOURCES:
-        raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
-    at_nodes = nodal_tractions(steps)
-    if (source or source_of(steps)) == "nodes":
-        return at_nodes, "nodes"
-    if missing := [name for name in EDGES if any(name not in step for step in steps)]:
-        raise NotInResult(
-            f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
-        )
-    law = _law_of(friction)
-    constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
-    pair = ElasticPair.from_materials(*constants[0], *constants[1])
-    corrected = [
-        _edges(lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
-        for one, step in zip(at_nodes, steps, strict=True)
-    ]
-    return np.array(corrected), "edges"
 
 
 def _law_of(friction: float) -> FrictionLaw:
@@ -239,16 +219,6 @@ def _edges(lattice: Lattice, loads: Array, step: Fields) -> ContactEdges:
     return ContactEdges(loads[0], gap, touching, np.isfinite(gap), lattice.basis, lattice.start)
 
 
-def bulk_stresses(steps: Sequence[Fields], body: int) -> Array:
-    """Return the bulk stress of a body in some steps as three components xx, yy, xy, (step, 3)."""
-    return np.array(
-        [
-            [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for name in BULK_STRESS]
-            for step in steps
-        ]
-    )
-
-
 def below(
     loaded: Loaded,
     where: Mapping[str, Any],
@@ -261,11 +231,21 @@ def below(
 
     lattice, steps, body = loaded.lattice, loaded.steps, loaded.body
     found = region(lattice, **where)
-    names = chosen_components(components)
+    for name in components:
+        if not isinstance(name, str) or name not in STRESSES:
+            hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
+            raise DeckError(f"{name!r} is no quantity below the surface{hint}")
+    names = tuple(components) or (*TENSOR, "von_mises_stress")
     nu, shear_modulus = loaded.material
     loads, used = loaded.tractions(source)
     if found.lattice is None or summed(lattice, found):
-        moved, stress = _at_points(lattice, loads, body, nu, found)
+        memory.require(
+            memory_needed(lattice, found, len(loads)),
+            f"the stress at {found.count} points in {len(loads)} steps",
+            "choose fewer points or steps",
+        )
+        flat = fields.at_points(lattice, loads, body, nu, found.nodes)
+        moved, stress = (values.reshape(len(loads), *found.shape, -1) for values in flat)
     else:
         moved = np.empty((0, 3))
         if any(name in _DISPLACEMENTS for name in names):
@@ -294,10 +274,10 @@ def below(
 
 def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
     """Add the bulk stress of a body to the stress (step, ..., component) by its tractions, and return it."""
-    bulk = bulk_stresses(steps, body)
-    for k, name in enumerate(BULK_STRESS):
+    for name in BULK_STRESS:
+        bulk = [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for step in steps]
         component = TENSOR.index(name.removeprefix("bulk_"))
-        stress[..., component] += bulk[:, k].reshape(-1, *[1] * (stress.ndim - 2))
+        stress[..., component] += np.reshape(bulk, (-1, *[1] * (stress.ndim - 2)))
     return stress
 
 
@@ -362,18 +342,6 @@ def tractions_needed(
     each, all_of_them = _CORRECTED_ARRAYS
     correction = _EDGE_ARRAYS * field + tractions_memory(*lattice.shape, contact, sheared, unlike)
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
-
-
-def _at_points(lattice: Lattice, loads: Array, body: int, nu: float, where: Region) -> tuple[Array, Array]:
-    """Return displacement times the shear modulus, and stress, (step, ..., component)."""
-    shape = len(loads), *where.shape
-    memory.require(
-        memory_needed(lattice, where, len(loads)),
-        f"the stress at {where.count} points in {len(loads)} steps",
-        "choose fewer points or steps",
-    )
-    moved, stress = fields.at_points(lattice, loads, body, nu, where.nodes)
-    return moved.reshape(*shape, 3), stress.reshape(*shape, 6)
 
 
 def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region, components: int) -> Array:

@@ -42,7 +42,7 @@ def stress(
     result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
 ) -> Figure:
     """Draw the equivalent stress of von Mises in a section below the contact."""
-    view = StepView.of(result, step)
+    view = StepView(result, step)
     cut = Cut.of([view], angle, through)
     along = np.linspace(0.0, cut.line.length, _POINTS)
     depth = np.linspace(0.0, _DEPTH * cut.line.length, _POINTS // 2)
@@ -83,7 +83,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     ValueError
         If pressures were not kept, or the result does not contain the moduli of the bodies.
     """
-    views = [StepView.of(result, number) for number in mapped_steps(result)]
+    views = [StepView(result, number) for number in mapped_steps(result)]
     if not views:
         raise NotInResult("the pressure was not kept (output.fields)")
     largest = max(views, key=lambda view: int(view.contact.sum()))
@@ -153,7 +153,7 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     alike = [field for _, field in drawn if field.name == first]
     lowest, highest = min(map(np.nanmin, alike)), max(map(np.nanmax, alike))
     cycle = by_name[shown[0]].attrs["steps"]
-    view = StepView.of(result, int(cycle[-1]) if step is None else step)
+    view = StepView(result, int(cycle[-1]) if step is None else step)
 
     columns = len(drawn) if len(drawn) < 4 else 2
     canvas, panels = style.new_panels(len(drawn), columns, 3.6 + 0.2 / columns, 3.9, 0.3)

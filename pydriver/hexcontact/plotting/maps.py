@@ -182,7 +182,7 @@ def views_of(
     """Return views of steps of one or several results, a label for each, and the title of the figure."""
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
-    views = [StepView.of(result, step, source) for result in several for step in chosen]
+    views = [StepView(result, step, source) for result in several for step in chosen]
     titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]

@@ -28,7 +28,7 @@ def overview(result: Result | xarray.Dataset, step: int = -1, source: str | None
     Without friction: the pressure over the plane and along x; with friction also the shear traction, the
     zones and the history.
     """
-    view = StepView.of(result, step, source)
+    view = StepView(result, step, source)
     with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
     canvas = _frictional(dataset_of(result), view) if with_friction else _frictionless(view)
     set_title(canvas, view.title)

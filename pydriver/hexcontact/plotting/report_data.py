@@ -69,8 +69,8 @@ def drawn_data(
 
 def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     """Return limits, maps (pictures in base64), arrows, zones and sections along x of some load steps."""
-    last = StepView.of(result, numbers[-1])
-    part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
+    last = StepView(result, numbers[-1])
+    part = Part.around((StepView(result, number) for number in numbers), 1.2, 0.2)
     known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
     if last.friction == 0.0:
         known = {title: names for title, names in known.items() if not VARIABLES[names[0]].frictional}
@@ -92,10 +92,10 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     zones: list[str] = []
     sections = []
     noise = _NOISE * float(np.abs(result.dataset["approach"].values).max())
-    line = line_of((StepView.of(result, number) for number in numbers), 0.0)
+    line = line_of((StepView(result, number) for number in numbers), 0.0)
     place = np.linspace(0.0, line.length, _CUT)
     for number in numbers:
-        view = StepView.of(result, number)
+        view = StepView(result, number)
         contact = view.touches(*plane.points)
         weight = np.where(contact, view.at(*plane.points, view.contact.astype(float)), 1.0)
         for title, names in known.items():

@@ -230,7 +230,7 @@ def section(
     ax : matplotlib.axes.Axes, optional
         Axes for the pressure, without its difference from Hertz; by default those of a new figure.
     """
-    view = StepView.of(result, step, source)
+    view = StepView(result, step, source)
     if ax is not None:
         draw_pressures(ax, [view], Cut.of([view], angle, through), always=True)
         ax.legend(loc="lower center")
@@ -393,7 +393,7 @@ def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | N
     deepest = dataset["max_worn_depth"].values[steps]
     wanted = np.linspace(0.0, deepest[-1], min(_CURVES, steps.size))
     places = np.unique(np.abs(deepest[:, None] - wanted).argmin(axis=0))
-    views = [StepView.of(result, int(dataset["step"].values[step])) for step in steps[places]]
+    views = [StepView(result, int(dataset["step"].values[step])) for step in steps[places]]
     cut = Cut.of(views, angle, through)
 
     canvas = style.new_figure(5.6, 5.0)

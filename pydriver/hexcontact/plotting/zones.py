@@ -155,7 +155,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
 
     With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).
     """
-    view = StepView.of(result, step)
+    view = StepView(result, step)
     if not view.contact.any():
         raise NotInResult("no node is in contact")
     part = Part.around([view], 1.2)

@@ -45,9 +45,10 @@ def title_of(dataset: xarray.Dataset) -> str:
 
 
 class StepView:
-    """One load step of a result for pictures; SI units, arrays over the nodes of the window."""
+    """A load step of a result, from 1 (-1: the last), for pictures: SI units, arrays over the nodes."""
 
-    def __init__(self, dataset: xarray.Dataset, step: int, source: str | None = None) -> None:
+    def __init__(self, result: AnyResult, step: int, source: str | None = None) -> None:
+        dataset = dataset_of(result)
         self.source = source  # of the tractions; None: the edges where they are known
         self.data = step_of(dataset, step)
         self.number = int(self.data["step"])
@@ -66,11 +67,6 @@ class StepView:
         several = f"step {self.number}" if dataset.sizes["step"] > 1 else ""
         named = ", ".join(filter(None, (title_of(dataset), several)))
         self.title = f"{named} ({_loads(self.data)})".lstrip()
-
-    @classmethod
-    def of(cls, result: AnyResult, step: int, source: str | None = None) -> StepView:
-        """Return the view of step number ``step`` (from 1; -1 is the last one) of a result."""
-        return cls(dataset_of(result), step, source)
 
     @property
     def friction(self) -> float:

@@ -1,4 +1,4 @@
-"""Checks of numbers and arrays that users pass, before the core takes them."""
+"""Names of arrays, data sets and tables, and checks of what users pass before the core takes it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import math
 import operator
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DeckError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame as DataFrame
+    from xarray import DataArray as DataArray
+    from xarray import Dataset as Dataset
+else:  # xarray and pandas are imported at their first use
+    DataArray = DataFrame = Dataset = Any
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, DataFrame, Dataset
 from ..core import flat
 from ..core.measures import line_of
 from ..deck.read import recorded
@@ -33,8 +33,6 @@ from .friction import LubkinTorsion, MindlinContact, SuperposedContact
 from .frictionless import EllipticContact, cone, flat_punch, power_law, rounded_punch
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
     from rich.table import Table
 
 
@@ -166,7 +164,7 @@ class PartialSlip(Sheared):
 class ClosedForms:
     """The closed solutions for a whole result."""
 
-    def __init__(self, dataset: xarray.Dataset) -> None:
+    def __init__(self, dataset: Dataset) -> None:
         self.dataset = dataset
         self.friction = hertz_gap.friction_of(dataset.attrs)
         self.modulus = hertz_gap.attribute_of(dataset.attrs, "effective_modulus")
@@ -263,7 +261,7 @@ class ClosedForms:
 class History:
     """The history of a load step: all steps up to it, or itself alone if it is static."""
 
-    def __init__(self, dataset: xarray.Dataset, number: int, static: bool) -> None:
+    def __init__(self, dataset: Dataset, number: int, static: bool) -> None:
         last = int(np.flatnonzero(dataset["step"].values == number)[0])
         self.steps = slice(last if static else 0, last + 1)
         self.dataset = dataset
@@ -331,7 +329,7 @@ class Exact:
     scales: Mapping[str, float] = field(default_factory=dict)  # scales of the errors of the fields
 
 
-def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
+def closed_solutions(dataset: Dataset, number: int) -> tuple[list[Exact], str]:
     """Return the closed solutions that hold for a load step, and a remark on them."""
     place = int(np.flatnonzero(dataset["step"].values == number)[0])
     so_far = dataset.isel(step=slice(0, place + 1))
@@ -442,7 +440,7 @@ def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
     return []
 
 
-def _pressed_only(dataset: xarray.Dataset, sliding: float) -> bool:
+def _pressed_only(dataset: Dataset, sliding: float) -> bool:
     """Test whether a growing normal load is the only load."""
     loads = dataset["normal_load"].values
     if (np.diff(loads) < -_SMALL * loads[-1]).any():
@@ -509,7 +507,7 @@ class Comparison(Sequence[Entry]):
         """Largest of the errors; NaN without closed solutions."""
         return max((abs(entry.error) for entry in self.entries), default=math.nan)
 
-    def to_dataframe(self) -> pandas.DataFrame:
+    def to_dataframe(self) -> DataFrame:
         """Return the table: quantity, solution, unit, exact, computed, error."""
         import pandas
 
@@ -553,7 +551,7 @@ class Comparison(Sequence[Entry]):
 
 
 def compare(
-    dataset: xarray.Dataset, data: xarray.Dataset, exact: Mapping[str, float] | object | None, name: str
+    dataset: Dataset, data: Dataset, exact: Mapping[str, float] | object | None, name: str
 ) -> Comparison:
     """Compare a load step of a dataset, `data`; see `hexcontact.Result.compare`."""
     number = int(data["step"])
@@ -570,7 +568,7 @@ def compare(
     return Comparison(entries, number, note)
 
 
-def _own(exact: Mapping[str, float] | object, name: str, dataset: xarray.Dataset) -> Exact:
+def _own(exact: Mapping[str, float] | object, name: str, dataset: Dataset) -> Exact:
     """Return a given solution."""
     if isinstance(exact, Mapping):
         for quantity_name in exact:

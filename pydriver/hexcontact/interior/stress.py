@@ -9,12 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, integer
+from ..arrays import Array, DataArray, Dataset, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
 from ..core.edges import ContactEdges, TractionField, tractions_memory
@@ -30,16 +30,12 @@ from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS
 from . import fields
 from .fields import Region, region
 
-if TYPE_CHECKING:
-    import xarray
-
-
 _LEAST = ("life",)  # quantities whose least value counts
 _ALIKE = 1e-6  # share of a value within which others count as equal: the first of them is named
 _SHALLOW = 2.0  # depth in spacings down to which a value depends on the few nodes next to an edge
 
 
-def with_places(found: xarray.Dataset) -> xarray.Dataset:
+def with_places(found: Dataset) -> Dataset:
     """Give each quantity the attributes largest, largest_at and largest_step, life least and so on."""
     for name, field in found.data_vars.items():
         values = np.where(np.isfinite(field.values), field.values, np.nan)
@@ -55,9 +51,7 @@ def with_places(found: xarray.Dataset) -> xarray.Dataset:
     return found
 
 
-def with_errors(
-    found: xarray.Dataset, spacing: float, others: Sequence[tuple[float, xarray.Dataset]]
-) -> None:
+def with_errors(found: Dataset, spacing: float, others: Sequence[tuple[float, Dataset]]) -> None:
     """Give each quantity largest_error, life least_factor, by spacing and table of other lattices."""
     spacings = np.array([spacing, *(other for other, _ in others)]) / spacing
     for name, field in found.data_vars.items():
@@ -73,7 +67,7 @@ def with_errors(
         field.attrs |= {"least_factor": float(np.exp(error))} if name in _LEAST else {"largest_error": error}
 
 
-def _error_of(field: xarray.DataArray) -> str:
+def _error_of(field: DataArray) -> str:
     """Return the estimated error of the value that counts in words; empty if the file has none."""
     attributes = field.attrs
     error = float(attributes.get("least_factor", attributes.get("largest_error", 0.0)))
@@ -87,12 +81,12 @@ def _error_of(field: xarray.DataArray) -> str:
     return f" ± {percent(share) if share <= 1.0 else _worded(error, field)}"
 
 
-def _worded(value: float, field: xarray.DataArray) -> str:
+def _worded(value: float, field: DataArray) -> str:
     units = str(field.attrs.get("units", "")).removesuffix("1")
     return quantity(value, units) if " " not in units else f"{quantity(value)} {units}"
 
 
-def place_of(field: xarray.DataArray) -> str:
+def place_of(field: DataArray) -> str:
     """Return the value that counts and its place in words; empty if the file has none."""
     word = "least" if field.name in _LEAST else "largest"
     if (at := field.attrs.get(f"{word}_at")) is None:
@@ -103,7 +97,7 @@ def place_of(field: xarray.DataArray) -> str:
     return f"{word} {text} at x = {x}, y = {y}, depth {depth}" + (f", step {step}" if step else "")
 
 
-def extremes_of(found: xarray.Dataset) -> dict[str, dict[str, Any]]:
+def extremes_of(found: Dataset) -> dict[str, dict[str, Any]]:
     """Return the range of each quantity, and the place of the value that counts, for other programs."""
     return {
         str(name): {
@@ -225,7 +219,7 @@ def below(
     components: Sequence[str] = (),
     numbers: Sequence[int] | None = None,
     source: str | None = None,
-) -> xarray.Dataset:
+) -> Dataset:
     """Return quantities below the surface; without `numbers` of steps there is one, and no such dimension."""
     import xarray
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..arrays import Array
+from ..arrays import Array, DataArray, Dataset
 from ..deck.below import Fatigue
 from ..errors import NotInResult
 from ..interior.files import tables_of
@@ -28,10 +28,6 @@ from .report_data import mapped_steps
 from .sections import Cut, Point
 from .zones import draw_zone_bars
 
-if TYPE_CHECKING:
-    import xarray
-
-
 _DEPTH = 0.6  # of the section, in its widths
 _POINTS = 121  # along the line; 60 below each other
 LEVELS = 12
@@ -39,7 +35,7 @@ LEVELS = 12
 
 @figure("stress", "von Mises stress below the contact, in a section")
 def stress(
-    result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
+    result: Result | Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
 ) -> Figure:
     """Draw the equivalent stress of von Mises in a section below the contact."""
     view = StepView(result, step)
@@ -116,7 +112,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     return canvas
 
 
-def _below(result: Result | xarray.Dataset, step: int, points: Array, *names: str) -> xarray.Dataset:
+def _below(result: Result | Dataset, step: int, points: Array, *names: str) -> Dataset:
     """Return stresses of a load step at points of body 1, or of body 2 if body 1 is rigid."""
     result = as_result(result)
     bodies = bodies_of(result.deck)
@@ -128,7 +124,7 @@ _ENDLESS = 1e9  # cycles beyond which life is shown as endless
 
 
 @figure("fatigue", "fatigue parameter and life on the surface and below it", needs="[[fatigue]]")
-def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
+def fatigue(result: Result | Dataset, step: int | None = None) -> Figure:
     """Draw the first fatigue parameter of the deck and the life, at the surface and in a section below it.
 
     Parameters
@@ -167,14 +163,14 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     return canvas
 
 
-def _first_of(found: xarray.Dataset, name: str) -> xarray.DataArray:
+def _first_of(found: Dataset, name: str) -> DataArray:
     """Return a parameter of a table, the first other one if it has not got it."""
     others = (other for other, field in found.data_vars.items() if field.attrs["units"] != "rad")
     return found[name if name in found else min(others, key=lambda other: other == "life")]
 
 
 def _color(
-    axes: Axes, x: Array, y: Array, field: xarray.DataArray, limits: tuple[Any, Any] | None = None
+    axes: Axes, x: Array, y: Array, field: DataArray, limits: tuple[Any, Any] | None = None
 ) -> Callable[[], None]:
     """Draw a parameter in colors with their scale; return what marks its largest value, or the least life.
 
@@ -193,7 +189,7 @@ def _color(
     return lambda: style.mark_largest(axes, x, y, -values if life else values, *words)
 
 
-def _scale(field: xarray.DataArray) -> tuple[float, str]:
+def _scale(field: DataArray) -> tuple[float, str]:
     """Return the factor of a parameter and the label of its color scale."""
     units, named = str(field.attrs["units"]), str(field.attrs["long_name"])
     if field.name == "life":
@@ -207,7 +203,7 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     return factor, style.titled(named, unit)
 
 
-def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, limits: Any) -> None:
+def _draw_surface(axes: Axes, view: StepView, field: DataArray, limits: Any) -> None:
     """Draw a map of the surface with the outlines of contact and stick area."""
     part = Part.around([view], _MARGIN)
     mark = _color(axes, field["x"].values * part.factor, field["y"].values * part.factor, field, limits)
@@ -222,7 +218,7 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, limits: A
     mark()
 
 
-def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, limits: Any) -> None:
+def _draw_section(axes: Axes, view: StepView, field: DataArray, limits: Any) -> None:
     """Draw a section, with contact and stick as bars above the surface."""
     x, y = field["x"].values, field["y"].values
     along, depth, words = section_of(field)
@@ -233,7 +229,7 @@ def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, limits: A
     axes.set(**words, aspect="equal")
 
 
-def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
+def section_of(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
     """Return places along a section and depths in a unit, with the labels of the axes."""
     x, y = field["x"].values, field["y"].values
     along = x if np.ptp(y) == 0.0 else y if np.ptp(x) == 0.0 else np.hypot(x - x[0, 0], y - y[0, 0])
@@ -262,7 +258,7 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "bl
 
 
 @figure("lines", "tables along a line, or at points by step", needs="[[stress]] or [[fatigue]]")
-def lines(result: Result | xarray.Dataset) -> Figure:
+def lines(result: Result | Dataset) -> Figure:
     """Draw the tables [[stress]] and [[fatigue]] of the deck along lines, and at points over the steps."""
     result = as_result(result)
     names = [name for name, table in tables_of(result.deck).items() if table.line or table.points]
@@ -271,7 +267,7 @@ def lines(result: Result | xarray.Dataset) -> Figure:
     return draw_tables(list(at_hand(result, kept_steps(result), names)), title_of(result.dataset))
 
 
-def draw_tables(shown: Sequence[tuple[str, xarray.Dataset]], title: str) -> Figure:
+def draw_tables(shown: Sequence[tuple[str, Dataset]], title: str) -> Figure:
     """Draw tables of a line or of points, below each other."""
     panels = [_panels(found) for _, found in shown]
     rows = [-(-len(of_table) // _COLUMNS) for of_table in panels]
@@ -285,7 +281,7 @@ def draw_tables(shown: Sequence[tuple[str, xarray.Dataset]], title: str) -> Figu
     return canvas
 
 
-def _panels(found: xarray.Dataset) -> list[list[str]]:
+def _panels(found: Dataset) -> list[list[str]]:
     """Return the quantities of each panel: those of one unit share it, if each is a single curve."""
     names = [str(name) for name, field in found.data_vars.items() if field.attrs.get("units") != "rad"]
     if "distance" not in found.sizes or found.sizes.get("step") != 1:  # several steps or points; fatigue
@@ -295,7 +291,7 @@ def _panels(found: xarray.Dataset) -> list[list[str]]:
 
 
 def _draw_table(
-    part: SubFigure, name: str, found: xarray.Dataset, panels: Sequence[Sequence[str]], columns: int
+    part: SubFigure, name: str, found: Dataset, panels: Sequence[Sequence[str]], columns: int
 ) -> None:
     """Draw the panels of a table, with its name and place above."""
     grid = style.panels_of(part, len(panels), columns)
@@ -328,7 +324,7 @@ def _draw_table(
     part.suptitle(", ".join(filter(None, about)), fontsize=9)
 
 
-def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArray, quantities: int) -> None:
+def _draw_curves(axes: Axes, place: Array, curves: Array, field: DataArray, quantities: int) -> None:
     """Draw curves of a quantity in its unit; life on a logarithmic scale."""
     finite = curves[np.isfinite(curves)]
     units = str(field.attrs["units"])
@@ -357,7 +353,7 @@ def _legend_beside(axes: Axes, labels: Sequence[str], title: str | None = None) 
     axes.legend(labels, title=title, loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=1.2)
 
 
-def _along(found: xarray.Dataset) -> tuple[Array, str, str]:
+def _along(found: Dataset) -> tuple[Array, str, str]:
     """Return the places along a line, the words of their axis, and the coordinates that do not change."""
     axes = {name: found[name].values for name in ("x", "y", "depth")}
     moving = [name for name, values in axes.items() if np.ptp(values) > 0.0]
@@ -380,7 +376,7 @@ def _named(name: str) -> str:
 
 
 @figure("table", "the file of one table of stresses or fatigue", needs="a table")
-def table(table: xarray.Dataset) -> Figure:
+def table(table: Dataset) -> Figure:
     """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth."""
     title, _, name = str(table.attrs["title"]).rpartition(": ")
     if {"distance", "point"} & table.sizes.keys():
@@ -399,7 +395,7 @@ def table(table: xarray.Dataset) -> Figure:
     return canvas
 
 
-def _worst(field: xarray.DataArray) -> xarray.DataArray:
+def _worst(field: DataArray) -> DataArray:
     """Return a field at the step and depth of the value that counts."""
     values = np.where(np.isfinite(field), field, np.nan)
     worst = np.nanargmin(values) if field.name == "life" else np.nanargmax(values)
@@ -407,7 +403,7 @@ def _worst(field: xarray.DataArray) -> xarray.DataArray:
     return field.isel({name: int(at[name]) for name in ("step", "depth") if name in at})
 
 
-def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
+def _places(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
     """Return the coordinates of a map in a unit, with the labels of the axes."""
     if np.ptp(field["depth"].values) > 0.0:
         return section_of(field)
@@ -416,7 +412,7 @@ def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
     return x * factor, y * factor, {"xlabel": f"x ({unit})", "ylabel": f"y ({unit})"}
 
 
-def _place(field: xarray.DataArray) -> str:
+def _place(field: DataArray) -> str:
     """Name step and depth of a map."""
     words = [f"step {int(field['step'])}"] if "step" in field.coords else []
     if not np.ptp(field["depth"].values):

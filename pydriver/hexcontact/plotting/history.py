@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from ..analytic.compare import CIRCULAR, ClosedForms
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
@@ -25,32 +25,28 @@ from ..variables import PANELS, VARIABLES, names_where, spelled
 from .registry import SEVERAL_RUNS, figure
 from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
 
-if TYPE_CHECKING:
-    import xarray
-
-
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
 
-def _known(dataset: xarray.Dataset) -> list[str]:
+def _known(dataset: Dataset) -> list[str]:
     return [
         str(n) for n in dataset.data_vars if dataset[n].dims == ("step",) and dataset[n].dtype.kind in "fi"
     ]
 
 
-def values_of(dataset: xarray.Dataset, name: str) -> Array:
+def values_of(dataset: Dataset, name: str) -> Array:
     """Return the history of a quantity."""
     return np.asarray(dataset[name].values, dtype=float)
 
 
-def vectors_of(dataset: xarray.Dataset, name: str) -> Array:
+def vectors_of(dataset: Dataset, name: str) -> Array:
     """Return the history of a vector, its components in rows."""
     return np.stack([values_of(dataset, f"{name}_{axis}") for axis in "xy"])
 
 
-def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
+def _largest(dataset: Dataset, names: Sequence[str]) -> float:
     values = np.concatenate([values_of(dataset, name) for name in names])
     finite = values[np.isfinite(values)]
     return float(np.abs(finite).max()) if finite.size else 0.0
@@ -96,7 +92,7 @@ def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
     return fits if all(name in known for name in fits) else names
 
 
-def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
+def _chosen(dataset: Dataset) -> list[tuple[str, ...]]:
     """Return the quantities that a history shows by default, in panels."""
     known = _known(dataset)
     if "stick_area" not in known:
@@ -107,7 +103,7 @@ def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
 
 @figure("history", "loads, motions, areas, p_max by step or over a load")
 def history(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     quantities: Sequence[str] | None = None,
     over: str = "step",
     ax: Axes | None = None,
@@ -156,7 +152,7 @@ def history(
     return canvas
 
 
-def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over: str = "step") -> None:
+def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str = "step") -> None:
     """Draw quantities of one unit over the load steps, or over another quantity."""
     factor, unit = scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
     place, label = dataset["step"].values, "load step"
@@ -207,7 +203,7 @@ def _apart(name: str, names: Sequence[str]) -> str:
 
 @figure("loop", "tangential load against shift", needs="tangential load")
 def loop(
-    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+    result: Result | Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
     """Draw the tangential load against the shift; for similar spheres also the closed solution.
 
@@ -246,7 +242,7 @@ def loop(
 
 @figure("torsion", "torque against twist", needs="torque")
 def torsion(
-    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+    result: Result | Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
     """Draw the torque against the twist; for similar spheres also the solution of Lubkin."""
     dataset = _before_wear(dataset_of(result))
@@ -269,7 +265,7 @@ def torsion(
 Axis = tuple[Array, str, str]  # values, name and unit of the quantity on an axis
 
 
-def _before_wear(dataset: xarray.Dataset) -> xarray.Dataset:
+def _before_wear(dataset: Dataset) -> Dataset:
     """Return the load history without the cycles of wear, of which only the end is recorded."""
     if "wear_cycles" not in dataset:
         return dataset
@@ -314,7 +310,7 @@ def _draw_loop(
     return to_y
 
 
-def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
+def initial_compliance(dataset: Dataset) -> tuple[float, float]:
     """Return the shift of the first step with a tangential load over that of Mindlin, and its Q/(mu P).
 
     Spheres are pressed, then sheared at a constant normal load; another result is an error.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefiner
 
 from ..analytic.compare import ClosedForms, PartialSlip
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core.edges import ZoneMesh
 from ..core.lattice import linear
 from ..errors import DeckError
@@ -27,10 +27,6 @@ from ..text import scaled
 from ..variables import MAPS, VARIABLES
 from .registry import figure, styled
 from .style import EXACT, drawing, legend_above, panels_of, set_title
-
-if TYPE_CHECKING:
-    import xarray
-
 
 Limits = tuple[float, float, float, float]
 
@@ -385,7 +381,7 @@ def draw_field(
 @styled
 def field_map(
     name: str,
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     with_arrows: bool | None = None,
     ax: Axes | None = None,
@@ -416,7 +412,7 @@ def field_map(
 
 @figure("pressure", _FIELDS["pressure"].help)
 def pressure_field(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     ax: Axes | None = None,
     source: str | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
 from ..analytic.compare import PartialSlip
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..core.lattice import section_ends
 from ..errors import DeckError, NotInResult
 from ..result.result import Result
@@ -22,10 +22,6 @@ from ..text import scaled, worded
 from . import style
 from .maps import closed_solutions, views_of
 from .registry import figure
-
-if TYPE_CHECKING:
-    import xarray
-
 
 Point = tuple[float, float]
 
@@ -216,7 +212,7 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
 
 @figure("section", "pressure along a line, and its difference from Hertz")
 def section(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     step: int = -1,
     angle: float = 0.0,
     through: Point | None = None,
@@ -246,7 +242,7 @@ def section(
 
 @figure("tractions", "pressure and shear traction along a line, at some steps", needs="friction")
 def tractions(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     angle: float = 0.0,
     through: Point | None = None,
@@ -381,7 +377,7 @@ _CURVES = 7
 
 
 @figure("wear", "pressure and worn depth along a line, by cycles of wear", needs="wear")
-def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
+def wear(result: Result | Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
     """Draw pressure and worn depth in a section of the contact, for several cycles of wear."""
     dataset = dataset_of(result)
     if "wear_cycles" not in dataset or "worn_depth" not in dataset:

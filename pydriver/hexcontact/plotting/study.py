@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import Dataset
 from ..errors import DeckError
 from ..result.view import last_steps, parameters_of
 from ..text import quantity, scaled
 from ..variables import SUMMARY, VARIABLES, spelled
 from .registry import figure
 from .style import COMPUTED, color_scale, legend_under, new_panels, set_title, shades, titled
-
-if TYPE_CHECKING:
-    import xarray
 
 _LEGEND = 8  # curves, more of which get a scale of colors
 
@@ -26,14 +24,14 @@ def _spelled(name: str) -> str:
     return spelled(name.removesuffix("_fit")) if name in VARIABLES else name
 
 
-def _scale(study: xarray.Dataset, name: str) -> tuple[float, str]:
+def _scale(study: Dataset, name: str) -> tuple[float, str]:
     """Return factor and unit for an axis with a quantity."""
     values = np.abs(study[name].values.astype(float))
     largest = float(np.max(values[np.isfinite(values)], initial=0.0))
     return scaled(largest, str(study[name].attrs.get("units", "1")).removesuffix("1"))
 
 
-def _varying(study: xarray.Dataset) -> list[str]:
+def _varying(study: Dataset) -> list[str]:
     """Return the quantities of a summary that differ between the cases."""
     found = []
     for name in ("approach", *SUMMARY):
@@ -45,7 +43,7 @@ def _varying(study: xarray.Dataset) -> list[str]:
 
 
 @figure("study", "quantities of the cases over a parameter", needs="a study")
-def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: str = "") -> Figure:
+def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "") -> Figure:
     """Draw quantities of the last load step over a parameter of a study.
 
     Parameters
@@ -91,7 +89,7 @@ def study(study: xarray.Dataset, quantities: Sequence[str] | None = None, over: 
 
 def _draw(
     axes: Axes,
-    curves: xarray.Dataset,
+    curves: Dataset,
     name: str,
     over: str,
     labels: Sequence[str],
@@ -110,7 +108,7 @@ def _draw(
     axes.grid(color="0.9", lw=0.5)
 
 
-def _label(study: xarray.Dataset, dims: Sequence[object], place: object) -> str:
+def _label(study: Dataset, dims: Sequence[object], place: object) -> str:
     """Return the values of the other parameters of a curve."""
     values = place if isinstance(place, tuple) else (place,)
     words = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +15,7 @@ from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
 from ..analytic.compare import PartialSlip
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core import measures
 from ..core.edges import ZoneMesh
 from ..core.measures import ROUND
@@ -28,9 +28,6 @@ from ..text import worded
 from . import style
 from .maps import FEWER_ARROWS, Part, closed_solutions, map_panels, mesh_of, views_of
 from .registry import figure
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def draw_zones(axes: Axes, view: StepView, exact: PartialSlip | None, part: Part) -> None:
@@ -150,7 +147,7 @@ _APART = 80  # spacings across the picture up to which nodes are distinguishable
 
 
 @figure("boundary", "nodes in contact (and stick), fitted circle or ellipse")
-def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
+def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
     With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).

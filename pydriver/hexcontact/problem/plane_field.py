@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import netcdf_library
-from ..arrays import Array, Mask, has_entries, reals
+from ..arrays import Array, DataArray, Mask, has_entries, reals
 from ..core import memory
 from ..core.contact import shaped
 from ..core.friction import FrictionLaw
@@ -24,10 +24,6 @@ from ..errors import DeckError
 from ..files import reading
 from ..text import listed, quantity
 from ..variables import LARGEST
-
-if TYPE_CHECKING:
-    import xarray
-
 
 # Departure of a spline from the range of two neighbouring heights, over the largest difference nearby: 0.2
 # beside a step, 0.17 beside the kink of a flat, at most 0.01 for waves of six points and more. The part that
@@ -66,7 +62,7 @@ class HeightMap:
         self.distances = float(np.median(np.diff(self.x))), float(np.median(np.diff(self.y)))
 
     @classmethod
-    def of(cls, gap: xarray.DataArray, rule: Rule) -> Self:
+    def of(cls, gap: DataArray, rule: Rule) -> Self:
         """Return the map of an array with the coordinates x and y, each along a dimension."""
         name = rule.key
         x, y = gap.coords["x"], gap.coords["y"]
@@ -268,7 +264,7 @@ def _place(x: float, y: float) -> str:
     return f"x = {x:.4g} m, y = {y:.4g} m"
 
 
-def in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
+def in_si(values: DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
     """Return values in SI, converted from the attribute `units`; without it they are in SI."""
     units = str(values.attrs.get("units", dimension.unit))
     try:

@@ -12,22 +12,19 @@ import datetime
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import integer
+from ..arrays import Dataset, integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
-
-if TYPE_CHECKING:
-    import xarray
 
 COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
@@ -256,12 +253,12 @@ def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[A
     return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
 
 
-def lattice_of(dataset: xarray.Dataset) -> Lattice:
+def lattice_of(dataset: Dataset) -> Lattice:
     """Return the lattice window of a result."""
     return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
 
 
-def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
+def step_of(dataset: Dataset, number: int) -> Dataset:
     """Return a load step of a result by its number, see `hexcontact.Result.step`."""
     number = integer(number, "step", "the number of a load step, from 1; -1 is the last one")
     numbers = dataset["step"].values
@@ -272,7 +269,7 @@ def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
     raise NoSuchStep(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
 
 
-def history_of(dataset: xarray.Dataset) -> list[str]:
+def history_of(dataset: Dataset) -> list[str]:
     """Return the names of the quantities of a result with one value by step."""
     return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("step",)]
 
@@ -283,7 +280,7 @@ def assemble(
     complete: bool = True,
     trials: Mapping[str, Sequence[Any]] | None = None,
     stopped: str = "",
-) -> xarray.Dataset:
+) -> Dataset:
     """Return the dataset of the steps of a run, which are read twice: no generator.
 
     `complete`: these are all steps of the run; `trials` as of `Layout`; `stopped`: reason of an early end.

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Dataset
 from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
@@ -43,7 +44,6 @@ from .step import Step
 
 if TYPE_CHECKING:
     import netCDF4
-    import xarray
 
     from .result import Result
 
@@ -115,7 +115,7 @@ _LATER = {
 }
 
 
-def fault_of_result(dataset: xarray.Dataset) -> str:
+def fault_of_result(dataset: Dataset) -> str:
     """Return a fault of the dataset of a result file, whose fields may be unread; empty if there is none."""
     attributes = {str(name): value for name, value in dataset.attrs.items()}
     if fault := _fault_of_attributes(attributes):
@@ -162,7 +162,7 @@ def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
     return ""
 
 
-def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
+def _fault_of_coordinates(dataset: Dataset) -> str:
     """Return a fault of steps, rows and columns, which count one by one."""
     if dataset["step"].values[0] != 1:
         return "its steps do not begin with 1"
@@ -176,7 +176,7 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
     return ""
 
 
-def _fault_of_histories(dataset: xarray.Dataset) -> str:
+def _fault_of_histories(dataset: Dataset) -> str:
     """Return a fault of the numbers by step; empty if there is none."""
     known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
     history = {name: dataset[name].values for name in known}
@@ -224,7 +224,7 @@ def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, 
     return low, high
 
 
-def _fault_of_fields(dataset: xarray.Dataset) -> str:
+def _fault_of_fields(dataset: Dataset) -> str:
     """Return a fault of the deck, or of the fields, which are read step by step; empty if there is none."""
     try:
         tomllib.loads(str(dataset.attrs["deck"]))

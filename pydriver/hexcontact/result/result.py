@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analytic.hertz_gap import friction_of
-from ..arrays import Array, has_entries, integer, number
+from ..arrays import Array, DataArray, DataFrame, Dataset, has_entries, integer, number
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stress, cycle_of
 from ..deck.faults import NOWHERE
@@ -26,9 +26,6 @@ from .layout import Quantities, history_of, lattice_of, step_of
 from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
-
     from ..analytic.compare import Comparison
 
 
@@ -52,17 +49,17 @@ class Result:
     of its file, empty if there is none.
     """
 
-    def __init__(self, dataset: xarray.Dataset | Callable[[], xarray.Dataset], path: str = "") -> None:
+    def __init__(self, dataset: Dataset | Callable[[], Dataset], path: str = "") -> None:
         self._made, self.path = dataset, path
 
     @property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> Dataset:
         """All quantities, and attributes of the run."""
         if callable(self._made):
             self._made = self._made()
         return self._made
 
-    def __getattr__(self, name: str) -> xarray.DataArray:
+    def __getattr__(self, name: str) -> DataArray:
         """Return a quantity."""
         if name.startswith("_") or name in ("dataset", "path"):
             raise AttributeError(name)
@@ -72,12 +69,12 @@ class Result:
             raise AttributeError(error.args[0]) from None
 
     @overload
-    def __getitem__(self, name: str) -> xarray.DataArray: ...
+    def __getitem__(self, name: str) -> DataArray: ...
 
     @overload
-    def __getitem__(self, name: slice) -> xarray.Dataset: ...
+    def __getitem__(self, name: slice) -> Dataset: ...
 
-    def __getitem__(self, name: str | slice) -> xarray.DataArray | xarray.Dataset:
+    def __getitem__(self, name: str | slice) -> DataArray | Dataset:
         """Return a quantity, also ``step``, which is a method as an attribute; a slice: those load steps.
 
         Slices count as those of ``list(result)``: ``result[1:3]`` has the load steps 2 and 3.
@@ -104,7 +101,7 @@ class Result:
         """Test whether there is a quantity of this name."""
         return name in self.dataset.variables
 
-    def __iter__(self) -> Iterator[xarray.Dataset]:
+    def __iter__(self) -> Iterator[Dataset]:
         """Iterate over the load steps."""
         return (self.dataset.isel(step=place) for place in range(len(self)))
 
@@ -138,7 +135,7 @@ class Result:
         """The lattice window of the result."""
         return lattice_of(self.dataset)
 
-    def step(self, number: int) -> xarray.Dataset:
+    def step(self, number: int) -> Dataset:
         """Return a load step by its number, from 1; -1 is the last one; IndexError if there is none."""
         return step_of(self.dataset, number)
 
@@ -165,17 +162,17 @@ class Result:
         return PressureField.of(self.traction_field(number, "edges"))
 
     @property
-    def history(self) -> pandas.DataFrame:
+    def history(self) -> DataFrame:
         """Table of all quantities with one value by step."""
         return self.dataset[history_of(self.dataset)].to_dataframe()
 
     @property
-    def segments(self) -> pandas.DataFrame:
+    def segments(self) -> DataFrame:
         """Segments of the load history: label, first and last step, energy that friction dissipated (J)."""
         return self._parts(segments)
 
     @property
-    def cycles(self) -> pandas.DataFrame:
+    def cycles(self) -> DataFrame:
         """Closed cycles of a load history with friction, a line each; empty if there are none.
 
         Columns: kind of loading ("shear", "torsion", "normal"), first and last step, energy that friction
@@ -185,7 +182,7 @@ class Result:
         """
         return self._parts(cycles)
 
-    def _parts(self, of: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> pandas.DataFrame:
+    def _parts(self, of: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> DataFrame:
         import pandas
 
         rows = of(cast(Any, self.history.to_dict("records")))
@@ -210,7 +207,7 @@ class Result:
         step: int = -1,
         points: int | None = None,
         source: str | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fields along a line between two points.
 
         Along a line a field is a polygon. By default the points are its corners, so that straight lines
@@ -243,7 +240,7 @@ class Result:
         step: int = -1,
         points: int | None = None,
         source: str | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fields along a line across the whole contact; other arguments and result as of `profile`.
 
         Parameters
@@ -262,7 +259,7 @@ class Result:
         coefficient: float,
         segment: str | Sequence[str] | None = None,
         steps: Sequence[int] | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return the wear of one cycle of the loads, of a run with friction and without [wear].
 
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
@@ -290,7 +287,7 @@ class Result:
         body: int = 1,
         source: str | None = None,
         **where: Any,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return stresses and displacements (SI) below the surface, see docs/stress.md.
 
         `components` are names of `hexcontact.variables.STRESSES`; several numbers of a step give the dataset
@@ -324,7 +321,7 @@ class Result:
         steps: Sequence[int] | None = None,
         body: int = 1,
         **given: Any,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fatigue parameters (SI) over a closed cycle, see docs/fatigue.md.
 
         DeckError if a name, a constant or the body is wrong, the segments are no closed cycle, or fields of
@@ -368,7 +365,7 @@ class Result:
         steps: Sequence[int] | None = None,
         body: int = 1,
         **where: Any,
-    ) -> Iterator[pandas.DataFrame]:
+    ) -> Iterator[DataFrame]:
         """Yield the stresses of a cycle by point and load step, in MPa, as pyLife takes them, block by block.
 
         Arguments as of `fatigue`. The index is ``node_id, load_step``; the columns are ``x``, ``y`` and
@@ -428,7 +425,7 @@ class Result:
         """Names, units and meanings of all quantities; printed, a table."""
         return Quantities([str(name) for name in self.dataset.variables])
 
-    def to_dataframe(self, *names: str, step: int | None = None) -> pandas.DataFrame:
+    def to_dataframe(self, *names: str, step: int | None = None) -> DataFrame:
         """Return quantities (SI) as a table; ``attrs["units"]`` of it has their units.
 
         By default these are all with one value by step: a line is a load step, with fields a node of a load
@@ -497,14 +494,14 @@ class Result:
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
 
 
-def as_result(result: Result | xarray.Dataset) -> Result:
+def as_result(result: Result | Dataset) -> Result:
     """Return a result by its dataset, or itself."""
     return result if isinstance(result, Result) else Result(result)
 
 
 def at_hand(
     result: Result, kept: list[int], names: list[str] | None = None, anew: bool = False
-) -> Iterator[tuple[str, xarray.Dataset]]:
+) -> Iterator[tuple[str, Dataset]]:
     """Yield name and dataset of each table, or of those named, of the deck of a result.
 
     Tables of the run are read from their files; with `anew` all are computed.
@@ -519,7 +516,7 @@ def at_hand(
             yield name, found
 
 
-def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> xarray.Dataset:
+def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> Dataset:
     """Return the dataset of a table of the deck."""
     if isinstance(table, Fatigue):
         constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
+from ..arrays import DataFrame
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.keys import Load
 from ..deck.toml import as_toml, load_as_toml, plain
@@ -30,9 +31,8 @@ from .run import metadata_of
 from .wear import without_ends
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-
     from ..result.result import Result
+
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -145,7 +145,7 @@ class Session:
         return tuple(self._steps)
 
     @property
-    def history(self) -> pandas.DataFrame:
+    def history(self) -> DataFrame:
         """Table of everything that has one value by step, by the number of the step."""
         import pandas
 

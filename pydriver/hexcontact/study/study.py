@@ -16,9 +16,10 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from .._version import __version__
+from ..arrays import Dataset
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
@@ -31,9 +32,6 @@ from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
 from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
 from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
-
-if TYPE_CHECKING:
-    import xarray
 
 
 class StudyLines(Lines):
@@ -212,7 +210,7 @@ class Study:
         retry: bool = False,
         listener: Listener | None = None,
         cancel: threading.Event | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Run the missing cases, write the result to `output` and return it.
 
         In a script this belongs under ``if __name__ == "__main__":``, since it starts processes. DeckError if
@@ -300,7 +298,7 @@ class Study:
         """Return whether the result of a case exists."""
         return any(self.folder.number(case) == number and self.folder.done(case) for case in self.cases)
 
-    def collect(self) -> xarray.Dataset:
+    def collect(self) -> Dataset:
         """Combine the finished cases, write the result to `output`, and return it.
 
         DeckError or ResourceError if it cannot be written.
@@ -310,7 +308,7 @@ class Study:
         write(dataset, self.output, {"title": self.title, "study": study})
         return dataset
 
-    def _combined(self) -> xarray.Dataset:
+    def _combined(self) -> Dataset:
         """Return the data set of the finished cases."""
         self.folder.enter(self.plan)
         attributes = {
@@ -327,6 +325,6 @@ class Study:
         return f"Study({self.title!r}, {self.file.combine} over {axes}: {len(self)} cases, {self.output})"
 
 
-def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> xarray.Dataset:
+def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> Dataset:
     """Read a study file and run its missing cases; options as of `Study.run`."""
     return Study.from_toml(path, output).run(**options)

@@ -261,19 +261,15 @@ class Case(Problem):
         -----
         PlausibilityWarning
             For each of `warnings` that was not raised before.
-        AccuracyWarning
-            If an accuracy that the case asks for was not reached.
-        PathWarning
-            If a static load step, or one that begins without contact, was solved in parts.
+        AccuracyWarning, PathWarning
+            If an accuracy that the case asks for was not reached; or a static load step, or one that begins
+            without contact, was solved in parts.
 
         Raises
         ------
-        DeckError
-            If the output cannot be written, or the contact outgrows a fixed window.
-        ConvergenceError
-            If a load step misses its tolerance; with an output, the steps before it are recorded.
-        ResourceError
-            If there is not enough memory or disk.
+        DeckError, ConvergenceError, ResourceError
+            If the output cannot be written, or the contact outgrows a fixed window; a load step misses its
+            tolerance (with an output, the steps before it are recorded); memory or disk do not suffice.
         """
         from .solve.run import run
 

@@ -259,7 +259,7 @@ def trial_rows(result: Result) -> list[Row]:
 
     A row has the values on three of the lattices, and the largest error of all steps over the largest value.
     """
-    from ..solve.accuracy import JUDGED, relative_errors
+    from ..solve.lattices import JUDGED, relative_errors
 
     data = result.dataset
     if "trial_spacing" not in data:

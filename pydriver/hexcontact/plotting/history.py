@@ -1,4 +1,4 @@
-"""Quantities with one value for each load step: histories, loops of load and motion, compliance."""
+"""Numbers of each load step, or each case of a study: histories, loops of load and motion, compliance."""
 
 from __future__ import annotations
 
@@ -19,11 +19,25 @@ from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
 from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
-from ..result.view import Results, as_list, dataset_of, title_of
-from ..text import scaled, worded
-from ..variables import PANELS, VARIABLES, names_where, spelled
+from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
+from ..text import quantity, scaled, worded
+from ..variables import PANELS, SUMMARY, VARIABLES, names_where, spelled
 from .registry import SEVERAL_RUNS, figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
+from .style import (
+    COMPUTED,
+    EXACT,
+    GUIDE,
+    THIRD,
+    color_scale,
+    drawing,
+    handles_of,
+    legend_under,
+    new_figure,
+    new_panels,
+    set_title,
+    shades,
+    titled,
+)
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _MANY = 60  # steps beyond which curves have no markers
@@ -47,9 +61,13 @@ def vectors_of(dataset: Dataset, name: str) -> Array:
 
 
 def _largest(dataset: Dataset, names: Sequence[str]) -> float:
-    values = np.concatenate([values_of(dataset, name) for name in names])
-    finite = values[np.isfinite(values)]
-    return float(np.abs(finite).max()) if finite.size else 0.0
+    values = np.concatenate([np.ravel(values_of(dataset, name)) for name in names])
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _scaled(dataset: Dataset, names: Sequence[str]) -> tuple[float, str]:
+    """Return factor and unit for an axis with quantities of one unit."""
+    return scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
 
 
 def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
@@ -154,10 +172,10 @@ def history(
 
 def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str = "step") -> None:
     """Draw quantities of one unit over the load steps, or over another quantity."""
-    factor, unit = scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
+    factor, unit = _scaled(dataset, names)
     place, label = dataset["step"].values, "load step"
     if over != "step":
-        along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
+        along, length = _scaled(dataset, [over])
         place, label = values_of(dataset, over) * along, titled(_spelled(over), length)
     begun = begins_at_zero([*names, *([over] if over != "step" else [])])
     place = np.insert(place, 0, 0.0) if begun else place
@@ -183,7 +201,7 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
 
 
 def _spelled(name: str) -> str:
-    return spelled(name.removesuffix("_fit"))
+    return spelled(name.removesuffix("_fit")) if name in VARIABLES else name  # of a parameter
 
 
 def _common(names: Sequence[str]) -> str:
@@ -374,3 +392,82 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
     at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
     set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
     return canvas
+
+
+# --- studies ------------------------------------------------------------------------------------------------
+
+_LEGEND = 8  # curves, more of which get a scale of colors
+
+
+def _varying(study: Dataset) -> list[str]:
+    """Return the quantities of a summary that differ between the cases."""
+    found = []
+    for name in ("approach", *SUMMARY):
+        values = study[name].values if name in study else np.array([])
+        finite = values[np.isfinite(values)]
+        if finite.size and np.ptp(finite) > 1e-6 * np.abs(finite).max():
+            found.append(name)
+    return found
+
+
+@figure("study", "quantities of the cases over a parameter", needs="a study")
+def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "") -> Figure:
+    """Draw quantities of the last load step over a parameter of a study; cases not on a grid are points.
+
+    Parameters
+    ----------
+    study : xarray.Dataset
+        The result of a study.
+    quantities : sequence of str, optional
+        Names of quantities, one for each panel; by default those of a summary that vary.
+    over : str
+        Parameter on the horizontal axis; by default the one with the most values.
+
+    Raises
+    ------
+    DeckError
+        If there is no such name, or no case is done.
+    """
+    study = last_steps(study)
+    numbers = [n for n in parameters_of(study) if study[n].dtype.kind in "fi" and study[n].ndim == 1]
+    if not numbers or (over and over not in numbers):
+        expected = f"expected {' or '.join(numbers)}" if numbers else "none of its parameters is a number"
+        raise DeckError(f"over = {over!r}: {expected}")
+    over = over or max(numbers, key=lambda name: study[name].size)
+    names = _varying(study) if quantities is None else list(quantities)
+    if unknown := [name for name in names if name not in study.data_vars]:
+        raise DeckError(f"{unknown[0]} is no quantity of this study")
+    if not names:
+        raise DeckError("no quantity differs between its cases; are any done?")
+    [along] = study[over].dims
+    others = [dim for dim in study["status"].dims if dim != along]
+    curves = study.stack(curve=others) if others else study.expand_dims("curve")
+    labels = [_label(study, others, place) for place in curves["curve"].values] if others else [""]
+    canvas, panels = new_panels(len(names), min(len(names), 2), 3.4, 2.1, 0.5)
+    colors = shades(len(labels)) if others else [COMPUTED]
+    (to_place, length), order = _scaled(curves, [over]), np.argsort(curves[over].values)
+    look: dict[str, Any] = {"ls": "-" if along != "case" else "", "marker": "o", "ms": 3}
+    for axes, name in zip(panels, names, strict=True):
+        factor, unit = _scaled(curves, [name])
+        for k, label in enumerate(labels):
+            place, values = (curves[over].values * to_place), curves[name].isel(curve=k).values * factor
+            axes.plot(place[order], values[order], label=label, color=colors[k], **look)
+        axes.set(xlabel=titled(_spelled(over), length), ylabel=titled(_spelled(name), unit))
+        axes.grid(color="0.9", lw=0.5)
+    if 1 < len(labels) <= _LEGEND:
+        legend_under(canvas, panels[0].get_lines())
+    elif others:
+        color_scale(canvas, panels, labels, colors)
+    set_title(canvas, str(study.attrs.get("title", "")))
+    return canvas
+
+
+def _label(study: Dataset, dims: Sequence[object], place: object) -> str:
+    """Return the values of the other parameters of a curve."""
+    values = place if isinstance(place, tuple) else (place,)
+    words = []
+    for dim, value in zip(dims, values, strict=True):
+        unit = str(study[dim].attrs.get("units", "1")).removesuffix("1")
+        text = value if isinstance(value, str) else quantity(float(value), unit) if unit else f"{value:g}"
+        words.append(f"{dim} {text}")
+    return ", ".join(words)

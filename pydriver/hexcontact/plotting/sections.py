@@ -302,14 +302,8 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
         for sign in used:
             edge = sign * bound * to_stress
             axes.fill_between(cut.along(cut.fine), edge, color="0.92", lw=0, zorder=0)
-            axes.plot(
-                cut.along(cut.fine),
-                edge,
-                color=style.GUIDE,
-                lw=0.8,
-                label=name if sign == used[0] else None,
-                zorder=1,
-            )
+            label = name if sign == used[0] else None
+            axes.plot(cut.along(cut.fine), edge, color=style.GUIDE, lw=0.8, label=label, zorder=1)
     axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=1)
     for values, color, name in zip((along, across), (style.COMPUTED, style.THIRD), cut.names(), strict=True):
         axes.plot(place, values * to_stress, color=color, label=name, zorder=4, **cut.look())

@@ -57,36 +57,19 @@ def _one_at_a_time(call: Callable[Concatenate[Session, _P], _T]) -> Callable[Con
 
 
 class Session:
-    """A run that waits between its load steps; made by `hexcontact.Case.start`.
+    """A run that waits between its load steps; made by `hexcontact.Case.start`; ``case`` is its problem.
 
     Iterating over it solves the loads of the case one by one. `advance` applies other loads instead of the
     remaining ones of the case.
 
     A step that does not converge, or slides, raises an exception and leaves the session at the step before,
-    from which other loads can be applied.
+    from which other loads can be applied. The first window follows from the loads of the case, and grows with
+    the contact.
 
     With an output each step is on the disk before the next begins; `close`, or the end of a ``with`` block,
     completes the file. Its deck has the applied loads. If loads of the case remain and none was applied by
-    `advance`, the run is unfinished and `hexcontact.resume` continues it.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem; the size of the first window follows from its loads, and grows with the contact.
-    output : path, optional
-        netCDF file to write. Without it all steps are in memory.
-    overwrite : bool
-        Replace an output that exists.
-
-    Attributes
-    ----------
-    case : Problem
-        The problem.
-
-    Raises
-    ------
-    DeckError
-        If the output cannot be written.
+    `advance`, the run is unfinished and `hexcontact.resume` continues it. Without an output all steps are in
+    memory.
 
     Examples
     --------

@@ -197,14 +197,10 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
             shown = TextTable(title, ("step", *columns), rows, tight=True)
-            if _fits(shown, console):
+            needed = console.measure(shown, options=console.options.update_width(1000))
+            if needed.maximum <= console.width:
                 return shown
     return shown
-
-
-def _fits(table: TextTable, console: Console) -> bool:
-    """Return whether a table needs no more width than a console has."""
-    return console.measure(table, options=console.options.update_width(1000)).maximum <= console.width
 
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:

@@ -22,22 +22,8 @@ from ..result.result import Result
 from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
 from ..text import quantity, scaled, worded
 from ..variables import PANELS, SUMMARY, VARIABLES, names_where, spelled
+from . import style
 from .registry import SEVERAL_RUNS, figure
-from .style import (
-    COMPUTED,
-    EXACT,
-    GUIDE,
-    THIRD,
-    color_scale,
-    drawing,
-    handles_of,
-    legend_under,
-    new_figure,
-    new_panels,
-    set_title,
-    shades,
-    titled,
-)
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _MANY = 60  # steps beyond which curves have no markers
@@ -153,10 +139,10 @@ def history(
         if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
             raise DeckError("ax holds quantities of one unit; expected some in quantities")
         draw_history(ax, dataset, [name for names in panels for name in names], over)
-        return drawing(ax, 0.0, 0.0)[0]
+        return style.drawing(ax, 0.0, 0.0)[0]
     columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    canvas = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
+    canvas = style.new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
     grid = canvas.subplots(rows, columns, sharex=True, squeeze=False)
     empty = grid.size - len(panels)  # at the end of the first row
     slots = [*grid[0, : columns - empty], *grid[1:].flat]
@@ -166,7 +152,7 @@ def history(
         draw_history(axes, dataset, names, over)
     for axes in grid[:-1].flat:
         axes.set_xlabel("")
-    set_title(canvas, title_of(dataset))
+    style.set_title(canvas, title_of(dataset))
     return canvas
 
 
@@ -176,11 +162,11 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
     place, label = dataset["step"].values, "load step"
     if over != "step":
         along, length = _scaled(dataset, [over])
-        place, label = values_of(dataset, over) * along, titled(_spelled(over), length)
+        place, label = values_of(dataset, over) * along, style.titled(_spelled(over), length)
     begun = begins_at_zero([*names, *([over] if over != "step" else [])])
     place = np.insert(place, 0, 0.0) if begun else place
     marker = "o" if place.size <= _MANY else ""
-    lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
+    lines = (style.COMPUTED, "-", marker), (style.EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
         values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
@@ -189,7 +175,7 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     named = _spelled(names[0] if len(names) == 1 else _common(names))
-    axes.set(xlabel=label, ylabel=titled(named, unit))
+    axes.set(xlabel=label, ylabel=style.titled(named, unit))
     if len(names) > 1:
         axes.legend([_apart(name, names) for name in names], handlelength=2.2)
     axes.grid(color="0.9", lw=0.5)
@@ -197,7 +183,7 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
         cast(MaxNLocator, axes.xaxis.get_major_locator()).set_params(integer=True)
         if "segment" in dataset:
             for change in np.flatnonzero(np.diff(dataset["segment"].values)):
-                axes.axvline(float(place[change + begun]), color=GUIDE, lw=0.7, ls=":", zorder=0)
+                axes.axvline(float(place[change + begun]), color=style.GUIDE, lw=0.7, ls=":", zorder=0)
 
 
 def _spelled(name: str) -> str:
@@ -236,7 +222,7 @@ def loop(
         raise NotInResult("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
-    canvas, axes = drawing(ax, 4.6, 3.8)
+    canvas, axes = style.drawing(ax, 4.6, 3.8)
     to_force = _draw_loop(
         axes,
         (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
@@ -250,11 +236,11 @@ def loop(
     room = 0.04 * (high - low)
     for level in (-bound * to_force, bound * to_force):
         if 1.3 * low < level < 1.3 * high:
-            axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+            axes.axhline(level, color=style.GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
-    axes.legend(handles=handles_of(axes))
-    set_title(canvas, title_of(dataset), ax)
+    axes.legend(handles=style.handles_of(axes))
+    style.set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
@@ -266,7 +252,7 @@ def torsion(
     dataset = _before_wear(dataset_of(result))
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise NotInResult("there is no torque in this result")
-    canvas, axes = drawing(ax, 4.6, 3.8)
+    canvas, axes = style.drawing(ax, 4.6, 3.8)
     _draw_loop(
         axes,
         (values_of(dataset, "twist"), r"twist $\vartheta$", "rad"),
@@ -276,7 +262,7 @@ def torsion(
         cycles,
     )
     axes.legend()
-    set_title(canvas, title_of(dataset), ax)
+    style.set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
@@ -302,13 +288,13 @@ def _draw_loop(
     (x, x_name, x_unit), (y, y_name, y_unit) = motion, load
     to_x, x_unit = scaled(float(np.abs(x).max()), x_unit)
     to_y, y_unit = scaled(float(np.abs(y).max()), y_unit)
-    axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=0)
-    axes.axvline(0.0, color=GUIDE, lw=0.5, zorder=0)
+    axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
+    axes.axvline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
     size = 3.5 if x.size <= 2 * _MANY else 2.0
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9}
     found = cycles_of(x, y)
     numbers = [-1] * bool(found) if chosen is None else [chosen] if isinstance(chosen, int) else [*chosen]
-    colors = [COMPUTED] if len(numbers) < 2 else shades(len(numbers))
+    colors = [style.COMPUTED] if len(numbers) < 2 else style.shades(len(numbers))
     for number, color in zip(numbers, colors, strict=False):
         place = number if number < 0 else number - 1
         if number == 0 or not -len(found) <= place < len(found):
@@ -321,9 +307,9 @@ def _draw_loop(
             axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)
     if chosen is None:
         line = {"ls": ""} if closed is not None else {"lw": 0.7}
-        axes.plot(x * to_x, y * to_y, color=COMPUTED, label="computed", zorder=3, **look, **line)
+        axes.plot(x * to_x, y * to_y, color=style.COMPUTED, label="computed", zorder=3, **look, **line)
     if closed is not None:
-        axes.plot(closed[0] * to_x, closed[1] * to_y, color=EXACT, lw=1.1, label=name, zorder=2)
+        axes.plot(closed[0] * to_x, closed[1] * to_y, color=style.EXACT, lw=1.1, label=name, zorder=2)
     axes.set(xlabel=f"{x_name} ({x_unit})", ylabel=f"{y_name} ({y_unit})")
     return to_y
 
@@ -377,9 +363,11 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
-    canvas, axes = drawing(ax, 4.6, 3.6)
-    axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
-    colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
+    canvas, axes = style.drawing(ax, 4.6, 3.6)
+    axes.axhline(1.0, color=style.GUIDE, lw=0.8, ls=":", label="Mindlin")
+    colors = dict(
+        zip(sorted({mu for mu, _ in series}), (style.COMPUTED, style.EXACT, style.THIRD), strict=False)
+    )
     for (mu, coupling), points in sorted(series.items()):
         beta, ratio_of = np.array(sorted(points)).T
         full = coupling == "full"
@@ -390,7 +378,7 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
     axes.legend()
     low, high = min(shares), max(shares)
     at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
+    style.set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
     return canvas
 
 
@@ -443,8 +431,8 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
     others = [dim for dim in study["status"].dims if dim != along]
     curves = study.stack(curve=others) if others else study.expand_dims("curve")
     labels = [_label(study, others, place) for place in curves["curve"].values] if others else [""]
-    canvas, panels = new_panels(len(names), min(len(names), 2), 3.4, 2.1, 0.5)
-    colors = shades(len(labels)) if others else [COMPUTED]
+    canvas, panels = style.new_panels(len(names), min(len(names), 2), 3.4, 2.1, 0.5)
+    colors = style.shades(len(labels)) if others else [style.COMPUTED]
     (to_place, length), order = _scaled(curves, [over]), np.argsort(curves[over].values)
     look: dict[str, Any] = {"ls": "-" if along != "case" else "", "marker": "o", "ms": 3}
     for axes, name in zip(panels, names, strict=True):
@@ -452,13 +440,13 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         for k, label in enumerate(labels):
             place, values = (curves[over].values * to_place), curves[name].isel(curve=k).values * factor
             axes.plot(place[order], values[order], label=label, color=colors[k], **look)
-        axes.set(xlabel=titled(_spelled(over), length), ylabel=titled(_spelled(name), unit))
+        axes.set(xlabel=style.titled(_spelled(over), length), ylabel=style.titled(_spelled(name), unit))
         axes.grid(color="0.9", lw=0.5)
     if 1 < len(labels) <= _LEGEND:
-        legend_under(canvas, panels[0].get_lines())
+        style.legend_under(canvas, panels[0].get_lines())
     elif others:
-        color_scale(canvas, panels, labels, colors)
-    set_title(canvas, str(study.attrs.get("title", "")))
+        style.color_scale(canvas, panels, labels, colors)
+    style.set_title(canvas, str(study.attrs.get("title", "")))
     return canvas
 
 

@@ -776,6 +776,16 @@ def test_history_shows_areas_over_steps_or_load(over: str) -> None:
         plotting.history(result, over="tangential_load")
 
 
+@pytest.mark.usefixtures("laid_out_once")
+def test_areas_to_the_edge_are_named_like_those_of_the_nodes() -> None:
+    result = cattaneo()
+    fits = {f"{name}_fit": result[name] for name in ("contact_area", "stick_area")}
+    shown = drawn.visible(plotting.history(result.assign(fits)))
+    [axes] = [axes for axes in shown if set(by_label(axes)) == set(fits)]
+    assert axes.get_ylabel().startswith("area (")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["contact", "stick"]
+
+
 def test_loop_of_load_and_shift() -> None:
     result = loop()
     [axes] = plotting.loop(result).axes

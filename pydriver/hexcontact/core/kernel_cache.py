@@ -92,6 +92,13 @@ def configure(
         Bytes in the folder at most. If a process begins with more, the oldest are deleted.
     folder_shared : bool, optional
         Accept a folder, and files in it, that other users can write.
+
+    Examples
+    --------
+    >>> from hexcontact import kernel_cache
+    >>> kernel_cache.configure(memory="1 GB")
+    >>> kernel_cache.statistics().memory <= 1e9
+    True
     """
     bound = None if memory is None else _bytes(memory, "memory")
     size = None if folder_size is None else _bytes(folder_size, "folder_size")

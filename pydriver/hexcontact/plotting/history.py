@@ -187,7 +187,7 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
 
 
 def _spelled(name: str) -> str:
-    return spelled(name.removesuffix("_fit")) if name in VARIABLES else name  # of a parameter
+    return spelled(name.removesuffix("_fit"))
 
 
 def _common(names: Sequence[str]) -> str:
@@ -440,7 +440,8 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         for k, label in enumerate(labels):
             place, values = (curves[over].values * to_place), curves[name].isel(curve=k).values * factor
             axes.plot(place[order], values[order], label=label, color=colors[k], **look)
-        axes.set(xlabel=style.titled(_spelled(over), length), ylabel=style.titled(_spelled(name), unit))
+        named = _spelled(name) if name in VARIABLES else name
+        axes.set(xlabel=style.titled(over, length), ylabel=style.titled(named, unit))
         axes.grid(color="0.9", lw=0.5)
     if 1 < len(labels) <= _LEGEND:
         style.legend_under(canvas, panels[0].get_lines())

@@ -5,6 +5,8 @@ Run it after a change of the deck format or of `VARIABLES`: ``python docs/deck_t
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import re
 from collections.abc import Callable, Iterable
@@ -47,7 +49,6 @@ TABLES: dict[str, type[Table]] = {  # by their headings in keys.md
         if issubclass(part, Table)
     },
 }
-BLOCK = re.compile(r"(<!-- table: limits -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 HEADER = ("key", "expected", "unit", "default", "example", "meaning")
@@ -137,11 +138,14 @@ def shapes() -> str:
 
 
 def limits() -> str:
-    lines = [row(("expected", "limit", "reason")), "|---|---|---|"]
+    """The limits that `check` and `run` warn of, as CSV."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("expected", "limit", "reason"))
     for limit in plausibility.LIMITS:
         bound = f"at most {limit.most:g}" if limit.most < math.inf else f"at least {limit.least:g}"
-        lines.append(row((f"`{limit.quantity}`", bound, limit.reason)))
-    return "\n".join(lines) + "\n"
+        table.writerow((f"`{limit.quantity}`", bound, limit.reason))
+    return text.getvalue()
 
 
 def variables(belongs: Callable[[str, Variable], bool]) -> str:
@@ -183,13 +187,7 @@ def variables_page() -> str:
     return page("Variables of a result", "[The result file](netcdf.md) explains them.", tables)
 
 
-def errors_page() -> str:
-    """The page of expected errors with its table of limits."""
-    text = (DOCS / "theory/expected_errors.md").read_text(encoding="utf-8")
-    return BLOCK.sub(lambda block: block[1] + limits() + block[2], text)
-
-
-PAGES = {"keys.md": keys_page, "variables.md": variables_page, "theory/expected_errors.md": errors_page}
+PAGES = {"keys.md": keys_page, "variables.md": variables_page, "theory/limits.csv": limits}
 
 if __name__ == "__main__":
     for name, written in PAGES.items():

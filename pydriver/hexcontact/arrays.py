@@ -1,15 +1,24 @@
-"""Checks of numbers and arrays that users pass, before the core takes them."""
+"""Names of arrays, data sets and tables, and checks of what users pass before the core takes it."""
 
 from __future__ import annotations
 
+import math
 import operator
-from collections.abc import Callable, Collection
-from typing import Any
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DeckError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame as DataFrame
+    from xarray import DataArray as DataArray
+    from xarray import Dataset as Dataset
+else:  # xarray and pandas are imported at their first use
+    DataArray = DataFrame = Dataset = Any
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -70,6 +79,11 @@ def number(
     return found
 
 
+def numbers(values: Mapping[str, Any]) -> dict[str, float]:
+    """Return arguments as real numbers by their names."""
+    return {name: number(value, name) for name, value in values.items()}
+
+
 def integer(value: Any, name: str, expected: str = "an integer") -> int:
     """Return an argument as an integer of 32 bits."""
     try:
@@ -81,11 +95,54 @@ def integer(value: Any, name: str, expected: str = "an integer") -> int:
     return found
 
 
+positive = partial(number, expected="a positive number", fits=lambda value: 0.0 < value < math.inf)
+
+
 def word(value: Any, name: str, allowed: Collection[str]) -> str:
     """Return an argument that is one of a few words."""
     if not isinstance(value, str) or value not in allowed:
         raise DeckError(f"{name} = {_shown(value)}: expected {' or '.join(map(repr, allowed))}")
     return value
+
+
+def vector(value: Any, name: str, expected: str, count: int) -> Array:
+    """Return an argument of a few finite numbers."""
+    array = reals(value, name)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        raise DeckError(f"{name} = {value!r}: expected {expected}")
+    return array
+
+
+_ARGUMENTS: dict[str, Callable[[Any, str], Any]] = {
+    **dict.fromkeys(("row_first", "col_first", "n_row", "n_col", "max_sweeps", "max_cuts"), integer),
+    "threads": partial(integer, expected="an integer of at least 0"),  # the core checks the bound
+    "method": partial(word, allowed=("direct", "fft")),
+    "iteration": partial(word, allowed=("newton", "dissertation")),
+    "coupling": partial(word, allowed=("full", "goodman")),
+    "entry": partial(word, allowed=("implicit", "interpolated")),
+    **dict.fromkeys(("lambda_1", "lambda_2", "lambda_5", "young_modulus", "poisson_ratio"), number),
+    "spacing": partial(number, expected="a positive length in meters", fits=lambda v: 0 < v < math.inf),
+    **dict.fromkeys(("cell_ratio", "shear_modulus", "yield_stress"), positive),
+    "cell_angle": partial(
+        number, expected="an angle in radians between 0 and pi", fits=lambda v: 0 < v < math.pi
+    ),
+    "direction": partial(number, expected="an angle in radians", fits=lambda v: abs(v) <= math.pi),
+    "normal_load": partial(number, expected="a number not below zero", fits=lambda v: 0 <= v < math.inf),
+    "approach": partial(number, fits=math.isfinite),
+    "tolerance": partial(number, expected="a number between 0 and 1", fits=lambda v: 0 < v < 1),
+    "friction_coefficient": partial(number, expected="a number of at least 0, or inf", fits=lambda v: v >= 0),
+    "shear_limit": partial(number, expected="a number above 0, or inf", fits=lambda v: v > 0),
+    "slope": partial(number, expected="a finite number", fits=math.isfinite),
+    "origin": partial(vector, expected="two finite lengths in meters", count=2),
+    "interface": partial(vector, expected="a coefficient, an exponent and a stiffness", count=3),
+    "value": partial(vector, expected="four finite numbers", count=4),
+}
+"""Checks of the arguments of the core by their names."""
+
+
+def checked(**arguments: Any) -> tuple[Any, ...]:
+    """Return arguments of the core after the check that belongs to the name of each."""
+    return tuple(_ARGUMENTS[name](value, name) for name, value in arguments.items())
 
 
 def _shown(value: Any) -> str:

@@ -188,6 +188,8 @@ class Case(Problem):
     def changed(self, changes: Mapping[str, Any] | None = None, **arguments: Any) -> Self:
         """Return the same case with other values for some keys of its deck, or some arguments of `Case`.
 
+        DeckError with a sentence for each fault; TypeError if there is no such argument, with the nearest.
+
         Parameters
         ----------
         changes : mapping, optional
@@ -197,13 +199,6 @@ class Case(Problem):
         **arguments
             New values of arguments of `Case`, such as ``spacing="5 um"``, which replaces ``nodes_in_radius``,
             or ``normal_load=20.0``, which replaces all loads.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each fault.
-        TypeError
-            If there is no such argument; it names the nearest.
         """
         refuse_unknown(arguments, _ARGUMENTS, "Case.changed")
         if arguments.keys() & FINENESS:
@@ -266,19 +261,15 @@ class Case(Problem):
         -----
         PlausibilityWarning
             For each of `warnings` that was not raised before.
-        AccuracyWarning
-            If an accuracy that the case asks for was not reached.
-        PathWarning
-            If a static load step, or one that begins without contact, was solved in parts.
+        AccuracyWarning, PathWarning
+            If an accuracy that the case asks for was not reached; or a static load step, or one that begins
+            without contact, was solved in parts.
 
         Raises
         ------
-        DeckError
-            If the output cannot be written, or the contact outgrows a fixed window.
-        ConvergenceError
-            If a load step misses its tolerance; with an output, the steps before it are recorded.
-        ResourceError
-            If there is not enough memory or disk.
+        DeckError, ConvergenceError, ResourceError
+            If the output cannot be written, or the contact outgrows a fixed window; a load step misses its
+            tolerance (with an output, the steps before it are recorded); memory or disk do not suffice.
         """
         from .solve.run import run
 
@@ -288,17 +279,8 @@ class Case(Problem):
     def start(self, output: str | Path | None = None, overwrite: bool = False) -> Session:
         """Begin a run that waits between its load steps, for loads that depend on results.
 
-        Parameters
-        ----------
-        output : path, optional
-            netCDF file to write; each step is on the disk before the next begins.
-        overwrite : bool
-            Replace an output that exists.
-
-        Returns
-        -------
-        Session
-            Iterate over it for the loads of the case, or apply others with `Session.advance`.
+        Output as of `run`. Iterate over the session for the loads of the case, or apply others with
+        `Session.advance`.
         """
         from .solve.session import Session
 

@@ -51,10 +51,7 @@ class HexcontactError(Exception):
 class DeckError(HexcontactError, ValueError):
     """The input is wrong: a deck key, an argument, a file that cannot be read or written.
 
-    Attributes
-    ----------
-    faults : tuple of Fault
-        Faults of a deck; empty for other input.
+    ``faults`` are those of a deck; there are none for other input.
     """
 
     exit_code = 2
@@ -97,10 +94,7 @@ class RimWarning(UserWarning):
 class ConvergenceError(HexcontactError, RuntimeError):
     """A load step did not meet its tolerance; the steps before it are recorded.
 
-    Attributes
-    ----------
-    details : mapping
-        The step, its residuals and where they are largest, by name; SI.
+    ``details`` are the step, its residuals and where they are largest, by name; SI.
     """
 
     exit_code = 3

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from .arrays import Dataset
 from .errors import HexcontactError
 
 if TYPE_CHECKING:
     import netCDF4
-    import xarray
 
 
 class _Lock:
@@ -150,7 +150,7 @@ def close(file: netCDF4.Dataset) -> None:
             raise
 
 
-def write(dataset: xarray.Dataset, path: Path, mode: Literal["w", "a"] = "w", **options: Any) -> None:
+def write(dataset: Dataset, path: Path, mode: Literal["w", "a"] = "w", **options: Any) -> None:
     """Write a dataset of xarray to a file, or to a group of it."""
     from xarray.backends import NetCDF4DataStore
 
@@ -163,7 +163,7 @@ def write(dataset: xarray.Dataset, path: Path, mode: Literal["w", "a"] = "w", **
             store.close()
 
 
-def opened_by_xarray(path: Path, **options: Any) -> xarray.Dataset:
+def opened_by_xarray(path: Path, **options: Any) -> Dataset:
     """Open a file with xarray, whose fields are then read under the lock.
 
     ValueError if a variable has a dimension twice, of which xarray only warns.

@@ -208,13 +208,8 @@ class TextTable(NamedTuple):
             pad_edge=False, collapse_padding=self.tight,
         )  # fmt: skip
         for header in self.headers:
-            text = _wraps(header)
+            text = header in ("", "label")  # a column of names or labels
             shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
         for row in self.rows:
             shown.add_row(*(Text(visible(cell)) for cell in row))
         return shown
-
-
-def _wraps(header: str) -> bool:
-    """Return whether a column is one of names or labels."""
-    return header in ("", "label")

@@ -41,6 +41,7 @@ class Variable(NamedTuple):
     # largest value: a number, the quantity of the history that it is part of, or ``"window"``, the area of
     # all nodes
     most: float | str = LARGEST
+    before: float = 0.0  # value before the first load step; NaN: unknown
     summary: int = 0  # place in the summary of a load step, after loads and motions; 0: none
     required: str = ""  # whether files must have it: ``"always"``, ``"friction"``; empty: never
     # whether it is a field, or a measure of one, that a contact without friction does not have
@@ -192,7 +193,8 @@ VARIABLES: dict[str, Variable] = {
         title="Mean pressure", summary=7, **_FROM_0,
     ),
     "mean_gap": _work(
-        "m", "mean of the gap over the window, which repeats", title="Mean gap", summary=8, **_FROM_0
+        "m", "mean of the gap over the window, which repeats",
+        title="Mean gap", summary=8, before=NAN, **_FROM_0,
     ),
     "bulk_body": _work(
         "1", "body that carries the bulk stress", dtype="i4", flags={1: "body_1", 2: "body_2"}

@@ -25,7 +25,7 @@ from hexcontact.problem import preview
 from hexcontact.problem.preview import SHIFTS
 from hexcontact.problem.problem import RATIO
 from hexcontact.result.journal import TrialFolder
-from hexcontact.solve import accuracy
+from hexcontact.solve import lattices as accuracy
 from hexcontact.variables import ESTIMATED, VARIABLES
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

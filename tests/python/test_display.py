@@ -105,7 +105,7 @@ def test_a_result_in_a_notebook_has_maps_of_its_last_step(result: Result) -> Non
     assert ["normal load", "100.0 N"] in page.rows
     assert "Sphere <b>on</b> flat" in page.text
     pressure, zones = page.pictures
-    view = StepView.of(result, -1)
+    view = StepView(result, -1)
     plane = Plane(view.window(1.15), max(pressure.size))
     assert plane.shape == pressure.size[::-1]
     values = view.at(*plane.points)

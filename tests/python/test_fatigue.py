@@ -316,12 +316,12 @@ def test_parameters_are_those_of_the_stresses_block_by_block(
         assert found.attrs["tractions"] == stress.attrs["tractions"] == "edges"
     monkeypatch.setattr("hexcontact.interior.fatigue._BLOCK", 1)
     monkeypatch.setattr("hexcontact.interior.fatigue._AT_ONCE", 3)
-    monkeypatch.setattr("hexcontact.interior.stress.tractions", _light)
+    monkeypatch.setattr("hexcontact.interior.stress.Loaded.tractions", _light)
     assert result.fatigue(*names, **CYCLE).equals(surface)
     assert result.fatigue("findley", findley_slope=0.3, **CYCLE, **plane).equals(section)
 
 
-TRACTIONS = stress_below.tractions
+TRACTIONS = stress_below.Loaded.tractions
 
 
 class _Light(np.ndarray):

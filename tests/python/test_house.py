@@ -110,7 +110,9 @@ def test_every_quick_test_is_there() -> None:
 def test_links_between_pages_lead_somewhere() -> None:
     dead = []
     for page in PAGES:
-        for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        text = page.read_text()
+        text += "".join((page.parent / file).read_text() for file in re.findall(r"^:file: (\S+)", text, re.M))
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
             if re.match(r"https?:|mailto:", target):
                 continue
             path, _, anchor = target.partition("#")

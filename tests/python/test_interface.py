@@ -75,10 +75,10 @@ def test_what_is_known_without_it_does_not_hold() -> None:
     result = hc.Case.from_dict(deck(10.0, 2.0)).run()
     assert result.dataset.attrs["interface_coefficient"] == 10.0
     assert result.dataset.attrs["interface_exponent"] == 2.0
-    assert StepView.of(result, -1).hertz is None
+    assert StepView(result, -1).hertz is None
     rigid = hc.Case.from_dict({k: v for k, v in deck(10.0, 2.0).items() if k != "interface"}).run()
     assert "interface_coefficient" not in rigid.dataset.attrs
-    assert StepView.of(rigid, -1).hertz is not None
+    assert StepView(rigid, -1).hertz is not None
     # the window is that of the larger contact
     assert result.dataset.sizes["row"] > rigid.dataset.sizes["row"]
 

@@ -38,7 +38,7 @@ def as_before() -> Iterator[None]:
 
 
 def test_examples_are_right() -> None:
-    assert doctest.testmod(kernel_cache) == (0, 4)
+    assert doctest.testmod(kernel_cache) == (0, 3)
 
 
 def window(n_row: int = 47, n_col: int = 52, spacing: float = SPACING) -> Lattice:

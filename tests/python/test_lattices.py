@@ -12,7 +12,7 @@ from hexcontact.core.contact import ElasticPair, FlexibilityOperator
 from hexcontact.core.friction import FrictionLaw
 from hexcontact.core.lattice import Lattice, crossings
 from hexcontact.interior import fields
-from hexcontact.interior.stress import _edges, nodal_tractions, tractions
+from hexcontact.interior.stress import Loaded, _edges, nodal_tractions
 from hexcontact.problem.preview import case_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -65,7 +65,7 @@ def test_stress_beside_the_edge(cells: str) -> None:
     step, p0, h = steps[-1], HERTZ.max_pressure, RADIUS / 20
     fine = Lattice.covering(h / 8, (0.0, 0.0), 2.1 * RADIUS, 2.1 * RADIUS)
     hertzian = p0 * np.sqrt(np.maximum(1.0 - (fine.x**2 + fine.y**2) / RADIUS**2, 0.0))
-    hats = tractions(step.lattice, [step.fields], step.bodies, 0.0, "edges")[0][0, 0]
+    hats = Loaded(step.lattice, [step.fields], step.bodies, 1).tractions("edges")[0][0, 0]
     [nodal] = nodal_tractions([step.fields])
     edges = _edges(step.lattice, nodal, step.fields)
     none, law = np.zeros(hats.shape, dtype=bool), FrictionLaw(MU)

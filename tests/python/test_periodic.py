@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, DeckError, Lattice, open_result
+from hexcontact import Case, DeckError, Lattice, open_result, plotting
+from hexcontact.plotting.report_data import charts_of
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 E_STAR = 210e9 / (2 * (1 - 0.3**2))
@@ -87,6 +88,13 @@ def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
     assert read.traction_field().source == "nodes"
     with pytest.raises(DeckError, match="stress below a window that repeats is not available yet"):
         read.stress()
+    with pytest.raises(DeckError, match="stress below a window that repeats is not available yet"):
+        plotting.stress(read)
+    charts = {chart["title"]: chart for chart in charts_of(read.history.reset_index().to_dict("records"))}
+    [gaps] = charts["Mean gap"]["curves"].values()
+    assert gaps[0] is None  # before the first load step the mean gap is that of the waves, and no load
+    assert charts["Mean gap"]["unit"] == "nm"
+    assert gaps[1] * 1e-9 == pytest.approx(float(read.mean_gap[0]), rel=1e-4)
     assert Case.from_text(read.deck).lattice == case.lattice
 
 

@@ -118,7 +118,7 @@ def test_worded() -> None:
 
 def test_pressure_between_nodes_is_linear_on_the_triangles() -> None:
     plane = made(lambda x, y: x * x, [lambda x, y: 7.0 + 2.0 * x - 3.0 * y], [1.0])
-    view = StepView.of(plane, -1)
+    view = StepView(plane, -1)
     rng = np.random.default_rng(5)
     # points of the window, away from its rim
     col, row = rng.uniform(-15, 15, (2, 400))
@@ -126,7 +126,7 @@ def test_pressure_between_nodes_is_linear_on_the_triangles() -> None:
     np.testing.assert_allclose(view.at(x, y), 7.0 + 2.0 * x - 3.0 * y, rtol=1e-9)
     assert view.at(np.array([50.0]), np.array([0.0])) == 0.0
     hat = made(lambda x, y: x * x, [lambda x, y: 1.0 * (np.hypot(x, y) < 1e-9)], [1.0])
-    view = StepView.of(hat, -1)
+    view = StepView(hat, -1)
     half = 0.05
     # 1 at the node, 1/2 in the middle of each of its six edges, 1/3 in the middle of each triangle
     turn = np.pi / 3 * np.arange(6)
@@ -139,7 +139,7 @@ def test_pressure_between_nodes_is_linear_on_the_triangles() -> None:
 
 @pytest.mark.parametrize("center", [(0.0, 0.0), (0.13, -0.21)])
 def test_hertz_is_recognized_from_the_gap_of_a_sphere(center: tuple[float, float]) -> None:
-    view = StepView.of(sphere(center), 2)
+    view = StepView(sphere(center), 2)
     expected = analytic.hertz_sphere(2.0, 1.5, normal_load=0.8)
     assert view.hertz is not None
     assert view.hertz.semi_major == pytest.approx(expected.contact_radius, rel=1e-6)
@@ -149,7 +149,7 @@ def test_hertz_is_recognized_from_the_gap_of_a_sphere(center: tuple[float, float
 
 
 def test_hertz_is_recognized_from_the_gap_of_cylinders() -> None:
-    view = StepView.of(cylinders(), -1)
+    view = StepView(cylinders(), -1)
     expected = analytic.crossed_cylinders(2.0, 1.0, 2.5, np.radians(50), normal_load=0.9)
     assert view.hertz is not None
     assert view.hertz.semi_major == pytest.approx(expected.semi_major, rel=1e-7)
@@ -158,15 +158,15 @@ def test_hertz_is_recognized_from_the_gap_of_cylinders() -> None:
 
 
 def test_no_hertz_where_there_is_none() -> None:
-    assert StepView.of(cone(), -1).hertz is None
+    assert StepView(cone(), -1).hertz is None
     without = sphere()
     del without.attrs["effective_modulus"]
-    assert StepView.of(without, -1).hertz is None
+    assert StepView(without, -1).hertz is None
     punch = sphere()
     punch["initial_gap"] = punch["initial_gap"].where(punch["initial_gap"] < 0.5)
-    assert StepView.of(punch, -1).hertz is None
+    assert StepView(punch, -1).hertz is None
     line = made(lambda x, y: y**2, [lambda x, y: np.maximum(0.3 - abs(y), 0)], [1.0])
-    assert StepView.of(line, -1).hertz is None
+    assert StepView(line, -1).hertz is None
 
 
 # ----------------------------------------------------------------------------------- figures
@@ -178,7 +178,7 @@ RESULTS = {
     "cone": cone,
     "fine": lambda: sphere(half=90, spacing=0.012),
 }
-FRICTIONLESS = [name for name, entry in entries().items() if entry.of_a_result and not entry.needs]
+FRICTIONLESS = [name for name, entry in entries().items() if entry.shows == "result" and not entry.needs]
 results = pytest.mark.parametrize("make", RESULTS)
 
 
@@ -218,8 +218,8 @@ def test_lines_and_areas_are_in_every_kind_of_file(name: str, kind: str) -> None
 )
 def test_hertz_holds_where_shear_does_not_move_the_pressure(beta: float, coupling: str, holds: bool) -> None:
     rough = {"algorithm": "incremental", "friction_coefficient": 0.3, "coupling": coupling}
-    assert StepView.of(sphere(dundurs_beta=beta, **rough), -1).hertz_holds is holds
-    assert StepView.of(sphere(dundurs_beta=beta, coupling=coupling), -1).hertz_holds
+    assert StepView(sphere(dundurs_beta=beta, **rough), -1).hertz_holds is holds
+    assert StepView(sphere(dundurs_beta=beta, coupling=coupling), -1).hertz_holds
 
 
 def is_section(upper: Any, lower: Any, view: StepView, hertz: EllipticContact | None) -> None:
@@ -261,7 +261,7 @@ HERTZ = {
 @results
 def test_pressure_is_drawn_over_the_plane(make: str) -> None:
     result = RESULTS[make]()
-    view = StepView.of(result, -1)
+    view = StepView(result, -1)
     figure = plotting.pressure_field(result)
     [axes] = drawn.visible(figure)
     drawn.is_field(axes, view, view.pressure, "pressure $p$")
@@ -280,19 +280,19 @@ def test_pressure_is_drawn_over_the_plane(make: str) -> None:
 def test_section_shows_nodes_hertz_and_their_difference(make: str) -> None:
     result = RESULTS[make]()
     axes = drawn.visible(plotting.section(result))
-    is_section(axes[0], axes[-1], StepView.of(result, -1), HERTZ[make]())
+    is_section(axes[0], axes[-1], StepView(result, -1), HERTZ[make]())
 
 
 def test_difference_from_hertz_is_in_percent_of_his_pressure() -> None:
     result = sphere()
     result["pressure"] *= 1.03
-    is_section(*plotting.section(result).axes, StepView.of(result, -1), HERTZ["sphere"]())
+    is_section(*plotting.section(result).axes, StepView(result, -1), HERTZ["sphere"]())
 
 
 @results
 def test_overview_is_the_map_beside_the_section(make: str) -> None:
     result = RESULTS[make]()
-    view = StepView.of(result, -1)
+    view = StepView(result, -1)
     first, *others = drawn.visible(plotting.overview(result))
     drawn.is_field(first, view, view.pressure, "pressure $p$")
     sections = [axes for axes in others if axes not in first.child_axes]
@@ -302,7 +302,7 @@ def test_overview_is_the_map_beside_the_section(make: str) -> None:
 @results
 def test_boundary_shows_the_nodes_in_contact(make: str) -> None:
     result = RESULTS[make]()
-    view = StepView.of(result, -1)
+    view = StepView(result, -1)
     axes = plotting.contact_boundary(result).axes[0]
     rim = measures.boundary(view.contact)
     lines = drawn.by_label(axes)
@@ -333,7 +333,7 @@ def test_history_shows_each_quantity_over_the_steps() -> None:
 
 
 def test_field_is_drawn_to_the_edge_of_the_contact() -> None:
-    view = StepView.of(sphere(), -1)
+    view = StepView(sphere(), -1)
     mesh = plotting_maps.mesh_of(view, view.pressure, vanishes=True)
     radius = np.hypot(mesh.x, mesh.y)
     inside = mesh.values > 0.0
@@ -346,7 +346,7 @@ def test_field_is_drawn_to_the_edge_of_the_contact() -> None:
 
 
 def test_a_field_that_does_not_vanish_goes_on_to_the_edge() -> None:
-    view = StepView.of(sphere(), -1)
+    view = StepView(sphere(), -1)
     mesh = plotting_maps.mesh_of(view, 3.0 + 2.0 * view.x - view.y, vanishes=False)
     off = np.abs(mesh.values - (3.0 + 2.0 * mesh.x - mesh.y))
     assert (
@@ -355,7 +355,7 @@ def test_a_field_that_does_not_vanish_goes_on_to_the_edge() -> None:
 
 
 def test_a_huge_field_is_thinned_out() -> None:
-    view = StepView.of(sphere(half=330, spacing=0.0035), -1)
+    view = StepView(sphere(half=330, spacing=0.0035), -1)
     mesh = plotting_maps.mesh_of(view, view.pressure, vanishes=True)
     assert (
         view.contact.sum() > plotting_maps.DRAWN_NODES > mesh.x.size / 1.1 > 0.4 * plotting_maps.DRAWN_NODES
@@ -368,7 +368,7 @@ def test_a_huge_field_is_thinned_out() -> None:
 def test_section_of_a_step_before_the_last(center: tuple[float, float]) -> None:
     result = sphere(center, loads=(0.2, 0.8, 1.1))
     hertz = analytic.hertz_ellipse(2.0, np.eye(2) / 1.5, normal_load=0.8)
-    is_section(*plotting.section(result, 2).axes, StepView.of(result, 2), hertz)
+    is_section(*plotting.section(result, 2).axes, StepView(result, 2), hertz)
 
 
 @pytest.mark.parametrize(("degrees", "through"), [(0.0, None), (17.0, None), (90.0, (0.13, -0.2))])
@@ -405,7 +405,7 @@ def test_section_at_an_angle_follows_the_ellipse() -> None:
     upper, lower = plotting.section(result, angle=solution.angle).axes
     s, p = drawn.si(upper, drawn.by_label(upper)["computed"], lower.get_xlabel())
     x, y = s * np.cos(solution.angle), s * np.sin(solution.angle)
-    assert_allclose(p, StepView.of(result, -1).at(x, y), rtol=0, atol=1e-9 * p.max())
+    assert_allclose(p, StepView(result, -1).at(x, y), rtol=0, atol=1e-9 * p.max())
     assert np.ptp(s[p > 0.0]) == pytest.approx(2 * solution.semi_major, abs=2 * 0.05)
 
 

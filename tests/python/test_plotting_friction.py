@@ -361,7 +361,7 @@ def test_tractions_of_a_step() -> None:
         values = values / units(lower.get_ylabel()) * units(axes.get_ylabel())
         met = {k: v for place, v in zip(x, values, strict=True) if (k := nodes.get(round(float(place), 9)))}
         if label == r"$\mu p$":  # drawn between the nodes, too
-            line = StepView.of(result, 3).at(x, 0.0 * x, factor * result.sel(step=3)[name].values)
+            line = StepView(result, 3).at(x, 0.0 * x, factor * result.sel(step=3)[name].values)
             np.testing.assert_allclose(values, line, atol=1e-9)
             continue
         assert len(met) > 15
@@ -550,7 +550,7 @@ def test_zone_maps_fill_contact_and_stick_area() -> None:
     factor = units(panels[0].get_ylabel())
     for axes, step in zip(panels, (2, 3, 4), strict=True):
         contact, stick = axes.patches
-        drawn.are_zones(axes, StepView.of(result, step))
+        drawn.are_zones(axes, StepView(result, step))
         assert patch_area(contact, factor) == pytest.approx(float(result["contact_area"][step - 1]), rel=0.05)
         [hertz] = axes.lines
         assert np.ptp(hertz.get_xdata()) * factor == pytest.approx(2 * HERTZ.contact_radius, rel=1e-4)
@@ -570,7 +570,7 @@ def test_places_without_a_map_stay_empty() -> None:
 def test_zone_maps_of_steps_differ_as_their_zones_do() -> None:
     panels = drawn.visible(plotting.zones(cattaneo(), [2, 4]))
     for axes, step in zip(panels, (2, 4), strict=True):
-        drawn.are_zones(axes, StepView.of(cattaneo(), step))
+        drawn.are_zones(axes, StepView(cattaneo(), step))
     shrunk = [patch_area(axes.patches[1], units(panels[0].get_ylabel())) for axes in panels]
     assert shrunk[1] < 0.5 * shrunk[0]
 
@@ -599,7 +599,7 @@ def test_zone_map_shows_the_closed_stick_area() -> None:
 @pytest.mark.usefixtures("laid_out_once")
 def test_zones_of_several_results() -> None:
     panels = drawn.visible(plotting.zones([cattaneo(), dissimilar()], [2, 4]))
-    views = [StepView.of(result, step) for result in (cattaneo(), dissimilar()) for step in (2, 4)]
+    views = [StepView(result, step) for result in (cattaneo(), dissimilar()) for step in (2, 4)]
     for axes, view in zip(panels, views, strict=True):
         drawn.are_zones(axes, view, units(panels[0].get_ylabel()))
     with pytest.raises(ValueError, match="a contact without friction has no stick and slip zones"):
@@ -615,7 +615,7 @@ def test_outlines_of_stick_areas() -> None:
     assert len(sticks) == 2
     for line, step in zip(sticks, (2, 3), strict=True):
         enclosed = area([np.stack(line.get_data(), axis=1) * factor])
-        view = StepView.of(result, step)
+        view = StepView(result, step)
         assert enclosed == pytest.approx(view.edges().stick(view.stick, view.reserve).area)
     contacts = [line for line in axes.lines if str(line.get_label()).startswith("_")]
     assert len(contacts) == 2
@@ -660,7 +660,7 @@ def test_map_of_the_shear_traction() -> None:
     one = result.sel(step=3)
     size = np.hypot(one["traction_x"].values, one["traction_y"].values)
     inside = one["pressure"].values > 0
-    drawn.is_field(axes, StepView.of(result, 3), size, "shear traction $|q|$")
+    drawn.is_field(axes, StepView(result, 3), size, "shear traction $|q|$")
     assert mesh.get_clim() == pytest.approx((0.0, size.max() / factor))
     [arrows] = [child for child in axes.get_children() if isinstance(child, Quiver)]
     assert 50 < arrows.N <= inside.sum()
@@ -681,7 +681,7 @@ def test_map_of_the_shear_traction() -> None:
 def test_map_of_each_field(name: str, label: str) -> None:
     result = cattaneo() if name == "accumulated_slip" else dissimilar()
     [axes] = drawn.visible(plotting.FIGURES[name](result, 3))
-    drawn.is_field(axes, StepView.of(result, 3), result[name].values[2], label)
+    drawn.is_field(axes, StepView(result, 3), result[name].values[2], label)
 
 
 def test_signed_maps_are_white_at_zero() -> None:
@@ -701,7 +701,7 @@ def test_maps_of_several_steps_share_a_scale() -> None:
     panels, [bar] = figure.axes[:3], [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
     factor, to_length = units(bar.get_ylabel()), units(panels[0].get_ylabel())
     for axes, step in zip(panels, (2, 3, 4), strict=True):
-        mesh, view = axes.collections[0], StepView.of(dissimilar(), step)
+        mesh, view = axes.collections[0], StepView(dissimilar(), step)
         at = mesh._triangulation.x * to_length, mesh._triangulation.y * to_length
         values = np.asarray(mesh.get_array()) * factor
         expected = view.at(*at, view.data["traction_x"].values)
@@ -717,7 +717,7 @@ def test_map_of_the_slip() -> None:
     assert np.asarray(figure.axes[0].collections[0].get_array()).max() * factor == pytest.approx(1e-3)
     one = result.sel(step=4)
     size = np.hypot(one["slip_increment_x"].values, one["slip_increment_y"].values)
-    drawn.is_field(figure.axes[0], StepView.of(result, 4), size, "slip in the step")
+    drawn.is_field(figure.axes[0], StepView(result, 4), size, "slip in the step")
 
 
 # ----------------------------------------------------------------------------------- history and loops
@@ -774,6 +774,16 @@ def test_history_shows_areas_over_steps_or_load(over: str) -> None:
         np.testing.assert_allclose(found, [0.0, *result[name].values], rtol=1e-12)
     with pytest.raises(ValueError, match="no history of tangential_load in this result; there are"):
         plotting.history(result, over="tangential_load")
+
+
+@pytest.mark.usefixtures("laid_out_once")
+def test_areas_to_the_edge_are_named_like_those_of_the_nodes() -> None:
+    result = cattaneo()
+    fits = {f"{name}_fit": result[name] for name in ("contact_area", "stick_area")}
+    shown = drawn.visible(plotting.history(result.assign(fits)))
+    [axes] = [axes for axes in shown if set(by_label(axes)) == set(fits)]
+    assert axes.get_ylabel().startswith("area (")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["contact", "stick"]
 
 
 def test_loop_of_load_and_shift() -> None:
@@ -869,7 +879,7 @@ def test_initial_compliance() -> None:
 @pytest.mark.usefixtures("laid_out_once")
 def test_overview_shows_maps_zones_section_and_history() -> None:
     result = cattaneo()
-    view = StepView.of(result, 3)
+    view = StepView(result, 3)
     figure = plotting.overview(result, 3)
     drawn.assert_painted(figure)
     pressure, shear, zones, section, areas, largest = drawn.visible(figure)
@@ -913,7 +923,7 @@ def worn() -> xarray.Dataset:
 SUITABLE = {
     name: {"torque": torsion, "wear": worn}.get("wear" if name == "worn_depth" else entry.needs, dissimilar)
     for name, entry in entries().items()
-    if entry.of_a_result
+    if entry.shows == "result"
 }
 
 
@@ -984,7 +994,7 @@ NEEDS_FRICTION = {
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, entry in entries().items() if entry.needs and entry.of_a_result]
+    "name", [name for name, entry in entries().items() if entry.needs and entry.shows == "result"]
 )
 def test_what_needs_friction_says_so(name: str) -> None:
     without = frictionless()
@@ -1011,5 +1021,5 @@ def test_what_was_not_kept_is_said() -> None:
 
 
 def test_title_names_the_loads() -> None:
-    assert StepView.of(cattaneo(), 3).title == "Made up, step 3 ($P$ = 800 mN, $Q_x$ = 120 mN)"
-    assert "$M_z$ = " in StepView.of(torsion(), 3).title
+    assert StepView(cattaneo(), 3).title == "Made up, step 3 ($P$ = 800 mN, $Q_x$ = 120 mN)"
+    assert "$M_z$ = " in StepView(torsion(), 3).title

@@ -226,7 +226,7 @@ def test_maps_are_the_fields(folder: Path) -> None:
     for shown, names in zip(fields["maps"], MAPPED, strict=True):
         assert len(shown["images"]) == len(shown["max"]) == 6
         for k, number in enumerate(fields["steps"]):
-            view = StepView.of(result, number)
+            view = StepView(result, number)
             parts = [view.data[name].values for name in names]
             largest = np.sqrt(sum(part**2 for part in parts))[view.contact].max()
             if "slip" in shown["name"] and largest < 1e-7 * float(result.approach.max()):
@@ -260,7 +260,7 @@ def test_zone_map_ends_at_the_edges(folder: Path) -> None:
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
     assert len(fields["zones"]) == 6
     for number, zones in enumerate(fields["zones"], start=1):
-        gray, view = picture(zones), StepView.of(result, number)
+        gray, view = picture(zones), StepView(result, number)
         plane = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape))
         x0, x1, y0, y1 = plane.limits
         area = (x1 - x0) * (y1 - y0) / gray.size
@@ -276,7 +276,7 @@ def test_zone_map_ends_at_the_edges(folder: Path) -> None:
 
 def test_arrows_point_along_the_traction_where_there_is_slip(folder: Path) -> None:
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
-    view = StepView.of(open_result(folder / "sheared.nc"), -1)
+    view = StepView(open_result(folder / "sheared.nc"), -1)
     x_min, x_max, y_min, y_max = (1e-6 * v for v in fields["limits"])
     for name, many, sign in (
         ("traction", 50, 1),
@@ -326,7 +326,7 @@ def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
     ):
         assert len(panel["curves"][name]) == len(fields["steps"]) == 6
         for number, curve in zip(fields["steps"], panel["curves"][name], strict=True):
-            view = StepView.of(result, number)
+            view = StepView(result, number)
             expected = factor * view.at(x, np.full(x.size, middle), field)
             found = FACTOR[panel["unit"]] * np.array(curve)
             # places have five digits, which count where tractions are as steep as roots
@@ -339,7 +339,7 @@ def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
     found = [FACTOR[panel["unit"]] * np.array(*curves) for curves in panel["curves"].values()]
     assert np.count_nonzero(found[1]) > 100
     np.testing.assert_allclose(found[1], hertz.pressure(x), rtol=0, atol=4e-4 * hertz.max_pressure)
-    view = StepView.of(open_result(folder / "pressed.nc"), -1)
+    view = StepView(open_result(folder / "pressed.nc"), -1)
     np.testing.assert_allclose(found[0], view.at(x, 0.0 * x), rtol=0, atol=6e-4 * hertz.max_pressure)
     assert pressed["charts"] == [] and pressed["fields"]["zones"] == []
 

@@ -29,7 +29,7 @@ from hexcontact import (
 from hexcontact.core.friction import FrictionLaw
 from hexcontact.core.lattice import Lattice
 from hexcontact.interior import fields
-from hexcontact.interior.stress import _edges, nodal_tractions, tractions
+from hexcontact.interior.stress import Loaded, _edges, nodal_tractions
 from hexcontact.surfaces import Sphere
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -173,7 +173,7 @@ def test_the_peak_at_the_trailing_edge_follows_from_the_root() -> None:
     steps: list = []
     case.run(on_step=steps.append)
     step, p0, h = steps[-1], exact.max_pressure, RADIUS / nodes
-    hats = tractions(step.lattice, [step.fields], step.bodies, 0.0, "edges")[0][0, 0]
+    hats = Loaded(step.lattice, [step.fields], step.bodies, 1).tractions("edges")[0][0, 0]
     peak = (1.0 - 2.0 * nu) / 3.0 + np.pi * mu * (4.0 + nu) / 8.0
     edge = np.array([[-RADIUS, 0.0, 0.0]])
     for turn in np.linspace(0.0, np.pi / 3, 5):  # other places between the nodes
@@ -379,7 +379,7 @@ def test_corrected_tractions_have_the_loads_of_the_nodal_ones() -> None:
     steps: list = []
     Case(body_1={**body, "surface": Sphere(radius=0.02)}, body_2=body, **given).run(on_step=steps.append)
     nodal, corrected = (
-        tractions(steps[-1].lattice, [steps[-1].fields], steps[-1].bodies, 0.5, s)[0][0]
+        Loaded(steps[-1].lattice, [steps[-1].fields], steps[-1].bodies, 1, 0.5).tractions(s)[0][0]
         for s in ("nodes", "edges")
     )
     for k in range(3):

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from hexcontact import DeckError
 from hexcontact.cli.app import app
-from hexcontact.plotting.study import study as draw
+from hexcontact.plotting.history import study as draw
 from hexcontact.study.dataset import read_study, study_of
 from hexcontact.study.study import Study
 

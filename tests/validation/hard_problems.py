@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from hexcontact.case import Case
 from hexcontact.deck.surfaces import Cylinder, Sphere
 from hexcontact.result.result import Result
-from hexcontact.solve.accuracy import driven
 from hexcontact.solve.events import Listener
-from hexcontact.solve.lattices import InMemory, refine
+from hexcontact.solve.lattices import InMemory, driven, refine
 
 from .reference import Comparison
 

@@ -14,7 +14,7 @@ from hexcontact import Case, analytic, influence
 from hexcontact.arrays import Array
 from hexcontact.core.friction import FrictionLaw
 from hexcontact.interior import fields
-from hexcontact.interior.stress import SOURCES, _edges, nodal_tractions, tractions
+from hexcontact.interior.stress import SOURCES, Loaded, _edges, nodal_tractions
 from hexcontact.surfaces import Sphere
 
 from .reference import Comparison
@@ -47,7 +47,8 @@ def errors(sources: tuple[str, ...] = SOURCES) -> Iterator[tuple[str, Array, flo
     found = {}
     for source in sources:
         pressure = (
-            tractions(step.lattice, [step.fields], step.bodies, 0.0, source)[0][0, 0] / exact.max_pressure
+            Loaded(step.lattice, [step.fields], step.bodies, 1).tractions(source)[0][0, 0]
+            / exact.max_pressure
         )
         loads = np.array([[pressure, 0 * pressure, 0 * pressure], [0 * pressure, pressure, 0 * pressure]])
         points = values[:, :3] * _RADIUS

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, DataFrame, Dataset
 from ..core import flat
 from ..core.measures import line_of
 from ..deck.read import recorded
@@ -28,28 +28,16 @@ from ..deck.surfaces import Punch, Surface
 from ..errors import DeckError
 from ..text import TextTable, html_table, quantity, text_table
 from ..variables import VARIABLES, spelled
-from . import friction
+from . import friction, hertz_gap
 from .friction import LubkinTorsion, MindlinContact, SuperposedContact
 from .frictionless import EllipticContact, cone, flat_punch, power_law, rounded_punch
-from .hertz_gap import (
-    SIMILAR,
-    QuadraticGap,
-    attribute_of,
-    friction_of,
-    is_compliant,
-    is_strained,
-    is_worn,
-    pressure_is_frictionless,
-)
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
     from rich.table import Table
 
 
 CIRCULAR = 0.999  # least ratio of the axes of a circular contact
-_SMALL = 1e-6  # share of the sliding load that is no load, and no change of a load
+_SMALL = 1e-6  # share of the sliding load, or of a motion, that is none, and no change of it
 _ASIDE = 1e-3  # largest distance from the line of the load, as a share of the sliding load, or shift
 _BEFORE_SLIDING = (
     0.999  # share of the sliding load beyond which the rigid motion does not follow from the load
@@ -174,29 +162,23 @@ class PartialSlip(Sheared):
 
 
 class ClosedForms:
-    """The closed solutions for a result.
+    """The closed solutions for a whole result."""
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        The whole result.
-    """
-
-    def __init__(self, dataset: xarray.Dataset) -> None:
+    def __init__(self, dataset: Dataset) -> None:
         self.dataset = dataset
-        self.friction = friction_of(dataset.attrs)
-        self.modulus = attribute_of(dataset.attrs, "effective_modulus")
-        self.gamma = attribute_of(dataset.attrs, "tangential_compliance_ratio")
-        self.beta = attribute_of(dataset.attrs, "dundurs_beta")
+        self.friction = hertz_gap.friction_of(dataset.attrs)
+        self.modulus = hertz_gap.attribute_of(dataset.attrs, "effective_modulus")
+        self.gamma = hertz_gap.attribute_of(dataset.attrs, "tangential_compliance_ratio")
+        self.beta = hertz_gap.attribute_of(dataset.attrs, "dundurs_beta")
         self.static = dataset.attrs.get("algorithm") == "static"
         self.deck = recorded(str(dataset.attrs.get("deck", "")))
-        similar = abs(self.beta) <= SIMILAR
-        self.apply = similar and 0.0 < self.friction < math.inf and not is_strained(dataset)
+        similar = abs(self.beta) <= hertz_gap.SIMILAR
+        self.apply = similar and 0.0 < self.friction < math.inf and not hertz_gap.is_strained(dataset)
 
     @cached_property
-    def gap(self) -> QuadraticGap | None:
+    def gap(self) -> hertz_gap.QuadraticGap | None:
         """The gap, if it is a quadratic form."""
-        return QuadraticGap.of(self.dataset)
+        return hertz_gap.QuadraticGap.of(self.dataset)
 
     @property
     def surface(self) -> Surface | None:
@@ -234,7 +216,7 @@ class ClosedForms:
             twisted = np.abs(twist).max() * hertz.radius > _ASIDE * alike.sliding_shift
             return None if twisted else PartialSlip(alike, *line, hertz)
         contact = SuperposedContact(*law, self.gamma, pressed.contact)
-        slides = abs(line[2][-1]) > (1.0 - _STEADY) * contact.sliding_load
+        slides = abs(line[2][-1]) > (1.0 - _SMALL) * contact.sliding_load
         return None if slides or twist.any() else Sheared(contact, *line)
 
     def partial_slip(self, number: int) -> PartialSlip | None:
@@ -279,12 +261,12 @@ class ClosedForms:
 class History:
     """The history of a load step: all steps up to it, or itself alone if it is static."""
 
-    def __init__(self, dataset: xarray.Dataset, number: int, static: bool) -> None:
+    def __init__(self, dataset: Dataset, number: int, static: bool) -> None:
         last = int(np.flatnonzero(dataset["step"].values == number)[0])
         self.steps = slice(last if static else 0, last + 1)
         self.dataset = dataset
         self.normal_load = float(dataset["normal_load"].values[last])
-        self.is_worn = is_worn(dataset.isel(step=self.steps))
+        self.is_worn = hertz_gap.is_worn(dataset.isel(step=self.steps))
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.dataset:
@@ -336,9 +318,6 @@ def _curve(loads: Sequence[float], first: Callable[[float], Array]) -> tuple[Arr
     return np.array(motion), fine
 
 
-_STEADY = 1e-6  # share of the sliding load, or of a motion, that is none
-
-
 @dataclass(frozen=True)
 class Exact:
     """Values and fields of a closed solution for a load step."""
@@ -350,24 +329,24 @@ class Exact:
     scales: Mapping[str, float] = field(default_factory=dict)  # scales of the errors of the fields
 
 
-def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
+def closed_solutions(dataset: Dataset, number: int) -> tuple[list[Exact], str]:
     """Return the closed solutions that hold for a load step, and a remark on them."""
     place = int(np.flatnonzero(dataset["step"].values == number)[0])
     so_far = dataset.isel(step=slice(0, place + 1))
     load = float(so_far["normal_load"][-1])
     if not load > 0.0:
         return [], "nothing is pressed in this load step"
-    if is_compliant(so_far.attrs):
+    if hertz_gap.is_compliant(so_far.attrs):
         return [], "no closed-form solution is known for a compliant interface"
-    if is_worn(so_far):
+    if hertz_gap.is_worn(so_far):
         return [], "no closed-form solution is known for worn surfaces"
     closed = ClosedForms(so_far)
     known = [*_normal(closed, load), *_shear(closed, number), *_torsion(closed, number)]
-    known += [] if is_strained(so_far) else _dissimilar(closed, load)
+    known += [] if hertz_gap.is_strained(so_far) else _dissimilar(closed, load)
     if known:
         note = "the gap was given in Python; the solutions are those of its values at the nodes"
         return known, note if "surface" in closed.deck.given else ""
-    if pressure_is_frictionless(so_far.attrs):
+    if hertz_gap.pressure_is_frictionless(so_far.attrs):
         return [], "no closed-form solution is known for these surfaces"
     return [], (
         "no closed-form solution is known for dissimilar bodies with friction under these loads; there are "
@@ -381,7 +360,7 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
 def _normal(closed: ClosedForms, load: float) -> list[Exact]:
     """Return the contact without friction."""
     pressed = closed.pressed
-    if pressed is None or not pressure_is_frictionless(closed.dataset.attrs):
+    if pressed is None or not hertz_gap.pressure_is_frictionless(closed.dataset.attrs):
         return []
     contact = pressed.contact(load)
     values = {"max_pressure": contact.max_pressure, "approach": contact.approach + pressed.lowest}
@@ -406,7 +385,7 @@ def _shear(closed: ClosedForms, number: int) -> list[Exact]:
     if slip is None or pressed is None:
         return []
     contact, values = slip.contact, {}
-    if abs(slip.turns[-1]) < (1.0 - _STEADY) * contact.sliding_load:
+    if abs(slip.turns[-1]) < (1.0 - _SMALL) * contact.sliding_load:
         if not pressed.rim:
             values["stick_radius_fit"] = float(contact.stick_radius(slip.swing))
         if not isinstance(slip, PartialSlip) or is_circular(slip.ellipse):
@@ -427,7 +406,7 @@ def _torsion(closed: ClosedForms, number: int) -> list[Exact]:
     """Return Lubkin's twist, if it holds up to this step and the contact does not slide."""
     torque = float(closed.dataset["torque"][-1]) if "torque" in closed.dataset else 0.0
     loop = closed.torsion(number) if torque else None
-    if loop is None or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
+    if loop is None or abs(loop[1][-1] - torque) > _SMALL * abs(torque):
         return []
     return [Exact("Lubkin", {"twist": float(loop[0][-1])})]
 
@@ -439,7 +418,7 @@ def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
     """Return closed solutions for dissimilar bodies under a growing normal load alone."""
     beta, mu, attributes = closed.beta, closed.friction, closed.dataset.attrs
     goodman = attributes.get("coupling") == "goodman"
-    if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(closed.dataset, mu * load):
+    if mu == 0.0 or abs(beta) <= hertz_gap.SIMILAR or not _pressed_only(closed.dataset, mu * load):
         return []
     hertz = closed.gap.contact(load) if closed.gap is not None else None
     incremental = attributes.get("algorithm") == "incremental"
@@ -461,15 +440,15 @@ def _dissimilar(closed: ClosedForms, load: float) -> list[Exact]:
     return []
 
 
-def _pressed_only(dataset: xarray.Dataset, sliding: float) -> bool:
+def _pressed_only(dataset: Dataset, sliding: float) -> bool:
     """Test whether a growing normal load is the only load."""
     loads = dataset["normal_load"].values
-    if (np.diff(loads) < -_STEADY * loads[-1]).any():
+    if (np.diff(loads) < -_SMALL * loads[-1]).any():
         return False
     scale = sliding if math.isfinite(sliding) else float(loads[-1])
     for axis in "xy":
         name = f"tangential_load_{axis}"
-        if name in dataset and np.abs(dataset[name].values).max() > _STEADY * scale:
+        if name in dataset and np.abs(dataset[name].values).max() > _SMALL * scale:
             return False
     turned = np.abs(dataset["twist"].values).max() if "twist" in dataset else 0.0
     return bool(turned == 0.0)
@@ -480,19 +459,11 @@ _HEADERS = ("", "solution", "exact", "computed", "error")
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a comparison.
+    """A line of a comparison: names of quantity and closed solution, both values (SI), and the error.
 
-    Attributes
-    ----------
-    quantity : str
-        Name of the quantity.
-    solution : str
-        Name of the closed solution.
-    exact, computed : float
-        The two values, SI; NaN for a field.
-    error : float
-        Their relative difference. For a field, the root mean square of the difference over the nodes in
-        contact, relative to the largest value; for a vector relative to the largest of all components.
+    The error is the relative difference. For a field the values are NaN, and the error is the root mean
+    square of the difference over the nodes in contact, relative to the largest value; for a vector relative
+    to the largest of all components.
     """
 
     quantity: str
@@ -505,14 +476,8 @@ class Entry:
 class Comparison(Sequence[Entry]):
     """Comparison of a load step with closed solutions; printed, a table.
 
-    Parameters
-    ----------
-    entries : sequence of Entry
-        The lines.
-    step : int
-        Number of the load step.
-    note : str
-        A remark on them, or the reason why there are none.
+    ``entries`` are the lines, ``step`` is the number of the load step, and ``note`` a remark on them, or the
+    reason why there are none.
     """
 
     def __init__(self, entries: Sequence[Entry], step: int, note: str = "") -> None:
@@ -542,7 +507,7 @@ class Comparison(Sequence[Entry]):
         """Largest of the errors; NaN without closed solutions."""
         return max((abs(entry.error) for entry in self.entries), default=math.nan)
 
-    def to_dataframe(self) -> pandas.DataFrame:
+    def to_dataframe(self) -> DataFrame:
         """Return the table: quantity, solution, unit, exact, computed, error."""
         import pandas
 
@@ -586,7 +551,7 @@ class Comparison(Sequence[Entry]):
 
 
 def compare(
-    dataset: xarray.Dataset, data: xarray.Dataset, exact: Mapping[str, float] | object | None, name: str
+    dataset: Dataset, data: Dataset, exact: Mapping[str, float] | object | None, name: str
 ) -> Comparison:
     """Compare a load step of a dataset, `data`; see `hexcontact.Result.compare`."""
     number = int(data["step"])
@@ -603,7 +568,7 @@ def compare(
     return Comparison(entries, number, note)
 
 
-def _own(exact: Mapping[str, float] | object, name: str, dataset: xarray.Dataset) -> Exact:
+def _own(exact: Mapping[str, float] | object, name: str, dataset: Dataset) -> Exact:
     """Return a given solution."""
     if isinstance(exact, Mapping):
         for quantity_name in exact:

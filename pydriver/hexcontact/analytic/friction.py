@@ -24,18 +24,8 @@ class MindlinContact:
     """Spheres pressed by P, then sheared: Cattaneo-Mindlin, and Mindlin-Deresiewicz on unloading.
 
     Exact for beta = 0 and gamma = 0; for gamma > 0 the slip directions are not exactly parallel and the
-    compliance is off by about 0.1 %.
-
-    Parameters
-    ----------
-    friction_coefficient : float
-        mu > 0.
-    normal_load : float
-        P, N.
-    contact_radius : float
-        a, m.
-    compliance : float
-        S, 1/Pa.
+    compliance is off by about 0.1 %. Coefficient of friction mu > 0, normal load P (N), contact radius a (m),
+    compliance S (1/Pa).
     """
 
     friction_coefficient: float
@@ -101,18 +91,8 @@ class SuperposedContact:
     With p(P), delta(P) and a(P) of the contact without friction and P* = P - Q/mu, the shear traction is
     q = mu (p(P) - p(P*)), the stick zone is the contact under P*, and the shift is (1 + gamma/2) mu
     (delta(P) - delta(P*)). Exact for beta = 0 and gamma = 0 and any surfaces; for gamma > 0 as exact as
-    Mindlin's.
-
-    Parameters
-    ----------
-    friction_coefficient : float
-        mu > 0.
-    normal_load : float
-        P, N.
-    tangential_compliance_ratio : float
-        gamma.
-    pressed : callable
-        The contact without friction under a load (N) above 0.
+    Mindlin's. Coefficient of friction mu > 0, normal load P (N), ratio gamma, and a function that returns the
+    contact without friction under a load (N) above 0.
     """
 
     friction_coefficient: float
@@ -160,16 +140,7 @@ class SuperposedContact:
 class LubkinTorsion:
     """Spheres pressed by P, then twisted about their common normal (Lubkin).
 
-    Parameters
-    ----------
-    friction_coefficient : float
-        mu > 0.
-    normal_load : float
-        P, N.
-    contact_radius : float
-        a, m.
-    compliance : float
-        S_t, 1/Pa.
+    Coefficient of friction mu > 0, normal load P (N), contact radius a (m), compliance S_t (1/Pa).
     """
 
     friction_coefficient: float
@@ -198,21 +169,11 @@ class LubkinTorsion:
 
 
 def no_slip_constants(beta: float) -> tuple[float, float]:
-    """Return the constants of indentation without slip (Mossakovskii, Spence).
+    """Return the constants kappa, chi of indentation without slip (Mossakovskii, Spence), 1 for beta = 0.
 
-    kappa = artanh(beta)/beta and chi = 1/2 / integral_0^1 t cos[(artanh(beta)/pi) ln((1-t)/(1+t))] dt.
-    A flat punch has P = 2 kappa E* a delta; a sphere, pressed incrementally, delta = chi a^2/R and
-    P = 4/3 kappa chi E* a^3/R.
-
-    Parameters
-    ----------
-    beta : float
-        Dundurs' constant, ``|beta| <= 1/2``.
-
-    Returns
-    -------
-    tuple of float
-        (kappa, chi); both 1 for beta = 0.
+    kappa = artanh(beta)/beta and chi = 1/2 / integral_0^1 t cos[(artanh(beta)/pi) ln((1-t)/(1+t))] dt for
+    Dundurs' constant ``|beta| <= 1/2``. A flat punch has P = 2 kappa E* a delta; a sphere, pressed
+    incrementally, delta = chi a^2/R and P = 4/3 kappa chi E* a^3/R.
     """
     if abs(beta) > 0.5:
         raise DeckError(f"beta is {beta!r}; expected a number in [-1/2, 1/2]")
@@ -223,19 +184,8 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
 def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
     """Return the stick ratio c/a of monotone indentation in Goodman's approximation (Spence).
 
-    Solves ``(a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a)`` with ``K'(k) = K(sqrt(1-k^2))``.
-
-    Parameters
-    ----------
-    beta : float
-        Dundurs' constant, not 0.
-    friction_coefficient : float
-        mu > 0.
-
-    Returns
-    -------
-    float
-        c/a in (0, 1).
+    Solves ``(a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a)`` with ``K'(k) = K(sqrt(1-k^2))``, for Dundurs'
+    constant beta, not 0, and mu > 0.
     """
     return _stick_ratio(flat.goodman, beta, friction_coefficient)
 
@@ -247,16 +197,8 @@ def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
 class PlaneCattaneo:
     """Cylinders of alike materials pressed by P', then sheared across their axes by Q' (Cattaneo, Mindlin).
 
-    Plane strain; exact for any Poisson's ratio. The middle of a contact much longer than wide.
-
-    Parameters
-    ----------
-    friction_coefficient : float
-        mu > 0.
-    normal_load : float
-        P', N/m.
-    half_width : float
-        Half the width of the contact b, m.
+    Plane strain; exact for any Poisson's ratio. The middle of a contact much longer than wide. Coefficient of
+    friction mu > 0, normal load P' (N/m), half the width of the contact b (m).
     """
 
     friction_coefficient: float
@@ -278,22 +220,10 @@ class PlaneCattaneo:
 def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float:
     """Return the stick ratio c/b of cylinders pressed monotonically in Goodman's approximation.
 
-    Solves ``|beta| K(k) = mu K'(k)``, k = c/b (Spence). It follows from a flat punch,
-    ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded traction in the
-    stick strip needs
-    ``integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0``.
-
-    Parameters
-    ----------
-    beta : float
-        Dundurs' constant, not 0.
-    friction_coefficient : float
-        mu > 0.
-
-    Returns
-    -------
-    float
-        c/b in (0, 1).
+    Solves ``|beta| K(k) = mu K'(k)``, k = c/b (Spence); arguments as of `goodman_stick_ratio`. It follows
+    from a flat punch, ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded
+    traction in the stick strip needs ``integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t)
+    p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0``.
     """
     return _stick_ratio(flat.goodman_plane, beta, friction_coefficient)
 

@@ -8,8 +8,7 @@ The axisymmetric solutions come from one theorem (Galin, Sneddon): with
 
     P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
 
-Contacts over an ellipse are in :mod:`hexcontact.analytic.frictionless`, those with friction in
-:mod:`hexcontact.analytic.friction`.
+Contacts with friction are in :mod:`hexcontact.analytic.friction`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, number, reals
+from ..arrays import Array, positive, reals
 from ..core import flat
 from ..errors import DeckError
 
@@ -45,18 +44,8 @@ _POWER_LAW, _ROUNDED_PUNCH = range(2)  # bodies of the core
 class AxisymmetricContact:
     """A contact over the circle r <= a.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    contact_radius : float
-        a, m.
-    approach : float
-        delta, m.
-    normal_load : float
-        P, N.
-    max_pressure : float
-        Largest contact pressure, Pa; ``inf`` for a cone (center) and a flat punch (edge).
+    E* (Pa), contact radius a (m), approach delta (m), normal load P (N), and the largest contact pressure
+    (Pa): ``inf`` for a cone (center) and a flat punch (edge).
     """
 
     effective_modulus: float
@@ -78,8 +67,7 @@ class AxisymmetricContact:
 def require_positive(**values: float) -> None:
     """Refuse values, given by their names, that are not positive numbers."""
     for name, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise DeckError(f"{name} is {value!r}; expected a positive number")
+        positive(value, name)
 
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
@@ -88,9 +76,7 @@ def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
-    found = number(value, name, "a positive number")
-    require_positive(**{name: found})
-    return name, found
+    return name, positive(value, name)
 
 
 # ----------------------------------------------------------------------------------- power laws
@@ -114,10 +100,6 @@ def power_law(
         n >= 1.
     **given
         `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
-
-    Returns
-    -------
-    AxisymmetricContact
     """
     require_positive(effective_modulus=effective_modulus, coefficient=coefficient)
     n = float(exponent)
@@ -139,18 +121,7 @@ def _contact(kind: int, body: tuple[float, ...], name: str, value: float) -> Axi
 def hertz_sphere(effective_modulus: float, radius: float, **given: Unpack[Given]) -> AxisymmetricContact:
     """Solve Hertz's contact of spheres, h = r^2/(2R): a^3 = 3PR/(4E*), p0 = 3P/(2 pi a^2), delta = a^2/R.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    radius : float
-        R, m; 1/R = 1/R_1 + 1/R_2.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
-
-    Returns
-    -------
-    AxisymmetricContact
+    The radius is R (m), 1/R = 1/R_1 + 1/R_2; other arguments as of `power_law`.
     """
     require_positive(radius=radius)
     return power_law(effective_modulus, 0.5 / radius, 2.0, **given)
@@ -159,18 +130,7 @@ def hertz_sphere(effective_modulus: float, radius: float, **given: Unpack[Given]
 def cone(effective_modulus: float, slope: float, **given: Unpack[Given]) -> AxisymmetricContact:
     """Solve the contact with a cone, h = m r: delta = pi m a/2, P = pi E* m a^2/2, p = (E* m/2) arcosh(a/r).
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    slope : float
-        m = tangent of the angle between the cone's side and the plane.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
-
-    Returns
-    -------
-    AxisymmetricContact
+    The slope is m, the tangent of the angle between the cone's side and the plane; others as of `power_law`.
     """
     return power_law(effective_modulus, slope, 1.0, **given)
 
@@ -181,18 +141,7 @@ def cone(effective_modulus: float, slope: float, **given: Unpack[Given]) -> Axis
 def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) -> AxisymmetricContact:
     """Solve the contact of a flat circular punch: P = 2 E* a delta, p = P/(2 pi a sqrt(a^2-r^2)).
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    radius : float
-        a, m.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``.
-
-    Returns
-    -------
-    AxisymmetricContact
+    The radius is a (m); others as of `power_law`, without ``contact_radius``.
     """
     require_positive(effective_modulus=effective_modulus, radius=radius)
     name, value = driven_by(given, with_radius=False)
@@ -209,22 +158,8 @@ def rounded_punch(
 ) -> AxisymmetricContact:
     """Solve the contact of a flat punch with a parabolic edge: h = (r-b)^2/(2R) outside r = b, 0 inside.
 
-    delta(t) = (t/R) [sqrt(t^2-b^2) - b arccos(b/t)] for t > b.
-
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    flat_radius : float
-        b, m.
-    edge_radius : float
-        R, m.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
-
-    Returns
-    -------
-    AxisymmetricContact
+    delta(t) = (t/R) [sqrt(t^2-b^2) - b arccos(b/t)] for t > b. The flat radius is b (m), the edge radius R
+    (m); other arguments as of `power_law`.
     """
     require_positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
     name, value = driven_by(given)
@@ -244,20 +179,8 @@ def axisymmetric(
 ) -> AxisymmetricContact:
     """Solve the contact of any smooth convex axisymmetric profile h(r), by Gauss quadrature.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    slope, curvature : callable
-        h'(r) and h''(r) as functions of an array of radii; smooth on [0, contact radius].
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
-    scale : float
-        First guess (m) of the contact radius; the profile is defined there.
-
-    Returns
-    -------
-    AxisymmetricContact
+    Slope and curvature are h'(r) and h''(r) as functions of an array of radii, smooth on [0, contact radius];
+    the scale (m) is a first guess of the contact radius, where they are defined. Others as of `power_law`.
     """
     from scipy import optimize
 
@@ -317,16 +240,8 @@ def _gauss(n: int) -> tuple[Array, Array]:
 class EllipticContact:
     """Hertz contact over an ellipse; returned by `hertz_ellipse` and `crossed_cylinders`.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    semi_major, semi_minor : float
-        Semi-axes a >= b, m.
-    angle : float
-        Direction of the major axis from x, rad, in (-pi/2, pi/2].
-    approach, normal_load, max_pressure : float
-        delta (m), P (N), p0 (Pa).
+    E* (Pa), semi-axes a >= b (m), direction of the major axis from x (rad) in (-pi/2, pi/2], approach delta
+    (m), normal load P (N), largest pressure p0 (Pa).
     """
 
     effective_modulus: float
@@ -355,18 +270,7 @@ class EllipticContact:
 def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[Given]) -> EllipticContact:
     """Solve Hertz's contact with the separation h = (x, y) H (x, y)^T / 2.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    hessian : array_like
-        H, the symmetric 2x2 tensor of second derivatives of h (1/m), positive definite.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``.
-
-    Returns
-    -------
-    EllipticContact
+    The Hessian is H (1/m), symmetric, positive definite, of shape (2, 2); others as of `flat_punch`.
     """
     require_positive(effective_modulus=effective_modulus)
     tensor = reals(hessian, "hessian")
@@ -384,21 +288,8 @@ def crossed_cylinders(
 ) -> EllipticContact:
     """Solve the contact of two cylinders, the first with its axis along x, the second turned by ``angle``.
 
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    radius_1, radius_2 : float
-        Radii, m.
-    angle : float
-        From the axis of cylinder 1 (the x axis) to that of cylinder 2, rad; not a multiple of pi.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``.
-
-    Returns
-    -------
-    EllipticContact
-        Its ``angle`` is that of the major axis from the axis of cylinder 1.
+    The radii are in m; the angle (rad), from the axis of cylinder 1 to that of cylinder 2, is no multiple of
+    pi, and that of the result is from the axis of cylinder 1. Others as of `flat_punch`.
     """
     require_positive(radius_1=radius_1, radius_2=radius_2)
     return hertz_ellipse(effective_modulus, flat.cylinders_hessian(radius_1, radius_2, angle), **given)

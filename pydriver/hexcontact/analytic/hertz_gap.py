@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..core.measures import half_axes
 from ..deck.read import recorded
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
 from .frictionless import EllipticContact, hertz_ellipse
-
-if TYPE_CHECKING:
-    import xarray
-
 
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
 
@@ -40,7 +36,7 @@ def is_compliant(attributes: Mapping[Any, Any]) -> bool:
     return INTERFACE[0] in attributes
 
 
-def is_strained(dataset: xarray.Dataset) -> bool:
+def is_strained(dataset: Dataset) -> bool:
     """Test whether there is a bulk stress, for which closed solutions of shear do not hold."""
     return any(bool(np.any(dataset[name])) for name in BULK_STRESS if name in dataset)
 
@@ -70,7 +66,7 @@ class QuadraticGap:
     lowest: float  # the gap there, m; not 0 for heights that are not shifted to first touch
 
     @classmethod
-    def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
+    def of(cls, dataset: Dataset) -> QuadraticGap | None:
         """Return the gap of a result; None if Hertz does not hold: another law or shape, a line contact."""
         try:
             known = cls.of_deck(str(dataset.attrs.get("deck", "")), dataset.attrs)

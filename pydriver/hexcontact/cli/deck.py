@@ -9,43 +9,32 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..files import beginning, replacing
 from ..text import did_you_mean, listed, visible
-from .frame import (
-    AsJson,
-    Content,
-    DeckFile,
-    Settings,
-    argument,
-    case_of,
-    command,
-    flag,
-    output_to,
-    print_error,
-    print_output,
-    target_of,
-)
+from . import frame
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
 
 
-@command("hexcontact check fretting.toml --set grid.spacing='2 um'")
-def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
+@frame.command("hexcontact check fretting.toml --set grid.spacing='2 um'")
+def check(
+    deck: frame.DeckFile, settings: frame.Settings = None, as_json: frame.AsJson = False
+) -> frame.Content:
     """Check a deck, report all its faults, and print a summary of the case."""
     from ..problem import plausibility
     from ..problem.preview import case_rows, least_and_most
     from ..solve.memory_needed import peak_memory, require_memory
     from . import printed
 
-    case = case_of(deck, settings)
+    case = frame.case_of(deck, settings)
     if not as_json:
         printed.console().print(printed.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first possible result
     require_memory(first, first.lattice)
-    target = target_of(case, deck)
+    target = frame.target_of(case, deck)
     if as_json:
         return case_content(case, target)
     for sentence in plausibility.warnings(case):
-        print_error(f"warning: {sentence}")
+        frame.print_error(f"warning: {sentence}")
     printed.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
     return None
 
@@ -78,10 +67,10 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
     }
 
 
-@command("hexcontact schema -o deck.schema.json")
+@frame.command("hexcontact schema -o deck.schema.json")
 def schema(
-    output: Annotated[Path | None, output_to("File to write; default: print it.")] = None,
-    study: Annotated[bool, flag("study", "Write the schema of study files instead.")] = False,
+    output: Annotated[Path | None, frame.output_to("File to write; default: print it.")] = None,
+    study: Annotated[bool, frame.flag("study", "Write the schema of study files instead.")] = False,
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
@@ -95,16 +84,16 @@ def schema(
         raise DeckError(f"{output} exists and is not a hexcontact schema; choose another output")
     with replacing(output) as path:
         path.write_text(text, encoding="utf-8")
-    print_output(
+    frame.print_output(
         f'written: {output}; first line of a {"study" if study else "deck"} that uses it: "#:schema {output}"'
     )
 
 
-@command("hexcontact new sphere")
+@frame.command("hexcontact new sphere")
 def new(
-    name: Annotated[str | None, argument("NAME", "Which starter deck.")] = None,
-    listing: Annotated[bool, flag("list", "List the starter decks.")] = False,
-    output: Annotated[Path | None, output_to("File to write; default: NAME.toml; - prints it.")] = None,
+    name: Annotated[str | None, frame.argument("NAME", "Which starter deck.")] = None,
+    listing: Annotated[bool, frame.flag("list", "List the starter decks.")] = False,
+    output: Annotated[Path | None, frame.output_to("File to write; default: NAME.toml; - prints it.")] = None,
 ) -> None:
     """Write a commented deck to start from."""
     from ..deck.toml import STARTERS, starter
@@ -125,4 +114,4 @@ def new(
             file.write(starter(name))
     except FileExistsError:
         raise DeckError(f"{target} exists already; choose another name with --output") from None
-    print_output(f"written: {target}; now: hexcontact run {target}")
+    frame.print_output(f"written: {target}; now: hexcontact run {target}")

@@ -433,24 +433,21 @@ def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Ca
 
 
 def _print_version(wanted: bool) -> None:
-    if wanted:
-        print(f"hexcontact {__version__}")
-        if "--verbose" in sys.argv:
-            _print_build()
-        raise typer.Exit()
+    """Print the version; with --verbose also compiler, libraries, threads, and the versions of packages."""
+    if not wanted:
+        return
+    print(f"hexcontact {__version__}")
+    if "--verbose" in sys.argv:
+        import platform
+        from importlib import metadata
 
+        from ..core import flat, memory
 
-def _print_build() -> None:
-    """Print compiler, libraries, threads, and the versions of packages."""
-    import platform
-    from importlib import metadata
-
-    from ..core import flat, memory
-
-    print("core", *flat.BUILT.split("; "), f"threads: {memory.threads()}", flat.LIBRARY, sep="\n  ")
-    packages = ("numpy", "scipy", "netCDF4", "xarray", "pandas", "pydantic", "matplotlib")
-    versions = (f"{name} {metadata.version(name)}" for name in packages)
-    print(f"Python {platform.python_version()}", *versions, sep="\n  ")
+        print("core", *flat.BUILT.split("; "), f"threads: {memory.threads()}", flat.LIBRARY, sep="\n  ")
+        packages = ("numpy", "scipy", "netCDF4", "xarray", "pandas", "pydantic", "matplotlib")
+        versions = (f"{name} {metadata.version(name)}" for name in packages)
+        print(f"Python {platform.python_version()}", *versions, sep="\n  ")
+    raise typer.Exit()
 
 
 @app.callback(epilog=f"Example: {_EXAMPLE}")

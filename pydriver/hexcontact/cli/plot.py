@@ -14,19 +14,7 @@ from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
-from .frame import (
-    Shown,
-    argument,
-    beside,
-    case_of,
-    command,
-    labels_of,
-    option,
-    output_to,
-    print_output,
-    steps_of,
-    steps_option,
-)
+from . import frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +37,7 @@ def _help() -> str:
     """Return the help, with a line for each figure: this imports the packages that draw."""
     from ..plotting.registry import entries
 
-    choices = [(_kind(entry), name, entry.help) for name, entry in entries().items()]
+    choices = [(entry.shows, name, entry.help) for name, entry in entries().items()]
     choices.append(("result", _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
     of_a_result, of_a_study, of_a_table, of_a_deck = (
@@ -64,20 +52,13 @@ def _help() -> str:
     )
 
 
-def _kind(entry: Entry) -> str:
-    """Return the kind of the FILE of a figure: a result, a study, a table or a deck."""
-    if entry.of_a_deck:
-        return "deck"
-    return "study" if entry.of_a_study else "table" if entry.of_a_table else "result"
-
-
 class _WithFigures(TyperCommand):
     """The command whose help is written when it is read."""
 
     help = property(lambda _: _help(), lambda _, __: None)
 
 
-@command(
+@frame.command(
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
     cls=_WithFigures,
@@ -85,48 +66,52 @@ class _WithFigures(TyperCommand):
 def plot(
     files: Annotated[
         list[Path] | None,
-        argument(
+        frame.argument(
             "FILE",
             "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
         ),
     ] = None,
-    what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
+    what: Annotated[str, frame.option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
         str | None,
-        steps_option(
+        frame.steps_option(
             "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
             "10,20,30 or 10-30 or all. The label of a segment is its last step."
         ),
     ] = None,
     angle: Annotated[
         str | None,
-        option(
+        frame.option(
             "--angle", metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."
         ),
     ] = None,
     through: Annotated[
         str | None,
-        option("--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
+        frame.option(
+            "--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."
+        ),
     ] = None,
     cycle: Annotated[
         str | None,
-        option(
+        frame.option(
             "--cycle", metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."
         ),
     ] = None,
     over: Annotated[
         str | None,
-        option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
+        frame.option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
     ] = None,
     arrows: Annotated[
-        Arrows | None, option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step.")
+        Arrows | None,
+        frame.option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step."),
     ] = None,
-    source: Shown = None,
+    source: frame.Shown = None,
     output: Annotated[
-        Path | None, output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE.")
+        Path | None,
+        frame.output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."),
     ] = None,
     format: Annotated[
-        Format | None, option("--format", "-f", help="Format where --output names none.")
+        Format | None, frame.option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
@@ -142,19 +127,19 @@ def plot(
         raise DeckError(f"--what {what}: expected the FILE of a result")
     if output and format:
         raise DeckError(f"--format {format}: the name of --output {output} has a format already")
-    if what in figures and figures[what].of_a_deck:
+    if what in figures and figures[what].shows == "deck":
         options = (step, angle, through, cycle, over, arrows, source)
         if len(files) > 1 or any(one is not None for one in options):
             raise DeckError(f"--what {what}: expected one deck, and no other options but --output, --format")
-        picture = output or beside(files[0], f"_{what}.{format or 'png'}")
-        print_output(f"written: {drawn_deck(files[0], what, picture)}")
+        picture = output or frame.beside(files[0], f"_{what}.{format or 'png'}")
+        frame.print_output(f"written: {drawn_deck(files[0], what, picture)}")
         return
     study = study_of(files[0]) if len(files) == 1 else None
     table = read_table(files[0]) if len(files) == 1 and study is None else None
     holds = "study" if study is not None else "table" if table is not None else "result"
     if holds != "result" and what == "overview":
         what = holds
-    shows = "result" if what == _ALL else _kind(figures[what])
+    shows = "result" if what == _ALL else figures[what].shows
     if holds != shows:
         words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
         kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
@@ -162,8 +147,10 @@ def plot(
     results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
     cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
-        "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
-        "cycle": None if cycle is None else steps_of(cycle, [""] * cycles, "cycle"),
+        "step": None
+        if step is None
+        else frame.steps_of(step, frame.labels_of(results[0]) if results else [""]),
+        "cycle": None if cycle is None else frame.steps_of(cycle, [""] * cycles, "cycle"),
         "angle": None if angle is None else angle_of(angle),
         "through": None if through is None else point_of(through),
         "over": over,
@@ -175,15 +162,15 @@ def plot(
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
-        first = output or beside(files[0], suffix)
-        print_output("\n".join(all_pictures(results[0], first, chosen)))
+        first = output or frame.beside(files[0], suffix)
+        frame.print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
     if study is not None:
         files, results = [study], [read_study(study)]
     elif table is not None:
         results = [table]
-    picture = output or beside(files[0], f"_{what}{suffix}")
-    print_output(f"written: {picture_of(results, what, picture, chosen)}")
+    picture = output or frame.beside(files[0], f"_{what}{suffix}")
+    frame.print_output(f"written: {picture_of(results, what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------
@@ -262,7 +249,7 @@ def drawn_deck(deck: Path, what: str, picture: Path) -> Path:
     """Draw a picture of a deck that was not run; return its file."""
     from ..plotting.registry import entries
 
-    return _save(entries()[what].draw(case_of(deck, None)), f"{what} of {deck}", picture)
+    return _save(entries()[what].draw(frame.case_of(deck, None)), f"{what} of {deck}", picture)
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:
@@ -274,7 +261,7 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
 
     lines, written = [], False
     for what, entry in entries().items():
-        if entry.needs == SEVERAL_RUNS or not entry.of_a_result:
+        if entry.needs == SEVERAL_RUNS or entry.shows != "result":
             continue
         own = {name: value for name, value in chosen.items() if {name, f"{name}s"} & entry.options.keys()}
         arguments = _arguments(entry, 1, own)

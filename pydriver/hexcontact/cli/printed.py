@@ -10,23 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.measures import half_axes
 from ..errors import DeckError
-from ..result.history_words import (
-    contact_size,
-    cycles,
-    energy_table,
-    error_of,
-    extent_of,
-    fitted,
-    is_frictional,
-    load_or_motion,
-    remarks,
-    residuals,
-    segments,
-    some_steps,
-    step_rows,
-    stick_share,
-    worth_showing,
-)
+from ..result import history_words as words
 from ..text import TextTable, percent, quantity
 from ..variables import VARIABLES, label_of, spelled
 
@@ -86,20 +70,20 @@ class Summary(NamedTuple):
         from ..problem.preview import parameters_of
 
         found = histories_of(refined) if refined is not None else histories
-        extent = extent if refined is None else extent_of(refined.step(-1))
+        extent = extent if refined is None else words.extent_of(refined.step(-1))
         return cls(case.title, found, parameters_of(case), case.deck_text, refined, extent)
 
     @classmethod
     def of_result(cls, result: Result) -> Summary:
         """Summarize a file."""
         histories, attributes = histories_of(result), result.dataset.attrs
-        extent = extent_of(result.step(-1))
+        extent = words.extent_of(result.step(-1))
         return cls(result.case_title, histories, attributes, result.deck, result, extent)
 
     @property
     def remarks(self) -> list[str]:
         """Sentences about doubtful steps."""
-        found = remarks(self.histories, self.parameters)
+        found = words.remarks(self.histories, self.parameters)
         from ..deck.read import recorded
 
         try:
@@ -129,8 +113,7 @@ class Summary(NamedTuple):
             shown.print(history_table(self.histories, shown))
         for title, (headers, rows) in self.tables(_MOST_ROWS).items():
             if rows:
-                words = f"{title}{named}" if title == _LAST else title
-                shown.print(TextTable(words, headers, rows))
+                shown.print(TextTable(title + named * (title == _LAST), headers, rows))
         before = () if whole_file else ("warnings", "notes")  # printed before the run
         printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
@@ -141,8 +124,8 @@ class Summary(NamedTuple):
         """Return the tables that terminal and page share, by title; `most` rows of energies."""
         last = self.histories[-1]
         return {
-            "Dissipated energy": energy_table(self.histories, most),
-            _LAST: (("", ""), step_rows(last, self.extent)),
+            "Dissipated energy": words.energy_table(self.histories, most),
+            _LAST: (("", ""), words.step_rows(last, self.extent)),
             "Against Hertz": (("", "Hertz", "computed", "difference"), hertz_rows(self.hertz, last)),
             "Accuracy": (_TRIALS, [] if self.result is None else trial_rows(self.result)),
         }
@@ -153,7 +136,7 @@ class Summary(NamedTuple):
 
     def as_run(self) -> dict[str, Any]:
         """Return a complete run as the object that ``run --json`` prints."""
-        worst = [residual for history in self.histories for residual in residuals(history).values()]
+        worst = [residual for history in self.histories for residual in words.residuals(history).values()]
         return {
             "title": self.title,
             "complete": True,
@@ -168,7 +151,7 @@ class Summary(NamedTuple):
 
     def parts(self) -> dict[str, Any]:
         """Return segments and cycles of the history, with the energy that friction dissipated in each."""
-        return {"segments": segments(self.histories), "cycles": cycles(self.histories)}
+        return {"segments": words.segments(self.histories), "cycles": words.cycles(self.histories)}
 
 
 def file_content(result: Result) -> dict[str, Any]:
@@ -206,7 +189,7 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
     The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
     """
     several = len(histories) > _MOST_ROWS
-    chosen = some_steps(histories, _MOST_ROWS) if several else range(len(histories))
+    chosen = words.some_steps(histories, _MOST_ROWS) if several else range(len(histories))
     title = f"History, {len(chosen)} of {len(histories)} load steps" if several else "History"
     for with_errors in (True, False):
         columns = _columns(histories, with_errors)
@@ -214,34 +197,32 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
             shown = TextTable(title, ("step", *columns), rows, tight=True)
-            if _fits(shown, console):
+            needed = console.measure(shown, options=console.options.update_width(1000))
+            if needed.maximum <= console.width:
                 return shown
     return shown
-
-
-def _fits(table: TextTable, console: Console) -> bool:
-    """Return whether a table needs no more width than a console has."""
-    return console.measure(table, options=console.options.update_width(1000)).maximum <= console.width
 
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:
     """Return the columns of a table of load steps by their headers, with or without estimated errors."""
 
     def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
-        return lambda history: entry(history) + (error_of(name, history) if with_errors else "")
+        return lambda history: entry(history) + (words.error_of(name, history) if with_errors else "")
 
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
-    for name in worth_showing(histories):
-        columns[label_of(name)] = column(functools.partial(load_or_motion, name), name)
-    if is_frictional(histories[-1]):
-        columns["stick"] = column(stick_share, "stick_area")
+    for name in words.worth_showing(histories):
+        columns[label_of(name)] = column(functools.partial(words.load_or_motion, name), name)
+    if words.is_frictional(histories[-1]):
+        columns["stick"] = column(words.stick_share, "stick_area")
     else:
         columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
         if any(half_axes(history) for history in histories):
-            columns["half-axes"] = lambda h: contact_size(h)[1]
+            columns["half-axes"] = lambda h: words.contact_size(h)[1]
         else:
-            columns["radius"] = column(lambda h: quantity(fitted("contact_radius", h), "m"), "contact_radius")
-    columns["residual"] = lambda h: f"{max(residuals(h).values(), default=math.nan):.1e}"
+            columns["radius"] = column(
+                lambda h: quantity(words.fitted("contact_radius", h), "m"), "contact_radius"
+            )
+    columns["residual"] = lambda h: f"{max(words.residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
     return columns
 
@@ -274,7 +255,7 @@ def trial_rows(result: Result) -> list[Row]:
 
     A row has the values on three of the lattices, and the largest error of all steps over the largest value.
     """
-    from ..solve.accuracy import JUDGED, relative_errors
+    from ..solve.lattices import JUDGED, relative_errors
 
     data = result.dataset
     if "trial_spacing" not in data:
@@ -328,10 +309,10 @@ def _reached(attributes: Mapping[str, Any]) -> str:
 
 def algorithm(attributes: Mapping[str, Any]) -> str:
     """Return the words for the algorithm and the friction law in the attributes of a result."""
-    words = str(attributes.get("algorithm", "unknown"))
-    if words in ("static", "incremental"):
+    named = str(attributes.get("algorithm", "unknown"))
+    if named in ("static", "incremental"):
         law = attributes.get("friction_law", f"coefficient {float(attributes['friction_coefficient']):g}")
-        words += f", friction {law}"
-    if words.startswith("incremental"):
-        words += ", entry interpolated" * (attributes.get("entry") == "interpolated")
-    return words + ", coupling goodman" * (attributes.get("coupling") == "goodman")
+        named += f", friction {law}"
+    if named.startswith("incremental"):
+        named += ", entry interpolated" * (attributes.get("entry") == "interpolated")
+    return named + ", coupling goodman" * (attributes.get("coupling") == "goodman")

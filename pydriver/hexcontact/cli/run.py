@@ -7,41 +7,23 @@ from pathlib import Path
 from typing import Annotated
 
 from ..solve.interruption import signal_pipe
-from .frame import (
-    AsJson,
-    Content,
-    DeckFile,
-    Level,
-    LogFile,
-    Plot,
-    Quiet,
-    Settings,
-    argument,
-    case_of,
-    command,
-    flag,
-    output_to,
-    print_error,
-    setting,
-    settings_option,
-    target_of,
-)
+from . import frame
 
 
-@command("hexcontact run cases/hertz_spheres.toml --plot")
+@frame.command("hexcontact run cases/hertz_spheres.toml --plot")
 def run(
-    deck: DeckFile,
+    deck: frame.DeckFile,
     output: Annotated[
-        Path | None, output_to("File to write; default: the deck's output.file, or DECK.nc here.")
+        Path | None, frame.output_to("File to write; default: the deck's output.file, or DECK.nc here.")
     ] = None,
-    overwrite: Annotated[bool, flag("overwrite", "Replace an existing output.")] = False,
-    plot: Plot = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
-    log_file: LogFile = None,
-    log_level: Level = None,
-    settings: Settings = None,
-) -> Content:
+    overwrite: Annotated[bool, frame.flag("overwrite", "Replace an existing output.")] = False,
+    plot: frame.Plot = False,
+    quiet: frame.Quiet = False,
+    as_json: frame.AsJson = False,
+    log_file: frame.LogFile = None,
+    log_level: frame.Level = None,
+    settings: frame.Settings = None,
+) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
     from ..solve import log
@@ -50,8 +32,8 @@ def run(
 
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with messages.logging(deck, *([output] if output else [])):
-        case = case_of(deck, settings)
-        target = target_of(case, deck, output)
+        case = frame.case_of(deck, settings)
+        target = frame.target_of(case, deck, output)
         log.refuse_same(log_file, [target])
         if plot:  # refuses before the run
             picture_beside(target)
@@ -61,18 +43,19 @@ def run(
     return messages.conclude(case, histories, extent, target, picture)
 
 
-@command("hexcontact resume fretting.nc")
+@frame.command("hexcontact resume fretting.nc")
 def resume(
-    file: Annotated[Path, argument("FILE", "The output of the run.")],
-    plot: Plot = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
-    log_file: LogFile = None,
-    log_level: Level = None,
+    file: Annotated[Path, frame.argument("FILE", "The output of the run.")],
+    plot: frame.Plot = False,
+    quiet: frame.Quiet = False,
+    as_json: frame.AsJson = False,
+    log_file: frame.LogFile = None,
+    log_level: frame.Level = None,
     settings: Annotated[
-        list[str] | None, settings_option("Change the solver for the further steps, as solver.tolerance=1e-7")
+        list[str] | None,
+        frame.settings_option("Change the solver for the further steps, as solver.tolerance=1e-7"),
     ] = None,
-) -> Content:
+) -> frame.Content:
     """Resume a run that was interrupted or killed, ran out of disk or did not converge.
 
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
@@ -81,7 +64,7 @@ def resume(
     from .solving import Messages, overview, picture_beside, solved, with_tables
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
-    overrides = dict(map(setting, settings or ()))
+    overrides = dict(map(frame.setting, settings or ()))
     with (
         signal_pipe() as pipe,
         messages.logging(file),
@@ -91,7 +74,7 @@ def resume(
             if plot:
                 picture_beside(again.store.path)
             if again.warning:
-                print_error(f"warning: {again.warning}")
+                frame.print_error(f"warning: {again.warning}")
             histories, extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
         else:
             with_tables(restart.output_of(file), pipe, messages)

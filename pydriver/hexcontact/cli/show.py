@@ -6,24 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 from ..errors import DeckError
-from .frame import (
-    AsJson,
-    Content,
-    ResultFile,
-    Shown,
-    beside,
-    command,
-    flag,
-    labels_of,
-    output_to,
-    print_output,
-    steps_of,
-    steps_option,
-)
+from . import frame
 
 
-@command("hexcontact info hertz_spheres.nc")
-def info(file: ResultFile, as_json: AsJson = False) -> Content:
+@frame.command("hexcontact info hertz_spheres.nc")
+def info(file: frame.ResultFile, as_json: frame.AsJson = False) -> frame.Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
     from ..interior.files import content_of, description
     from ..result.store import open_result
@@ -34,12 +21,12 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
         study = shown.read_study(path)
         if as_json:
             return shown.content_of(study, path)
-        print_output(shown.lines_of(study))
+        frame.print_output(shown.lines_of(study))
         return None
     if as_json and (content := content_of(file)):
         return content
     if lines := description(file):
-        print_output("\n".join(lines))
+        frame.print_output("\n".join(lines))
         return None
     result = open_result(file)
     if as_json:
@@ -48,38 +35,40 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     return None
 
 
-@command("hexcontact report fretting.nc")
+@frame.command("hexcontact report fretting.nc")
 def report(
-    file: ResultFile,
-    output: Annotated[Path | None, output_to("Page to write (.html); default: FILE.html.")] = None,
+    file: frame.ResultFile,
+    output: Annotated[Path | None, frame.output_to("Page to write (.html); default: FILE.html.")] = None,
 ) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
     from ..result.store import open_result
     from .report import write_report
 
-    print_output(f"written: {write_report(open_result(file), output or beside(file, '.html'))}")
+    frame.print_output(f"written: {write_report(open_result(file), output or frame.beside(file, '.html'))}")
 
 
-@command("hexcontact export fretting.nc --vtk")
+@frame.command("hexcontact export fretting.nc --vtk")
 def export(
-    file: ResultFile,
+    file: frame.ResultFile,
     vtk: Annotated[
         bool,
-        flag("vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."),
+        frame.flag(
+            "vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
+        ),
     ] = False,
-    ugrid: Annotated[bool, flag("ugrid", "A netCDF file with the fields on a mesh.")] = False,
+    ugrid: Annotated[bool, frame.flag("ugrid", "A netCDF file with the fields on a mesh.")] = False,
     csv: Annotated[
-        bool, flag("csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields.")
+        bool, frame.flag("csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields.")
     ] = False,
     histories: Annotated[
-        bool, flag("histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
+        bool, frame.flag("histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
     ] = False,
     step: Annotated[
-        str | None, steps_option("Only these load steps, as 10,20 or 10-30 or a label; -1: the last.")
+        str | None, frame.steps_option("Only these load steps, as 10,20 or 10-30 or a label; -1: the last.")
     ] = None,
-    source: Shown = None,
+    source: frame.Shown = None,
     output: Annotated[
-        Path | None, output_to("Folder to write into; default: FILE_export beside FILE.")
+        Path | None, frame.output_to("Folder to write into; default: FILE_export beside FILE.")
     ] = None,
 ) -> None:
     """Write a result for other programs; of a study the table of its cases, of a table its values."""
@@ -91,27 +80,27 @@ def export(
     from ..study import dataset as shown
 
     more = vtk or ugrid or histories or step is not None or source is not None
-    stem = beside(file, "").name
+    stem = frame.beside(file, "").name
     if (path := shown.study_of(file)) is not None:
         if more:
             raise DeckError(f"{path} is the result of a study, which has no fields; expected --csv alone")
-        study, stem = shown.read_study(path), beside(path, "").name
-        target = (output or beside(path, "_export")) / f"{stem}_cases.csv"
+        study, stem = shown.read_study(path), frame.beside(path, "").name
+        target = (output or frame.beside(path, "_export")) / f"{stem}_cases.csv"
         table = shown.table_of(study).rename(columns=shown.with_units(study))
-        print_output(f"written: {write.write_table(table, target)}")
+        frame.print_output(f"written: {write.write_table(table, target)}")
         return
-    folder = output or beside(file, "_export")
+    folder = output or frame.beside(file, "_export")
     if (found := read_table(file)) is not None:
         if more:
             raise DeckError(f"{file} holds {found.attrs['content']}, a table; expected --csv alone")
-        print_output(f"written: {write.write_table(write.flat(found), folder / f'{stem}.csv')}")
+        frame.print_output(f"written: {write.write_table(write.flat(found), folder / f'{stem}.csv')}")
         return
     result = open_result(file)
-    steps = None if step is None else steps_of(step, labels_of(result))
+    steps = None if step is None else frame.steps_of(step, frame.labels_of(result))
     # first the tables that may be refused
     written = write.histories_to_csv(result, folder, stem) if histories else []
     written += write.volumes_to_vtk(result, folder, stem) if vtk else []
     written += [write.to_vtk(result, folder, stem, steps, source)] if vtk else []
     written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps, source)] if ugrid else []
     written += write.to_csv(result, folder, stem, steps, source) if csv else []
-    print_output("\n".join(f"written: {path}" for path in written))
+    frame.print_output("\n".join(f"written: {path}" for path in written))

@@ -11,22 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
-from .frame import (
-    AsJson,
-    Content,
-    Failure,
-    Level,
-    LogFile,
-    Quiet,
-    argument,
-    command,
-    flag,
-    option,
-    output_to,
-    print_error,
-    print_output,
-    steps_of,
-)
+from . import frame
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
@@ -37,36 +22,38 @@ _SOME_FAILED = 3  # exit code of a study with failed or missing cases
 _MOST_NAMED = 20  # failures listed at the end
 
 
-@command("hexcontact study cases/study_friction.toml --jobs 4")
+@frame.command("hexcontact study cases/study_friction.toml --jobs 4")
 def study(
-    file: Annotated[Path, argument("STUDY", "The study, a TOML file.")],
+    file: Annotated[Path, frame.argument("STUDY", "The study, a TOML file.")],
     output: Annotated[
-        Path | None, output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it.")
+        Path | None,
+        frame.output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it."),
     ] = None,
     jobs: Annotated[
-        int | None, option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+        int | None, frame.option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
     ] = None,
     dask: Annotated[
-        str | None, option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
+        str | None,
+        frame.option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786."),
     ] = None,
-    slurm: Annotated[bool, flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
+    slurm: Annotated[bool, frame.flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
     case: Annotated[
         str | None,
-        option("--case", metavar="N,...", help="Run only these cases, as a task does: 3, or 1,4-6."),
+        frame.option("--case", metavar="N,...", help="Run only these cases, as a task does: 3, or 1,4-6."),
     ] = None,
-    collect: Annotated[bool, flag("collect", "Run nothing; combine the finished cases.")] = False,
+    collect: Annotated[bool, frame.flag("collect", "Run nothing; combine the finished cases.")] = False,
     plan: Annotated[
-        bool, option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
+        bool, frame.option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
     ] = False,
     skip_invalid: Annotated[
-        bool, option("--skip-invalid", help="Leave out invalid cases, and name each.")
+        bool, frame.option("--skip-invalid", help="Leave out invalid cases, and name each.")
     ] = False,
-    retry: Annotated[bool, flag("retry", "Repeat cases that failed.")] = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
-    log_file: LogFile = None,
-    log_level: Level = None,
-) -> Content:
+    retry: Annotated[bool, frame.flag("retry", "Repeat cases that failed.")] = False,
+    quiet: frame.Quiet = False,
+    as_json: frame.AsJson = False,
+    log_file: frame.LogFile = None,
+    log_level: frame.Level = None,
+) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
     from ..study.study import Study, study_reporter
     from .solving import Messages
@@ -81,7 +68,7 @@ def study(
     planned = Study.from_toml(file, output, check, skip_invalid)
     for wrong in planned.invalid:
         number = planned.folder.number(wrong)
-        print_error(f"case {number} ({wrong}) is invalid and left out: {wrong.fault.splitlines()[0]}")
+        frame.print_error(f"case {number} ({wrong}) is invalid and left out: {wrong.fault.splitlines()[0]}")
     if plan:
         return _plan(planned, as_json)
     if slurm:
@@ -89,12 +76,12 @@ def study(
         return None
     with messages.logging(file, planned.output):
         if case is not None:
-            numbers = steps_of(case, [""] * len(planned), "case")
+            numbers = frame.steps_of(case, [""] * len(planned), "case")
             outcomes = _run_cases(planned, numbers, retry, messages)
             failed = [outcome for outcome in outcomes if outcome.exit_code]
             if failed:
                 more = f"\n{len(failed)} of {len(numbers)} cases failed" if len(numbers) > 1 else ""
-                raise Failure(failed[0].message + more, failed[0].exit_code)
+                raise frame.Failure(failed[0].message + more, failed[0].exit_code)
             done = [
                 {"case": n, "output": planned.folder.folder / f"{n:04d}.nc", "seconds": outcome.seconds}
                 for n, outcome in zip(numbers, outcomes, strict=True)
@@ -114,7 +101,7 @@ def study(
     return None
 
 
-def _plan(study: Study, as_json: bool) -> Content:
+def _plan(study: Study, as_json: bool) -> frame.Content:
     """Print the cases of a study with their parameters and states; nothing is solved or written."""
     from ..study.plan import in_short
 
@@ -130,7 +117,7 @@ def _plan(study: Study, as_json: bool) -> Content:
     ]
     print(text_table(headers, rows))
     counts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
-    print_output(f"{study.title}: {len(study)} cases, {', '.join(counts)}")
+    frame.print_output(f"{study.title}: {len(study)} cases, {', '.join(counts)}")
     return None
 
 
@@ -160,15 +147,15 @@ class _State:
         number = study.folder.number
         if not quiet:
             files = f"their files in {study.folder.folder}/"
-            print_output(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
+            frame.print_output(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
         for case, outcome in self.failures[:_MOST_NAMED]:
-            print_error(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
+            frame.print_error(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
         if len(self.failures) > _MOST_NAMED:
-            print_error(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
+            frame.print_error(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
         if self.missing:
-            print_error(f"{self.missing} of {len(study)} cases have not been run")
+            frame.print_error(f"{self.missing} of {len(study)} cases have not been run")
         if any(outcome.lasting for _, outcome in self.failures):
-            print_error("--retry runs cases again that failed by themselves")
+            frame.print_error("--retry runs cases again that failed by themselves")
 
     def content(self) -> dict[str, Any]:
         """Return the state as the object that ``study --json`` prints."""
@@ -238,7 +225,7 @@ def _run_missing(study: Study, **options: Any) -> None:
     except Interrupted as signaled:
         saved = f"{_State.of(study).done} of {len(study)} cases are finished and recorded"
         message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"
-        raise Failure(message, signaled.exit_code) from None
+        raise frame.Failure(message, signaled.exit_code) from None
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:

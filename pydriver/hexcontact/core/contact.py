@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Mask, integer, number, reals, word
+from ..arrays import Array, Mask, checked, reals
 from ..errors import DeckError, RimWarning, warn
 from . import flat, kernel_cache
 from .handles import Handle, HeldState, Solved
@@ -24,8 +24,7 @@ tangential springs, 0 without."""
 UNILATERAL: Interface = (0.0, 0.0, 0.0)  # bodies that do not penetrate
 MOST_IN_CONTACT = 10**8  # largest number of nodes for estimates of memory, whose square does not overflow
 _SHAPE = " (rows, columns)"
-_METHODS = {"direct": 0, "fft": 1}
-_AS_WRITTEN = 2  # direct, with the iteration of the dissertation
+_METHODS = {("direct", "newton"): 0, ("fft", "newton"): 1, ("direct", "dissertation"): 2}
 _STOPPED = (  # in the order of fortran/contact_state.f90
     "nothing was solved",
     "",  # converged
@@ -39,25 +38,14 @@ _STOPPED = (  # in the order of fortran/contact_state.f90
 
 def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> Array:
     """Return finite values over the window, contiguous."""
-    array = np.ascontiguousarray(shaped(values, lattice, name))
+    return _finite(shaped(values, lattice, name), name)
+
+
+def _finite(values: Array, name: str) -> Array:
+    array = np.ascontiguousarray(values)
     if not np.isfinite(array).all():
         raise DeckError(f"{name}: {np.count_nonzero(~np.isfinite(array))} values are not finite numbers")
     return array
-
-
-def checked_interface(interface: Interface) -> Array:
-    """Return the three numbers of an interface as an array."""
-    numbers = reals(interface, "interface")
-    if numbers.shape != (3,):
-        raise DeckError(f"interface = {interface!r}: expected a coefficient, an exponent and a stiffness")
-    return numbers
-
-
-def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> Mask:
-    """Return the nodes that may touch; None means all."""
-    if candidate is None:
-        return np.ones(lattice.shape, dtype=bool)
-    return reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
 
 
 def shaped(values: ArrayLike, lattice: Lattice, name: str) -> Array:
@@ -72,38 +60,21 @@ def shaped(values: ArrayLike, lattice: Lattice, name: str) -> Array:
     return array
 
 
-def checked_tolerance(tolerance: float) -> None:
-    """Refuse a bound of residuals that is not between 0 and 1."""
-    number(tolerance, "tolerance", "a number between 0 and 1", lambda found: 0 < found < 1)
-
-
-def method_code(name: str, iteration: Iteration = "newton") -> int:
+def method_code(method: str, iteration: Iteration = "newton") -> int:
     """Return the number of a method with its iteration in the core."""
-    code = _METHODS[word(name, "method", _METHODS)]
-    if word(iteration, "iteration", ("newton", "dissertation")) == "newton":
-        return code
-    if name != "direct":
-        raise DeckError(f'iteration = "{iteration}" needs method = "direct", not "{name}"')
-    return _AS_WRITTEN
-
-
-def thread_count(threads: int) -> int:
-    """Return a number of threads; the core checks its bounds."""
-    return integer(threads, "threads", "an integer of at least 0")
+    given = checked(method=method, iteration=iteration)
+    if given not in _METHODS:
+        raise DeckError(f'iteration = "{iteration}" needs method = "direct", not "{method}"')
+    return _METHODS[given]
 
 
 @dataclass(frozen=True)
 class ElasticPair:
     """Compliance constants of two bodies in contact.
 
-    Attributes
-    ----------
-    lambda_1
-        Normal compliance ``1/(pi E*)`` [1/Pa].
-    lambda_2
-        Coupling of normal and tangential displacements, ``beta*lambda_1`` [1/Pa].
-    lambda_5
-        Additional tangential compliance, ``gamma*lambda_1`` [1/Pa].
+    ``lambda_1`` is the normal compliance ``1/(pi E*)``, ``lambda_2`` is the coupling of normal and tangential
+    displacements, ``beta*lambda_1``, and ``lambda_5`` is the additional tangential compliance,
+    ``gamma*lambda_1``, all in 1/Pa.
     """
 
     lambda_1: float
@@ -111,7 +82,7 @@ class ElasticPair:
     lambda_5: float
 
     def __post_init__(self) -> None:
-        one, two, five = (number(getattr(self, f"lambda_{k}"), f"lambda_{k}") for k in (1, 2, 5))
+        one, two, five = checked(**vars(self))
         if not (0 < one < np.inf and abs(two) < one and -one < five < np.inf):
             raise DeckError(
                 f"lambda_1, lambda_2, lambda_5 = {one:g}, {two:g}, {five:g}: expected finite numbers with "
@@ -128,22 +99,13 @@ class ElasticPair:
     ) -> ElasticPair:
         """Return the constants of two materials; ``None`` for both numbers of a body means rigid.
 
-        Parameters
-        ----------
-        young_modulus_1, young_modulus_2
-            Young's moduli [Pa].
-        poisson_ratio_1, poisson_ratio_2
-            Poisson's ratios, above -1 and at most 0.5.
-
-        Raises
-        ------
-        DeckError
-            A number out of its range, or two rigid bodies.
+        Young's moduli are in Pa, Poisson's ratios above -1 and at most 0.5. DeckError for a number out of its
+        range, or two rigid bodies.
         """
         bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
         constants = flat.elastic_constants(
-            [0.0 if young is None else number(young, "young_modulus") for young, _ in bodies],
-            [0.0 if poisson is None else number(poisson, "poisson_ratio") for _, poisson in bodies],
+            [0.0 if young is None else checked(young_modulus=young)[0] for young, _ in bodies],
+            [0.0 if poisson is None else checked(poisson_ratio=poisson)[0] for _, poisson in bodies],
             [young is None for young, _ in bodies],
         )
         return cls(*constants)
@@ -171,36 +133,21 @@ class ElasticPair:
 class FlexibilityOperator(Handle):
     """Operator from tractions on the lattice to relative surface displacements.
 
-    Parameters
-    ----------
-    lattice
-        Lattice and window.
-    pair
-        Elastic constants.
-    method
-        ``"fft"`` for convolutions, ``"direct"`` for an explicit matrix.
-    threads
-        Threads to use; 0: the default of OpenMP.
+    The method is ``"fft"`` for convolutions, or ``"direct"`` for an explicit matrix; with 0 threads it takes
+    the default of OpenMP.
     """
 
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
         self.lattice = lattice
-        self._create(flat.create_operator, method_code(method), lattice, pair, thread_count(threads))
+        self._create(flat.create_operator, method_code(method), lattice, pair, *checked(threads=threads))
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return the closing of the gap and the displacement of body 1 over body 2 along x and y.
+        """Return the closing of the gap and the displacement of body 1 over body 2 along x and y (m).
 
-        Parameters
-        ----------
-        pressure, traction_x, traction_y
-            Tractions on body 1, shape ``(n_row, n_col)`` [Pa]; an absent one is zero.
-
-        Returns
-        -------
-        tuple of ndarray
-            ``(w, s_x, s_y)``, shape ``(n_row, n_col)`` each [m].
+        Tractions on body 1 (Pa) have the shape ``(n_row, n_col)``, and so have the results; an absent one is
+        zero.
         """
         zero = np.zeros(self.lattice.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
@@ -245,13 +192,15 @@ class Contact(Handle):
         rim_warning: bool,
     ) -> None:
         self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
-        self._mask = checked_mask(candidate, lattice)
+        self._mask: Mask = np.ones(lattice.shape, dtype=bool)
+        if candidate is not None:
+            self._mask = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
         self._gap = shaped(initial_gap, lattice, "initial_gap")
 
     @property
     def _surfaces(self) -> tuple[Any, ...]:
         """Lattice, materials, gap and nodes that can touch, for the core; the gap of others is 0."""
-        gap = checked_field(np.where(self._mask, self._gap, 0.0), self.lattice, "initial_gap")
+        gap = _finite(np.where(self._mask, self._gap, 0.0), "initial_gap")
         return self.lattice, self._pair, gap, self._mask
 
     def called(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
@@ -318,7 +267,7 @@ class NormalContact(Contact):
         interface: Interface = UNILATERAL,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        given = *self._surfaces, checked_interface(interface), thread_count(threads)
+        given = *self._surfaces, *checked(interface=interface, threads=threads)
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -329,33 +278,16 @@ class NormalContact(Contact):
         tolerance: float = 1e-8,
         max_sweeps: int = 200,
     ) -> NormalSolution:
-        """Solve for a normal load or for an approach.
+        """Solve for a normal load (N), not negative, or for an approach of the remote parts (m).
 
-        Parameters
-        ----------
-        normal_load
-            Load that presses the bodies together, not negative [N].
-        approach
-            Approach of the remote parts instead [m].
-        tolerance
-            Bound of the residuals.
-        max_sweeps
-            Iterations on each lattice at most (direct: active sets).
-
-        Returns
-        -------
-        NormalSolution
-            Check ``converged``, since other solutions are returned, too, and ``touches_rim``.
+        Residuals are at most `tolerance`; iterations on each lattice (direct: active sets) are at most
+        `max_sweeps`. Check ``converged``, since other solutions are returned, too, and ``touches_rim``.
         """
         if (normal_load is None) == (approach is None):
             raise DeckError("expected either a normal load or an approach")
-        if normal_load is not None:
-            kind = "a number not below zero"
-            control, target = 1, number(normal_load, "normal_load", kind, lambda load: 0 <= load < np.inf)
-        else:
-            control, target = 2, number(approach, "approach", fits=np.isfinite)
-        checked_tolerance(tolerance)
-        limits = tolerance, integer(max_sweeps, "max_sweeps")
+        driven = {"approach": approach} if normal_load is None else {"normal_load": normal_load}
+        target, *limits = checked(**driven, tolerance=tolerance, max_sweeps=max_sweeps)
+        control = 2 if normal_load is None else 1
         solution = self._found(NormalSolution, self.called(flat.press, control, target, *limits))
         solution.gap[~self._mask] += self._gap[~self._mask]
         self._warn_of_rim(solution)
@@ -374,11 +306,11 @@ def memory_needed(
     """Return the memory (bytes) of a frictionless problem on a window."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.normal_memory(*window, code, thread_count(threads)))
+    return int(flat.normal_memory(*window, code, *checked(threads=threads)))
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:
     """Return method, extent and number of nodes in contact as the core takes them."""
-    extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
+    extent = [*checked(n_col=n_col, n_row=n_row)]
     nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
     return method_code(method), extent, nodes

@@ -68,20 +68,9 @@ class TractionField:
     """Pressure and shear traction of a contact over the plane.
 
     They vanish like square roots at the edge of the contact, and the reserve of friction does at the edge of
-    the stick area, both between the nodes; elsewhere they are linear.
-
-    Parameters
-    ----------
-    parts : ndarray, shape (5 or 11, n_row, n_col)
-        The field as the core holds it.
-    nodes : Nodes
-        Its nodes.
-    friction : FrictionLaw
-        Law of friction at them.
-    source : str
-        See below.
-    whole : tuple, optional
-        Shape of the window, and rows and columns of the field in it, if it is a part.
+    the stick area, both between the nodes; elsewhere they are linear. `parts` is the field as the core holds
+    it, on `nodes`; `whole` has the shape of the window, and rows and columns of the field in it, if it is a
+    part.
 
     Attributes
     ----------

@@ -2,6 +2,7 @@
 
 A history has the shape (..., times, 6): xx, yy, zz, xy, yz, xz, tension positive, one closed cycle. Results
 have the shape of the points, the axes before the last two. docs/fatigue.md has definitions and sources.
+Numbers are in SI; a history that is empty or not finite, or a number out of its range, is a `DeckError`.
 
 Examples
 --------
@@ -18,12 +19,12 @@ Tension and pressure of 200 MPa in turn, for Smith, Watson & Topper: sigma^2/E o
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, number, reals
+from ..arrays import Array, checked, number, numbers, positive, reals
 from ..errors import DeckError
 from . import flat
 
@@ -38,6 +39,9 @@ __all__ = [
     "ruiz",
     "smith_watson_topper",
 ]
+
+
+_RATIO: Any = ("a number above -1 and at most 0.5", lambda found: -1.0 < found <= 0.5)
 
 
 class CriticalPlane(NamedTuple):
@@ -61,90 +65,50 @@ class Ruiz(NamedTuple):
 
 
 def smith_watson_topper(stress: ArrayLike, young_modulus: float, poisson_ratio: float) -> CriticalPlane:
-    """Return the largest sigma_n,max times half the range of normal strain [Pa].
-
-    Parameters
-    ----------
-    stress : array_like, shape (..., times, 6)
-        Stress of one cycle [Pa].
-    young_modulus : float
-        E [Pa].
-    poisson_ratio : float
-        Poisson's ratio.
-
-    Raises
-    ------
-    DeckError
-        If the history is empty or not finite, or a number is out of its range.
-    """
-    moduli = _positive(young_modulus, "young_modulus"), _ratio(poisson_ratio)
+    """Return the largest sigma_n,max times half the range of normal strain [Pa]; moduli are E and nu."""
+    moduli = positive(young_modulus, "young_modulus"), number(poisson_ratio, "poisson_ratio", *_RATIO)
     return CriticalPlane(*flat.smith_watson_topper(_history(stress, 6), *moduli))
 
 
 def findley(stress: ArrayLike, slope: float) -> CriticalPlane:
-    """Return the largest tau_a + slope sigma_n,max [Pa]; see `smith_watson_topper` for the history.
+    """Return the largest tau_a + slope sigma_n,max [Pa].
 
-    Parameters
-    ----------
-    stress : array_like, shape (..., times, 6)
-        Stress of one cycle [Pa].
-    slope : float
-        Influence of the normal stress, 0.2 to 0.4 for ductile metals.
+    The slope is the influence of the normal stress, 0.2 to 0.4 for ductile metals.
     """
-    return CriticalPlane(*flat.findley(_history(stress, 6), _finite(slope)))
+    return CriticalPlane(*flat.findley(_history(stress, 6), *checked(slope=slope)))
 
 
 def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_stress: float) -> CriticalPlane:
-    """Return the largest (tau_a/G)(1 + slope sigma_n,max/sigma_y); see `smith_watson_topper` for the history.
+    """Return the largest (tau_a/G)(1 + slope sigma_n,max/sigma_y).
 
-    Parameters
-    ----------
-    stress : array_like, shape (..., times, 6)
-        Stress of one cycle [Pa].
-    slope : float
-        Influence of the normal stress.
-    shear_modulus, yield_stress : float
-        G and sigma_y [Pa].
+    The slope is the influence of the normal stress; G and sigma_y are the shear modulus and the yield stress.
     """
-    moduli = _positive(shear_modulus, "shear_modulus"), _positive(yield_stress, "yield_stress")
-    return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), _finite(slope), *moduli))
+    moduli = checked(shear_modulus=shear_modulus, yield_stress=yield_stress)
+    return CriticalPlane(*flat.fatemi_socie(_history(stress, 6), *checked(slope=slope), *moduli))
 
 
 def crossland(stress: ArrayLike, slope: float) -> Array:
-    """Return sqrt(J2,a) + slope sigma_h,max [Pa]; see `smith_watson_topper` for the history.
+    """Return sqrt(J2,a) + slope sigma_h,max [Pa].
 
-    Parameters
-    ----------
-    stress : array_like, shape (..., times, 6)
-        Stress of one cycle [Pa].
-    slope : float
-        Influence of the hydrostatic stress: (t - b/sqrt(3))/(b/3) from the limits of torsion t and bending b.
+    The slope is the influence of the hydrostatic stress: (t - b/sqrt(3))/(b/3) from the limits of torsion t
+    and bending b.
     """
-    return np.asarray(flat.crossland(_history(stress, 6), _finite(slope)))
+    return np.asarray(flat.crossland(_history(stress, 6), *checked(slope=slope)))
 
 
 def dang_van(stress: ArrayLike, slope: float) -> Array:
-    """Return the largest tau(t) + slope sigma_h(t) [Pa]; see `smith_watson_topper` for the history.
+    """Return the largest tau(t) + slope sigma_h(t) [Pa].
 
-    Parameters
-    ----------
-    stress : array_like, shape (..., times, 6)
-        Stress of one cycle [Pa].
-    slope : float
-        Influence of the hydrostatic stress: 3 (t/b - 1/2) from the limits of torsion t and bending b.
+    The slope is the influence of the hydrostatic stress: 3 (t/b - 1/2) from the limits of torsion t and
+    bending b.
     """
-    return np.asarray(flat.dang_van(_history(stress, 6), _finite(slope)))
+    return np.asarray(flat.dang_van(_history(stress, 6), *checked(slope=slope)))
 
 
 def ruiz(traction: ArrayLike, slip: ArrayLike, stress: ArrayLike) -> Ruiz:
-    """Return the fretting parameters of Ruiz.
+    """Return the fretting parameters of Ruiz, by the stress at the surface.
 
-    Parameters
-    ----------
-    traction, slip : array_like, shape (..., times, 2)
-        Shear traction [Pa] and slip [m] along x and y.
-    stress : array_like, shape (..., times, 6)
-        Stress at the surface [Pa].
+    Shear traction and slip along x and y have the shape (..., times, 2).
     """
     q, s, history = _history(traction, 2), _history(slip, 2), _history(stress, 6)
     if not q.shape[:-1] == s.shape[:-1] == history.shape[:-1]:
@@ -157,26 +121,11 @@ def life(
 ) -> Array:
     """Return the life in cycles at a value of the parameter of Smith, Watson & Topper.
 
-    Parameters
-    ----------
-    value : array_like
-        sigma_n,max times half the range of normal strain [Pa].
-    young_modulus, strength : float
-        E and sigma_f' [Pa].
-    b, c : float
-        Exponents of strength and ductility, below zero.
-    ductility : float
-        eps_f'.
-
-    Returns
-    -------
-    ndarray
-        Cycles; inf beyond 1e30, 0 below one half, NaN for NaN.
+    Moduli are E and sigma_f'; b and c, below zero, are the exponents of strength and ductility, eps_f' is the
+    ductility. Cycles are inf beyond 1e30, 0 below one half, NaN for NaN.
     """
     names = {"young_modulus": young_modulus, "strength": strength, "b": b, "ductility": ductility, "c": c}
-    return np.asarray(
-        flat.life(reals(value, "value"), **{name: number(v, name) for name, v in names.items()})
-    )
+    return np.asarray(flat.life(reals(value, "value"), **numbers(names)))
 
 
 def _history(history: ArrayLike, components: int) -> Array:
@@ -187,16 +136,3 @@ def _history(history: ArrayLike, components: int) -> Array:
             f"a history of shape {array.shape}: expected (..., times, {components}), a time or more"
         )
     return array
-
-
-def _finite(slope: float) -> float:
-    return number(slope, "slope", "a finite number", np.isfinite)
-
-
-def _positive(value: float, name: str) -> float:
-    return number(value, name, "a positive number", lambda found: 0.0 < found < np.inf)
-
-
-def _ratio(value: float) -> float:
-    kind = "a number above -1 and at most 0.5"
-    return number(value, "poisson_ratio", kind, lambda found: -1.0 < found <= 0.5)

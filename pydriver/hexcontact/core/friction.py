@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, has_entries, integer, number, reals, word
+from ..arrays import Array, checked, has_entries, numbers, reals
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
 from . import flat
@@ -24,11 +24,8 @@ from .contact import (
     Method,
     NormalSolution,
     checked_field,
-    checked_interface,
-    checked_tolerance,
     method_code,
     shaped,
-    thread_count,
     window_size,
 )
 from .flat import AdaptiveSteps
@@ -88,33 +85,12 @@ class FrictionLaw:
 class ContactState(NormalSolution):
     """The end of a load step, from which the next one starts.
 
-    Arrays have the shape ``(n_row, n_col)``; names are those of `hexcontact.variables`.
+    Arrays over the nodes, numbers and their units are those of `hexcontact.variables` by their names; a zone
+    is 0 separated, 1 stick, 2 slip. ``residual_tangential`` is for the slip of the whole step, and may be
+    above the tolerance after halving.
 
     Attributes
     ----------
-    pressure, traction_x, traction_y : ndarray
-        Tractions on body 1 [Pa].
-    gap : ndarray
-        Gap [m].
-    relative_displacement_x, relative_displacement_y : ndarray
-        Displacement of body 1 relative to body 2, less the rigid motion [m].
-    slip_increment_x, slip_increment_y, accumulated_slip : ndarray
-        Slip of the step, and length of the whole slip path [m].
-    dissipation_density : ndarray
-        Dissipated energy by area [J/m2].
-    zone : ndarray of int8
-        0 separated, 1 stick, 2 slip.
-    normal_load, tangential_load_x, tangential_load_y, torque : float
-        Resultants of the tractions [N], [N m].
-    approach, shift_x, shift_y, twist : float
-        Rigid motions of the remote parts [m], [rad].
-    bulk_strain_xx, bulk_strain_yy, bulk_strain_xy : float
-        Bulk strain of body 1 less that of body 2.
-    dissipated_energy, dissipated_energy_path_error : float
-        Dissipated energy, and bound on its error by the size of the load steps [J].
-    residual_normal, residual_tangential, residual_force, residual_shear_force, residual_torque : float
-        Residuals of the contact conditions and of the prescribed loads. That of the friction conditions is
-        for the slip of the whole step, and may be above the tolerance after halving.
     converged : bool
         All residuals are within the tolerance, in each part of a step that was halved.
     sliding : bool
@@ -125,8 +101,6 @@ class ContactState(NormalSolution):
         Reason why the solver stopped; empty if it converged.
     sweeps, cuts : int
         Number of active sets, and of halvings of the step.
-    operator_applications : float
-        All work of the step, in applications of the full operator.
     """
 
     traction_x: Array
@@ -162,14 +136,8 @@ class FrictionalContact(Contact):
 
     Parameters
     ----------
-    lattice
-        Lattice and window of the nodes that may come into contact.
-    pair
-        Elastic constants.
-    initial_gap
-        Gap before loading, shape ``(n_row, n_col)`` [m].
-    candidate
-        False where a node cannot touch, shape ``(n_row, n_col)``; default: all can.
+    lattice, pair, initial_gap, candidate, method, threads, interface, rim_warning
+        As of `NormalContact`.
     friction_coefficient
         Coefficient of friction mu, at least 0; ``inf``: no slip; or one for each node, ``(n_row, n_col)``;
         or a `FrictionLaw`.
@@ -177,18 +145,8 @@ class FrictionalContact(Contact):
         Bound of the shear traction, which is at most ``min(mu * pressure, shear_limit)`` [Pa].
     coupling
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
-    method
-        ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
     iteration
         Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
-    threads
-        Threads to use; 0: the default of OpenMP.
-    interface
-        Coefficient c [Pa/m^m] and exponent m of a compliant interface, p = c (-gap)^m, and the stiffness of
-        its tangential springs [Pa/m], 0 without them; default: bodies do not penetrate.
-    rim_warning
-        Warn (`hexcontact.RimWarning`) of a solution with contact at the rim of the window, unless all
-        nodes touch that can and others cannot: the body ends there, like a punch.
     """
 
     def __init__(
@@ -209,18 +167,17 @@ class FrictionalContact(Contact):
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
         law = _checked_law(friction_coefficient, shear_limit, lattice)
-        word(coupling, "coupling", ("full", "goodman"))
-        self._create(
-            *(flat.create_sheared, method_code(method, iteration), *self._surfaces, law),
-            *(checked_interface(interface), coupling == "goodman", thread_count(threads)),
-        )
+        _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
+        given = *self._surfaces, law, springs, coupling == "goodman", count
+        self._create(flat.create_sheared, method_code(method, iteration), *given)
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
-        # not copies of one array: zeros that are not written take no memory
-        fields: dict[str, Any] = {name: np.zeros(self.lattice.shape) for name in _FIELDS}
-        fields["gap"] = np.where(self._mask, self._gap, np.nan)
-        return ContactState(**fields, zone=np.zeros(self.lattice.shape, np.int8))
+        gap, zero = np.where(self._mask, self._gap, 0.0), np.broadcast_to(0.0, self.lattice.shape)
+        held = HeldState.copied(dict.fromkeys(_FIELDS, zero) | {"gap": gap, "zone": zero}, {})
+        fields: dict[str, Any] = {name: held.view(name) for name in _FIELDS}
+        zone = np.zeros(self.lattice.shape, np.int8)
+        return self._masked(ContactState(**fields, zone=zone).behind(held))
 
     def advance(
         self,
@@ -273,21 +230,18 @@ class FrictionalContact(Contact):
         known = isinstance(control, list | tuple) and len(control) == 4
         if not known or not all(isinstance(kind, str) and kind in CONTROLS for kind in control):
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
-        targets = reals(value, "value")
-        if targets.shape != (4,) or not np.isfinite(targets).all():
-            raise DeckError(f"value = {value!r}: expected four finite numbers")
+        targets, _, *limits = checked(
+            value=value, entry=entry, tolerance=tolerance, max_sweeps=max_sweeps, max_cuts=max_cuts
+        )
         if control[0] == "force" and targets[0] < 0:
             raise DeckError(f"normal_load = {targets[0]:g}: expected a number not below zero")
         kept = [getattr(state, name) for name in BULK_STRAIN]
         strain = reals(kept if bulk_strain is None else bulk_strain, "bulk_strain", (3,))
-        word(entry, "entry", ("implicit", "interpolated"))
-        checked_tolerance(tolerance)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
         handle = self.called(
             *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
-            *(entry == "interpolated", tolerance),
-            *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts"), self._held(state)),
+            *(entry == "interpolated", *limits, self._held(state)),
         )
         found = self.solution(handle)
         self._warn_of_rim(found)
@@ -299,7 +253,9 @@ class FrictionalContact(Contact):
 
     def solution(self, handle: int) -> ContactState:
         """Return the state of a handle, whose gap is NaN where the bodies cannot touch."""
-        found = self._found(ContactState, handle)
+        return self._masked(self._found(ContactState, handle))
+
+    def _masked(self, found: ContactState) -> ContactState:
         if self._mask.all():
             return found
         gap = np.where(self._mask, found.gap, np.nan)
@@ -335,23 +291,16 @@ class FrictionalContact(Contact):
         """Return a state in the memory of the core, which is no copy if it was found there."""
         if state.known is not None and state.pressure.shape == self.lattice.shape:
             return state.known
-        numbers = {name: number(getattr(state, name), name) for name in CORE["numbers"]}
+        known = numbers({name: getattr(state, name) for name in CORE["numbers"]})
         gap = np.where(self._mask, shaped(state.gap, self.lattice, "gap"), 0.0)
         given = {name: getattr(state, name) for name in _FIELDS} | {"gap": gap}
         fields = {name: checked_field(values, self.lattice, name) for name, values in given.items()}
-        return HeldState.copied({**fields, "zone": np.asarray(state.zone)}, numbers)
+        return HeldState.copied({**fields, "zone": np.asarray(state.zone)}, known)
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
-        """Return a state of a smaller window on the window of this problem.
+        """Return a state of a smaller window, `lattice`, on the window of this problem.
 
         At new nodes the relative displacement follows from the tractions and the rigid motions.
-
-        Parameters
-        ----------
-        state
-            State on the smaller window.
-        lattice
-            The smaller window.
         """
         start = state.held
         handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
@@ -365,14 +314,13 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
     if isinstance(coefficient, FrictionLaw):
         law = _checked_law(coefficient.coefficient, coefficient.shear_limit, lattice)
         return dataclasses.replace(coefficient, coefficient=law.coefficient)
-    number(limit, "shear_limit", "a number above 0, or inf", lambda found: found > 0)
+    checked(shear_limit=limit)
     if has_entries(coefficient):
         mu = checked_field(coefficient, lattice, "friction_coefficient")
         if (mu < 0.0).any():
             raise DeckError(f"friction_coefficient: expected numbers of at least 0, not {mu.min():g}")
         return FrictionLaw(mu, limit)
-    kind = "a number of at least 0, or inf"
-    found = number(coefficient, "friction_coefficient", kind, lambda found: found >= 0)
+    [found] = checked(friction_coefficient=coefficient)
     return FrictionLaw(found, limit)
 
 
@@ -389,4 +337,4 @@ def memory_needed(
 ) -> int:
     """Return the memory (bytes) of a problem with friction on a window."""
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, unlike, thread_count(threads)))
+    return int(flat.friction_memory(*window, loads, coupled, unlike, *checked(threads=threads)))

@@ -1,7 +1,9 @@
 """Influence functions: integrals and displacements of triangle loads, kernels of the pyramid.
 
 Points may be arrays of any shapes that broadcast; results have the common shape. z points into the body, and
-displacements are those of its surface. Equation and table numbers are those of the dissertation.
+displacements are those of its surface. Equation and table numbers are those of the dissertation. Arguments
+that are not finite, out of range or of the wrong shape raise `DeckError`: vertices are the corners (xi, eta)
+of a triangle, shape (3, 2); x, y, z are the points, z >= 0 below the surface; nu is in (-1, 0.5].
 
 Examples
 --------
@@ -105,26 +107,7 @@ def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k
     The field point may be inside, outside, on an edge or its prolongation, or at a vertex. The error is
     below 1e-13 of the bound I_100 d^(k+m+1-j), d the distance of the farthest vertex, from 0 to 1e5
     triangle sizes away and for slivers, too. The order of the vertices does not matter; a triangle without
-    area gives 0.
-
-    Parameters
-    ----------
-    vertices : array_like, shape (3, 2)
-        Corners (xi, eta) of the triangle.
-    x, y : array_like
-        Field points.
-    j, k, m : int
-        Exponents: j = 1, 2, 3 and k, m >= 0 with 1 <= k + m + 2 - j <= 3.
-
-    Returns
-    -------
-    ndarray
-        Integrals, in the unit of length to the power k + m + 2 - j.
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number, has the wrong shape or is out of range.
+    area gives 0. The exponents are j = 1, 2, 3 and k, m >= 0 with 1 <= k + m + 2 - j <= 3.
 
     Examples
     --------
@@ -148,32 +131,16 @@ def triangle_displacement(
     shear_modulus: float,
     poisson_ratio: float,
 ) -> Displacement:
-    """Return the displacement by one of the loads of Tables 4.1 and 4.2 on a triangle.
+    """Return the displacement [m] by one of the loads of Tables 4.1 and 4.2 on a triangle, lengths in m.
 
     Parameters
     ----------
-    vertices : array_like, shape (3, 2)
-        Corners (xi, eta) of the triangle [m].
-    x, y : array_like
-        Field points [m].
     load : {"constant", "linear_x", "linear_y", "bilinear"}
         Load 1, x - xi, y - eta or (x - xi)(y - eta), in Pa with lengths in m.
     direction : {"normal", "x", "y"}
         Direction of the load; "normal" presses into the body.
-    shear_modulus : float
-        G of the body [Pa].
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5].
-
-    Returns
-    -------
-    Displacement
-        Along x, y and z [m].
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number, has the wrong shape or is out of range.
+    shear_modulus, poisson_ratio : float
+        G [Pa] and nu of the body.
     """
     k, m = _DEGREES[word(load, "load", _DEGREES)]
     found = flat.triangle_displacement(
@@ -198,30 +165,10 @@ def linear_load_displacement(
     shear_modulus: float,
     poisson_ratio: float,
 ) -> Displacement:
-    """Return the displacement by tractions that vary linearly over a triangle.
+    """Return the displacement [m] by tractions that vary linearly over a triangle.
 
-    Parameters
-    ----------
-    vertices : array_like, shape (3, 2)
-        Corners (xi, eta) of the triangle [m].
-    x, y : array_like
-        Field points [m].
-    traction : array_like, shape (3, 3)
-        For each corner the traction along x, along y and into the body [Pa].
-    shear_modulus : float
-        G of the body [Pa].
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5].
-
-    Returns
-    -------
-    Displacement
-        Along x, y and z [m].
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number, has the wrong shape or is out of range.
+    The tractions, shape (3, 3), are those along x, along y and into the body [Pa] at each corner; others as
+    of `triangle_displacement`.
     """
     loads = reals(traction, "traction", (3, 3), ": x, y, z at each corner")
     moduli = number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")
@@ -230,50 +177,17 @@ def linear_load_displacement(
 
 
 def pyramid_kernels(x: ArrayLike, y: ArrayLike) -> PyramidKernels:
-    """Return the five kernels of the unit pyramid of the equilateral lattice.
+    """Return the five kernels of the unit pyramid of the equilateral lattice, all in spacings.
 
     The pyramid is 1 at the origin and falls linearly to 0 at the hexagon with corners at distance 1 in the
     directions 0, 60, ..., 300 degrees. For a spacing l_e the kernels are l_e K(x/l_e, y/l_e). The error stays
     below 1e-13 of K1, which bounds all five, from 0 to 1e5 spacings.
-
-    Parameters
-    ----------
-    x, y : array_like
-        Field points relative to the node, in spacings.
-
-    Returns
-    -------
-    PyramidKernels
-        K1, Kxx, Kxy, Kx, Ky, in spacings.
-
-    Raises
-    ------
-    DeckError
-        If a coordinate is not a finite number, or the shapes do not broadcast.
     """
     return PyramidKernels(*_components(flat.pyramid_kernels(*_points(x=x, y=y))))
 
 
 def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> PyramidFunctions:
-    """Return the nine functions C, D, ..., K of Table 8.1.
-
-    Parameters
-    ----------
-    x, y : array_like
-        Field points relative to the node, in spacings.
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5]; G and K depend on it.
-
-    Returns
-    -------
-    PyramidFunctions
-        C, D, E, F, G, H, I, J, K, in spacings.
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number or out of range, or the shapes do not broadcast.
-    """
+    """Return the nine functions C, D, ..., K of Table 8.1, in spacings; G and K depend on nu."""
     nu = number(poisson_ratio, "poisson_ratio")
     if not -1.0 < nu <= 0.5:
         raise DeckError(f"poisson_ratio = {nu:g}: a number above -1 and at most 0.5 expected")
@@ -305,28 +219,11 @@ def pressure_errors(nodes_in_radius: float) -> tuple[float, float]:
 
 
 def pyramid_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float) -> Array:
-    """Return the stress below the surface by the unit pyramid of the equilateral lattice.
+    """Return the stress below the surface by the unit pyramid of the equilateral lattice, in spacings.
 
     The error is below 1e-12 of the envelope 1/(2 pi max(1, R)^2), R the distance from the node, up to 1e5
-    spacings.
-
-    Parameters
-    ----------
-    x, y, z : array_like
-        Points relative to the node, in spacings; z >= 0 points into the body.
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5].
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 6)
-        By a pressure and by tractions along x and y on the body, each 1 at the node: components xx, yy, zz,
-        xy, yz, xz, positive in tension.
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number or out of range, or the shapes do not broadcast.
+    spacings. The result has the shape (..., 3, 6): by a pressure and by tractions along x and y on the body,
+    each 1 at the node, the components xx, yy, zz, xy, yz, xz, positive in tension.
     """
     return np.asarray(flat.pyramid_fields(*_points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[1])
 
@@ -347,32 +244,11 @@ def triangle_stress(
     poisson_ratio: float,
     load: ArrayLike = (1.0, 1.0, 1.0),
 ) -> Array:
-    """Return the stress below the surface by a linear load on a triangle.
+    """Return the stress below the surface by a linear load on a triangle, ``load`` at its corners.
 
     The load ends at the edges; on them, at z = 0, some stresses are infinite, and the result is meaningful
-    only in a sum over triangles with continuous loads.
-
-    Parameters
-    ----------
-    vertices : array_like, shape (3, 2)
-        Corners of the triangle.
-    x, y, z : array_like
-        Points; z >= 0 points into the body.
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5].
-    load : array_like, shape (3,)
-        The load at the corners.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 6)
-        By the load as a pressure, and as a traction along x and y on the body: components as of
-        `pyramid_stress`.
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number or out of range, or the shapes do not broadcast.
+    only in a sum over triangles with continuous loads. The result has the shape (..., 3, 6): by the load as a
+    pressure, and as a traction along x and y on the body, components as of `pyramid_stress`.
     """
     return _triangle_below(vertices, load, poisson_ratio, x=x, y=y, z=z)[1]
 
@@ -395,28 +271,10 @@ def triangle_displacement_below(
 def mesh_stress(
     vertices: ArrayLike, tractions: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float
 ) -> Array:
-    """Return the stress below the surface by tractions on any set of triangles.
+    """Return the stress below the surface by tractions on any set of triangles, vertices of shape (n, 3, 2).
 
-    Parameters
-    ----------
-    vertices : array_like, shape (n, 3, 2)
-        Corners of the triangles.
-    tractions : array_like, shape (n, 3, 3)
-        At each corner the pressure, and the tractions along x and y on the body; linear on each triangle.
-    x, y, z : array_like
-        Points; z >= 0 points into the body.
-    poisson_ratio : float
-        nu of the body, in (-1, 0.5].
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
-        Components as of `pyramid_stress`.
-
-    Raises
-    ------
-    DeckError
-        If an argument is not a finite number or out of range, or the shapes do not fit.
+    The tractions, shape (n, 3, 3), are at each corner the pressure, and the tractions along x and y on the
+    body, linear on each triangle. The result has the shape (..., 6), components as of `pyramid_stress`.
     """
     return _mesh_below(vertices, tractions, poisson_ratio, x=x, y=y, z=z)[1]
 

@@ -48,15 +48,7 @@ _NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of
 
 
 class Statistics(NamedTuple):
-    """Content and use of the cache of this process.
-
-    Attributes
-    ----------
-    memory : int
-        Bytes of the cached spectra in memory, with those in use.
-    found, read, made : int
-        Spectra that were found in memory, read from the folder, and computed.
-    """
+    """Bytes of the spectra in memory, with those in use, and how many were found there, read, and made."""
 
     memory: int
     found: int
@@ -86,7 +78,9 @@ def configure(
 ) -> None:
     """Set the cache of this process; settings that are not given do not change.
 
-    Processes that it starts, such as those of a study, use the environment.
+    Processes that it starts, such as those of a study, use the environment. A value that is no number of
+    bytes is a `DeckError`; a folder that cannot be used is a `KernelFolderWarning`, and spectra stay in
+    memory.
 
     Parameters
     ----------
@@ -99,20 +93,12 @@ def configure(
     folder_shared : bool, optional
         Accept a folder, and files in it, that other users can write.
 
-    Raises
-    ------
-    DeckError
-        If a value is no number of bytes.
-
-    Warns
-    -----
-    KernelFolderWarning
-        If the folder cannot be used; spectra are cached in memory only.
-
     Examples
     --------
     >>> from hexcontact import kernel_cache
     >>> kernel_cache.configure(memory="1 GB")
+    >>> kernel_cache.statistics().memory <= 1e9
+    True
     """
     bound = None if memory is None else _bytes(memory, "memory")
     size = None if folder_size is None else _bytes(folder_size, "folder_size")
@@ -146,14 +132,7 @@ def clear() -> None:
 
 
 def statistics() -> Statistics:
-    """Return content and use of the cache of this process.
-
-    Examples
-    --------
-    >>> from hexcontact import kernel_cache
-    >>> kernel_cache.statistics().memory <= 256e6
-    True
-    """
+    """Return content and use of the cache of this process."""
     return Statistics(*flat.kernel_statistics())
 
 

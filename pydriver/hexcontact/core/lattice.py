@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Mask, integer, number, reals
+from ..arrays import Array, Mask, checked
 from ..errors import DeckError
 from . import flat
-
-_LENGTH = "a positive length in meters"
 
 
 class Nodes(NamedTuple):
@@ -83,17 +81,7 @@ class Lattice:
     periodic: bool = False
 
     def __post_init__(self) -> None:
-        if not 0 < number(self.spacing, "spacing", _LENGTH) < np.inf:
-            raise DeckError(f"spacing = {self.spacing!r}: expected {_LENGTH}")
-        number(self.cell_ratio, "cell_ratio", "a positive number", lambda ratio: 0 < ratio < np.inf)
-        kind = "an angle in radians between 0 and pi"
-        number(self.cell_angle, "cell_angle", kind, lambda angle: 0 < angle < np.pi)
-        number(self.direction, "direction", "an angle in radians", lambda angle: abs(angle) <= np.pi)
-        for name in ("row_first", "col_first", "n_row", "n_col"):
-            integer(getattr(self, name), name)
-        origin = reals(self.origin, "origin")
-        if origin.shape != (2,) or not np.isfinite(origin).all():
-            raise DeckError(f"origin = {self.origin!r}: expected two finite lengths in meters")
+        checked(**{name: value for name, value in vars(self).items() if name != "periodic"})
         if self.n_row < 1 or self.n_col < 1:
             raise DeckError(
                 f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"
@@ -111,23 +99,7 @@ class Lattice:
         cell_angle: float = math.pi / 3,
         direction: float = 0.0,
     ) -> Lattice:
-        """Return the smallest window whose parallelogram covers a rectangle.
-
-        Parameters
-        ----------
-        spacing
-            Distance of neighboring nodes along x [m].
-        center
-            Center of the rectangle [m].
-        length_x, length_y
-            Full sides of the rectangle [m].
-        origin
-            Position of node (0, 0) [m].
-        cell_ratio, cell_angle
-            Length of the second basis vector over that of the first, and its angle from it [rad].
-        direction
-            Angle of the first basis vector from x [rad].
-        """
+        """Return the smallest window whose parallelogram covers a rectangle of a center and sides [m]."""
         pattern = Pattern(origin, cell_ratio, cell_angle, direction)
         unit = pattern.window(spacing, 0, 0, 1, 1)
         half = 0.5 * np.array([length_x, length_y])
@@ -215,17 +187,7 @@ class Lattice:
         return replace(self, row_first=row, col_first=col, n_row=extent[1], n_col=extent[0])
 
     def embed(self, field: NDArray[np.generic], other: Lattice, fill: float = 0.0) -> NDArray[np.generic]:
-        """Return a field of this window on another one of the same lattice.
-
-        Parameters
-        ----------
-        field
-            Values over this window, shape ``(n_row, n_col)``.
-        other
-            The other window.
-        fill
-            Value at nodes outside this window.
-        """
+        """Return a field of this window on another one of the same lattice, whose other nodes are filled."""
         result = np.full(other.shape, fill, dtype=field.dtype)
         row, col = self.row_first - other.row_first, self.col_first - other.col_first
         top, left = max(row, 0), max(col, 0)
@@ -243,23 +205,8 @@ def linear(
 ) -> Array:
     """Interpolate values at the nodes of a lattice linearly on its triangles.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n_row, n_col)
-        Values at the nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
-    x, y : array_like
-        Points, m.
-    outside : float
-        Value at nodes outside the window.
-
-    Returns
-    -------
-    ndarray
-        Values at the points, in their shape.
+    `basis` has the basis vectors of the lattice as rows (m), `start` is the position of node [0, 0] (m), and
+    `outside` the value at nodes outside the window. The result has the shape of the points x, y (m).
     """
     nodes = Nodes(np.asarray(basis), start, np.shape(values))
     return np.asarray(flat.field_between_nodes(nodes, values, outside, x, y))

@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, DataFrame, Dataset
 from ..core import fatigue, memory
 from ..core.lattice import Lattice
 from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError
 from . import fields
 from .fields import Region, region
-from .stress import Fields, Loaded, NearSurface, add_bulk, source_of, summed, window_over
-
-if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
+from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, source_of, summed, window_over
 
 SLIPS = ("slip_increment_x", "slip_increment_y")
 _BLOCK = 1 << 27  # bytes of stress histories that are held at once, at least
@@ -155,14 +151,7 @@ def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple
             yield slice(start, start + len(block_of)), block_of
 
 
-def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
-    """Return fields (step, component, n_row, n_col) on a window that covers theirs."""
-    if whole == lattice:
-        return values
-    return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
-
-
-def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteria) -> xarray.Dataset:
+def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteria) -> Dataset:
     """Return fatigue parameters of a body."""
     import xarray
 
@@ -258,7 +247,7 @@ def _about(key: str, criteria: Criteria, moduli: Mapping[str, float]) -> dict[st
     return attributes | constants | _moduli_of("smith_watson_topper" if key == "life" else key, moduli)
 
 
-def tabulated(where: Region, part: slice, history: Array, numbers: Sequence[int]) -> pandas.DataFrame:
+def tabulated(where: Region, part: slice, history: Array, numbers: Sequence[int]) -> DataFrame:
     """Return histories as a table that pyLife takes: stresses in MPa by point and load step.
 
     The columns S11 ... S23 are those that pyLife expects; 1, 2, 3 stand for x, y, z.

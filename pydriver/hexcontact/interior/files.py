@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import netcdf_library
+from ..arrays import Dataset
 from ..deck.below import Fatigue, Stress
 from ..deck.read import recorded
 from ..errors import DeckError
 from ..files import reading, remove_stale, replacing
 from ..text import quantity
 from .stress import extremes_of, place_of
-
-if TYPE_CHECKING:
-    import xarray
-
 
 STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
 
@@ -39,7 +36,7 @@ def files_of(deck: str, output: Path) -> dict[str, Path]:
     return {name: output.with_name(f"{output.stem}_{name}.nc") for name in tables_of(deck)}
 
 
-def read_table(path: Path) -> xarray.Dataset | None:
+def read_table(path: Path) -> Dataset | None:
     """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
     if str(netcdf_library.attributes(path).get("content")) not in (STRESS, FATIGUE):
         return None
@@ -47,7 +44,7 @@ def read_table(path: Path) -> xarray.Dataset | None:
         return found.load()
 
 
-def readable_table(path: Path) -> xarray.Dataset | None:
+def readable_table(path: Path) -> Dataset | None:
     """Return the dataset of a file as `read_table`; None of a damaged one, too."""
     with contextlib.suppress(DeckError):
         return read_table(path)
@@ -83,7 +80,7 @@ def description(path: Path) -> list[str]:
     return [*lines, str(about["source"])]
 
 
-def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
+def write_netcdf(found: Dataset, target: Path) -> Path:
     """Write a dataset of stresses or fatigue parameters to a file, complete or not at all."""
     packed = {name: {"zlib": True, "complevel": 1} for name in found.data_vars}
     remove_stale(target)
@@ -92,7 +89,7 @@ def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
     return target
 
 
-def as_volume(found: xarray.Dataset) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+def as_volume(found: Dataset) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     """Return the points (n, 3) of one step, and their numbers along three directions, the last one fastest.
 
     z points into body 1, so that depths in body 2 are negative there.

@@ -9,12 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, integer
+from ..arrays import Array, DataArray, Dataset, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
 from ..core.edges import ContactEdges, TractionField, tractions_memory
@@ -30,16 +30,12 @@ from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS
 from . import fields
 from .fields import Region, region
 
-if TYPE_CHECKING:
-    import xarray
-
-
 _LEAST = ("life",)  # quantities whose least value counts
 _ALIKE = 1e-6  # share of a value within which others count as equal: the first of them is named
 _SHALLOW = 2.0  # depth in spacings down to which a value depends on the few nodes next to an edge
 
 
-def with_places(found: xarray.Dataset) -> xarray.Dataset:
+def with_places(found: Dataset) -> Dataset:
     """Give each quantity the attributes largest, largest_at and largest_step, life least and so on."""
     for name, field in found.data_vars.items():
         values = np.where(np.isfinite(field.values), field.values, np.nan)
@@ -55,9 +51,7 @@ def with_places(found: xarray.Dataset) -> xarray.Dataset:
     return found
 
 
-def with_errors(
-    found: xarray.Dataset, spacing: float, others: Sequence[tuple[float, xarray.Dataset]]
-) -> None:
+def with_errors(found: Dataset, spacing: float, others: Sequence[tuple[float, Dataset]]) -> None:
     """Give each quantity largest_error, life least_factor, by spacing and table of other lattices."""
     spacings = np.array([spacing, *(other for other, _ in others)]) / spacing
     for name, field in found.data_vars.items():
@@ -73,7 +67,7 @@ def with_errors(
         field.attrs |= {"least_factor": float(np.exp(error))} if name in _LEAST else {"largest_error": error}
 
 
-def _error_of(field: xarray.DataArray) -> str:
+def _error_of(field: DataArray) -> str:
     """Return the estimated error of the value that counts in words; empty if the file has none."""
     attributes = field.attrs
     error = float(attributes.get("least_factor", attributes.get("largest_error", 0.0)))
@@ -87,12 +81,12 @@ def _error_of(field: xarray.DataArray) -> str:
     return f" ± {percent(share) if share <= 1.0 else _worded(error, field)}"
 
 
-def _worded(value: float, field: xarray.DataArray) -> str:
+def _worded(value: float, field: DataArray) -> str:
     units = str(field.attrs.get("units", "")).removesuffix("1")
     return quantity(value, units) if " " not in units else f"{quantity(value)} {units}"
 
 
-def place_of(field: xarray.DataArray) -> str:
+def place_of(field: DataArray) -> str:
     """Return the value that counts and its place in words; empty if the file has none."""
     word = "least" if field.name in _LEAST else "largest"
     if (at := field.attrs.get(f"{word}_at")) is None:
@@ -103,7 +97,7 @@ def place_of(field: xarray.DataArray) -> str:
     return f"{word} {text} at x = {x}, y = {y}, depth {depth}" + (f", step {step}" if step else "")
 
 
-def extremes_of(found: xarray.Dataset) -> dict[str, dict[str, Any]]:
+def extremes_of(found: Dataset) -> dict[str, dict[str, Any]]:
     """Return the range of each quantity, and the place of the value that counts, for other programs."""
     return {
         str(name): {
@@ -138,15 +132,6 @@ _INVARIANTS = tuple(name for name in STRESSES if STRESSES[name].units == "Pa" an
 _DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
 
 
-def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
-    """Return the checked names of quantities; by default the six stresses and von Mises'."""
-    for name in components:
-        if not isinstance(name, str) or name not in STRESSES:
-            hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
-            raise DeckError(f"{name!r} is no quantity below the surface{hint}")
-    return tuple(components) or (*TENSOR, "von_mises_stress")
-
-
 def bodies_of(deck: str) -> Bodies:
     """Return the two bodies of a deck; none if the deck does not define them."""
     known = recorded(deck)
@@ -158,18 +143,6 @@ def bodies_of(deck: str) -> Bodies:
             "there is no stress to compute below the window of a full contact, which has no end"
         )
     return bodies.body_1, bodies.body_2
-
-
-def material(bodies: Bodies, body: int) -> tuple[float, float]:
-    """Return Poisson's ratio and shear modulus (Pa) of a body."""
-    if integer(body, "body") not in (1, 2):
-        raise DeckError(f"body = {body}: expected 1 or 2")
-    if not bodies:
-        raise NotInResult("the result does not say what the bodies are made of")
-    one = bodies[body - 1]
-    if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
-        raise NotInResult(f"body {body} is rigid: there is no stress to compute in it")
-    return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,40 +159,41 @@ class Loaded:
     @property
     def material(self) -> tuple[float, float]:
         """Poisson's ratio and shear modulus (Pa) of the body."""
-        return material(self.bodies, self.body)
+        if integer(self.body, "body") not in (1, 2):
+            raise DeckError(f"body = {self.body}: expected 1 or 2")
+        if not self.bodies:
+            raise NotInResult("the result does not say what the bodies are made of")
+        one = self.bodies[self.body - 1]
+        if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
+            raise NotInResult(f"body {self.body} is rigid: there is no stress to compute in it")
+        return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
 
     def tractions(self, source: str | None = None) -> tuple[Array, str]:
-        """Return the tractions of the steps, and their source."""
-        return tractions(self.lattice, self.steps, self.bodies, self.friction, source)
+        """Return the tractions (step, 3, n_row, n_col; Pa) of the steps, and their source."""
+        if source is not None and source not in SOURCES:
+            raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+        at_nodes = nodal_tractions(self.steps)
+        if (source or source_of(self.steps)) == "nodes":
+            return at_nodes, "nodes"
+        if missing := [name for name in EDGES if any(name not in step for step in self.steps)]:
+            raise NotInResult(
+                f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not "
+                "kept"
+            )
+        law = _law_of(self.friction)
+        constants = [(body.young_modulus, body.poisson_ratio) for body in self.bodies]
+        pair = ElasticPair.from_materials(*constants[0], *constants[1])
+        corrected = [
+            _edges(self.lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
+            for one, step in zip(at_nodes, self.steps, strict=True)
+        ]
+        return np.array(corrected), "edges"
 
 
 def nodal_tractions(steps: Sequence[Fields]) -> Array:
     """Return pressure and shear tractions of some steps as the core takes them, (step, 3, n_row, n_col)."""
     zero = np.zeros_like(np.asarray(steps[0]["pressure"], dtype=float))
     return np.array([[np.asarray(step.get(name, zero), dtype=float) for name in TRACTIONS] for step in steps])
-
-
-def tractions(
-    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, friction: float, source: str | None
-) -> tuple[Array, str]:
-    """Return the tractions (step, 3, n_row, n_col; Pa) of load steps, and their source."""
-    if source is not None and source not in SOURCES:
-        raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
-    at_nodes = nodal_tractions(steps)
-    if (source or source_of(steps)) == "nodes":
-        return at_nodes, "nodes"
-    if missing := [name for name in EDGES if any(name not in step for step in steps)]:
-        raise NotInResult(
-            f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
-        )
-    law = _law_of(friction)
-    constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
-    pair = ElasticPair.from_materials(*constants[0], *constants[1])
-    corrected = [
-        _edges(lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
-        for one, step in zip(at_nodes, steps, strict=True)
-    ]
-    return np.array(corrected), "edges"
 
 
 def _law_of(friction: float) -> FrictionLaw:
@@ -239,33 +213,33 @@ def _edges(lattice: Lattice, loads: Array, step: Fields) -> ContactEdges:
     return ContactEdges(loads[0], gap, touching, np.isfinite(gap), lattice.basis, lattice.start)
 
 
-def bulk_stresses(steps: Sequence[Fields], body: int) -> Array:
-    """Return the bulk stress of a body in some steps as three components xx, yy, xy, (step, 3)."""
-    return np.array(
-        [
-            [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for name in BULK_STRESS]
-            for step in steps
-        ]
-    )
-
-
 def below(
     loaded: Loaded,
     where: Mapping[str, Any],
     components: Sequence[str] = (),
     numbers: Sequence[int] | None = None,
     source: str | None = None,
-) -> xarray.Dataset:
+) -> Dataset:
     """Return quantities below the surface; without `numbers` of steps there is one, and no such dimension."""
     import xarray
 
     lattice, steps, body = loaded.lattice, loaded.steps, loaded.body
     found = region(lattice, **where)
-    names = chosen_components(components)
+    for name in components:
+        if not isinstance(name, str) or name not in STRESSES:
+            hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
+            raise DeckError(f"{name!r} is no quantity below the surface{hint}")
+    names = tuple(components) or (*TENSOR, "von_mises_stress")
     nu, shear_modulus = loaded.material
     loads, used = loaded.tractions(source)
     if found.lattice is None or summed(lattice, found):
-        moved, stress = _at_points(lattice, loads, body, nu, found)
+        memory.require(
+            memory_needed(lattice, found, len(loads)),
+            f"the stress at {found.count} points in {len(loads)} steps",
+            "choose fewer points or steps",
+        )
+        flat = fields.at_points(lattice, loads, body, nu, found.nodes)
+        moved, stress = (values.reshape(len(loads), *found.shape, -1) for values in flat)
     else:
         moved = np.empty((0, 3))
         if any(name in _DISPLACEMENTS for name in names):
@@ -294,10 +268,10 @@ def below(
 
 def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
     """Add the bulk stress of a body to the stress (step, ..., component) by its tractions, and return it."""
-    bulk = bulk_stresses(steps, body)
-    for k, name in enumerate(BULK_STRESS):
+    for name in BULK_STRESS:
+        bulk = [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for step in steps]
         component = TENSOR.index(name.removeprefix("bulk_"))
-        stress[..., component] += bulk[:, k].reshape(-1, *[1] * (stress.ndim - 2))
+        stress[..., component] += np.reshape(bulk, (-1, *[1] * (stress.ndim - 2)))
     return stress
 
 
@@ -364,18 +338,6 @@ def tractions_needed(
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 
-def _at_points(lattice: Lattice, loads: Array, body: int, nu: float, where: Region) -> tuple[Array, Array]:
-    """Return displacement times the shear modulus, and stress, (step, ..., component)."""
-    shape = len(loads), *where.shape
-    memory.require(
-        memory_needed(lattice, where, len(loads)),
-        f"the stress at {where.count} points in {len(loads)} steps",
-        "choose fewer points or steps",
-    )
-    moved, stress = fields.at_points(lattice, loads, body, nu, where.nodes)
-    return moved.reshape(*shape, 3), stress.reshape(*shape, 6)
-
-
 def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region, components: int) -> Array:
     """Return stress, or displacement times shear modulus, (step, depth, n_row, n_col, component)."""
     depths, target = where.depths, where.lattice
@@ -386,9 +348,15 @@ def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region,
         f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes in {len(loads)} steps",
         "choose a smaller box, or one nearer to the window, fewer depths or steps",
     )
-    moved = np.array([[lattice.embed(field, whole) for field in step] for step in loads], dtype=float)
-    found = fields.on_planes(whole, moved, body, nu, depths, components=components)
+    found = fields.on_planes(whole, embedded(lattice, whole, loads), body, nu, depths, components=components)
     return np.moveaxis(found[..., rows, cols], 2, -1)
+
+
+def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
+    """Return fields (step, component, n_row, n_col) on a window that covers theirs."""
+    if whole == lattice:
+        return values
+    return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
 
 
 def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, slice, slice]:

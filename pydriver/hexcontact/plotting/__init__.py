@@ -49,6 +49,6 @@ for _module in pkgutil.iter_modules(__path__):  # any other figures
     importlib.import_module(f"{__name__}.{_module.name}")
 
 FIGURES: dict[str, Callable[..., Figure]] = {
-    name: entry.draw for name, entry in entries().items() if entry.of_a_result
+    name: entry.draw for name, entry in entries().items() if entry.shows == "result"
 }
 """Figures of a result by name; their parameters are the options."""

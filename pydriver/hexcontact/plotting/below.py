@@ -3,51 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..analytic.hertz_gap import is_compliant
-from ..arrays import Array
+from ..arrays import Array, DataArray, Dataset
 from ..deck.below import Fatigue
 from ..errors import NotInResult
 from ..interior.files import tables_of
-from ..interior.stress import LOADED, Loaded, below, bodies_of
+from ..interior.stress import bodies_of
 from ..result.export import kept_steps
-from ..result.result import Result, at_hand
-from ..result.step import nodal
+from ..result.result import Result, as_result, at_hand
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, visible, worded
-from ..variables import EDGES, spelled
+from ..variables import spelled
+from . import style
 from .maps import Part, mesh_of
 from .registry import figure
 from .report_data import mapped_steps
 from .sections import Cut, Point
-from .style import (
-    COMPUTED,
-    EDGED,
-    EXACT,
-    GUIDE,
-    color_scale,
-    drawing,
-    handles_of,
-    legend_below,
-    legend_under,
-    mark_largest,
-    new_figure,
-    set_title,
-    shades,
-    titled,
-)
 from .zones import draw_zone_bars
-
-if TYPE_CHECKING:
-    import xarray
-
 
 _DEPTH = 0.6  # of the section, in its widths
 _POINTS = 121  # along the line; 60 below each other
@@ -56,31 +35,31 @@ LEVELS = 12
 
 @figure("stress", "von Mises stress below the contact, in a section")
 def stress(
-    result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
+    result: Result | Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
 ) -> Figure:
     """Draw the equivalent stress of von Mises in a section below the contact."""
-    view = StepView.of(result, step)
+    view = StepView(result, step)
     cut = Cut.of([view], angle, through)
     along = np.linspace(0.0, cut.line.length, _POINTS)
     depth = np.linspace(0.0, _DEPTH * cut.line.length, _POINTS // 2)
     x, y = cut.line.points(along)
     points = np.stack(np.broadcast_arrays(x[None], y[None], depth[:, None]), axis=-1)
-    found = _below(view, points, "von_mises_stress")
+    found = _below(result, step, points, "von_mises_stress")
     values = found["von_mises_stress"].values
 
-    canvas, axes = drawing(None, 5.6, 3.4, equal=True)
+    canvas, axes = style.drawing(None, 5.6, 3.4, equal=True)
     to_stress, unit = scaled(float(values.max()), "Pa")
     length = cut.lengths[0]
     drawn = axes.contourf(cut.along(along), depth * length, values * to_stress, LEVELS)
     canvas.colorbar(drawn, ax=axes, label=f"von Mises stress in body {found.attrs['body']} ({unit})")
-    mark_largest(axes, *np.meshgrid(cut.along(along), depth * length), values)
+    style.mark_largest(axes, *np.meshgrid(cut.along(along), depth * length), values)
     place = np.linspace(0.0, cut.line.length, 8 * _POINTS)
     draw_zone_bars(axes, view, cut.line.points(place), cut.along(place), -0.02 * depth[-1] * length)
     axes.legend(loc="lower right", labelcolor="white", handlelength=1.2)
     cut.show(axes)
     axes.set(ylabel=f"depth ({cut.lengths[1]})", aspect="equal", xlim=cut.along(along)[[0, -1]])
     axes.set_ylim(depth[-1] * length, -0.05 * depth[-1] * length)
-    set_title(canvas, view.title)
+    style.set_title(canvas, view.title)
     return canvas
 
 
@@ -100,7 +79,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     ValueError
         If pressures were not kept, or the result does not contain the moduli of the bodies.
     """
-    views = [StepView.of(result, number) for number in mapped_steps(result)]
+    views = [StepView(result, number) for number in mapped_steps(result)]
     if not views:
         raise NotInResult("the pressure was not kept (output.fields)")
     largest = max(views, key=lambda view: int(view.contact.sum()))
@@ -111,37 +90,33 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     points = np.stack([x, y, np.full(2, depth)], axis=-1)
     names = ("stress_xx", "stress_yy", "stress_xy")
     along = np.array([math.cos(angle) ** 2, math.sin(angle) ** 2, math.sin(2.0 * angle)])
-    found = [_below(view, points, *names) for view in views]
+    found = [_below(result, view.number, points, *names) for view in views]
     stress = np.array(
         [sum(c * one[name].values for c, name in zip(along, names, strict=True)) for one in found]
     )
 
-    canvas = new_figure(5.2, 3.0)
+    canvas = style.new_figure(5.2, 3.0)
     axes = canvas.add_subplot()
     to_stress, unit = scaled(float(abs(stress).max()), "Pa")
     numbers = [view.number for view in views]
-    for end, (color, mark) in enumerate(((COMPUTED, "o"), (EXACT, "s"))):
+    for end, (color, mark) in enumerate(((style.COMPUTED, "o"), (style.EXACT, "s"))):
         label = f"end at $x$ = {worded(float(x[end]), 'm')}".replace("-", "\u2212")
         axes.plot(numbers, stress[:, end] * to_stress, f"-{mark}", color=color, ms=3.0, label=label)
-    axes.axhline(0.0, color=GUIDE, lw=0.7)
+    axes.axhline(0.0, color=style.GUIDE, lw=0.7)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     symbol = r"$\sigma_{xx}$" if angle == 0.0 else r"$\sigma$ along the section"
     axes.set(xlabel="load step", ylabel=f"{symbol} in body {found[0].attrs['body']} ({unit})")
-    legend_below(axes, ncols=2, fontsize=8)
+    style.legend_below(axes, ncols=2, fontsize=8)
     deep = f"{worded(depth, 'm')} deep" if depth else "at the surface"
-    set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
+    style.set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
     return canvas
 
 
-def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
+def _below(result: Result | Dataset, step: int, points: Array, *names: str) -> Dataset:
     """Return stresses of a load step at points of body 1, or of body 2 if body 1 is rigid."""
-    wanted = LOADED if is_compliant(view.data.attrs) else (*LOADED, *EDGES)
-    fields = {name: view.data[name].values for name in wanted if view.has(name)}
-    bodies = bodies_of(str(view.data.attrs.get("deck", "")))
-    body = 2 if bodies and bodies[0].rigid else 1
-    given = view.lattice, [fields], bodies, body, view.friction
-    of = Loaded(*given, surface=lambda _: nodal(view.data, view.lattice).traction_field("edges"))
-    return below(of, {"points": points}, names)
+    result = as_result(result)
+    bodies = bodies_of(result.deck)
+    return result.stress(*names, step=step, body=2 if bodies and bodies[0].rigid else 1, points=points)
 
 
 _MARGIN = 1.5  # width of the map over that of the contact
@@ -149,7 +124,7 @@ _ENDLESS = 1e9  # cycles beyond which life is shown as endless
 
 
 @figure("fatigue", "fatigue parameter and life on the surface and below it", needs="[[fatigue]]")
-def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
+def fatigue(result: Result | Dataset, step: int | None = None) -> Figure:
     """Draw the first fatigue parameter of the deck and the life, at the surface and in a section below it.
 
     Parameters
@@ -157,7 +132,7 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     step : int, optional
         Number of the load step whose contact and stick area are outlined; by default the last of the cycle.
     """
-    result = result if isinstance(result, Result) else Result(result)
+    result = as_result(result)
     tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}
     surface = next((name for name, table in tables.items() if table.where.get("depths") == (0.0,)), None)
     section = next((name for name, table in tables.items() if table.plane), None)
@@ -174,44 +149,47 @@ def fatigue(result: Result | xarray.Dataset, step: int | None = None) -> Figure:
     alike = [field for _, field in drawn if field.name == first]
     lowest, highest = min(map(np.nanmin, alike)), max(map(np.nanmax, alike))
     cycle = by_name[shown[0]].attrs["steps"]
-    view = StepView.of(result, int(cycle[-1]) if step is None else step)
+    view = StepView(result, int(cycle[-1]) if step is None else step)
 
     columns = len(drawn) if len(drawn) < 4 else 2
-    rows = -(-len(drawn) // columns)
-    canvas = new_figure(3.6 * columns + 0.2, 3.9 * rows + 0.3)
-    panels = canvas.subplots(rows, columns, squeeze=False).ravel()
+    canvas, panels = style.new_panels(len(drawn), columns, 3.6 + 0.2 / columns, 3.9, 0.3)
     for axes, (table, field) in zip(panels, drawn, strict=True):
-        values, factor, scale = colored_values(field)
-        levels: Any = LEVELS
-        if field.name == first != "life":  # common to panels of the same parameter
-            levels = MaxNLocator(LEVELS).tick_values(lowest * factor, highest * factor)
+        limits = (lowest, highest) if field.name == first != "life" else None  # of all its panels
         draw = _draw_surface if table == surface else _draw_section
-        colored = draw(axes, view, field, values, levels)
+        draw(axes, view, field, limits)
         axes.set_title(f"{'surface' if table == surface else 'section'} of body {tables[table].body}")
-        canvas.colorbar(colored, ax=axes, location="bottom", shrink=0.9, **scale)
-    legend_under(canvas, handles_of(*panels))
-    set_title(canvas, title_of(result.dataset))
+    style.legend_under(canvas, style.handles_of(*panels))
+    style.set_title(canvas, title_of(result.dataset))
     return canvas
 
 
-def _first_of(found: xarray.Dataset, name: str) -> xarray.DataArray:
+def _first_of(found: Dataset, name: str) -> DataArray:
     """Return a parameter of a table, the first other one if it has not got it."""
     others = (other for other, field in found.data_vars.items() if field.attrs["units"] != "rad")
     return found[name if name in found else min(others, key=lambda other: other == "life")]
 
 
-def colored_values(field: xarray.DataArray) -> tuple[Array, float, dict[str, Any]]:
-    """Return values in a unit, its factor and the options of the color scale; life as a power of ten."""
+def _color(
+    axes: Axes, x: Array, y: Array, field: DataArray, limits: tuple[Any, Any] | None = None
+) -> Callable[[], None]:
+    """Draw a parameter in colors with their scale; return what marks its largest value, or the least life.
+
+    Life is drawn as a power of ten. The worst value is bright.
+    """
     factor, label = _scale(field)
-    values = np.squeeze(field.values) * factor
-    scale: dict[str, Any] = {"label": label, "ticks": MaxNLocator(6)}
-    if field.name == "life":
+    values, life = np.squeeze(field.values) * factor, field.name == "life"
+    options: dict[str, Any] = {"label": label, "ticks": MaxNLocator(6)}
+    if life:
         values = np.log10(np.clip(values, 1.0, _ENDLESS))
-        scale["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
-    return values, factor, scale
+        options["format"] = FuncFormatter(lambda power, _: f"$10^{{{power:g}}}$")
+    levels: Any = MaxNLocator(LEVELS).tick_values(*(factor * end for end in limits)) if limits else LEVELS
+    drawn = axes.contourf(x, y, values, levels, cmap="viridis_r" if life else "viridis")
+    axes.figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9, **options)
+    words = ("least life",) if life else ()
+    return lambda: style.mark_largest(axes, x, y, -values if life else values, *words)
 
 
-def _scale(field: xarray.DataArray) -> tuple[float, str]:
+def _scale(field: DataArray) -> tuple[float, str]:
     """Return the factor of a parameter and the label of its color scale."""
     units, named = str(field.attrs["units"]), str(field.attrs["long_name"])
     if field.name == "life":
@@ -222,52 +200,36 @@ def _scale(field: xarray.DataArray) -> tuple[float, str]:
     else:
         power = 3 * math.floor(math.log10(largest) / 3) if largest > 0.0 else 0
         factor, unit = 10.0**-power, f"$10^{{{power}}}$ " * (power != 0) + units.replace("Pa2", "Pa²")
-    return factor, titled(named, unit)
+    return factor, style.titled(named, unit)
 
 
-def map_of(field: xarray.DataArray) -> str:
-    """Return the colors of a parameter: the worst value is bright."""
-    return "viridis_r" if field.name == "life" else "viridis"
-
-
-def mark_worst(axes: Axes, x: Array, y: Array, field: xarray.DataArray, values: Array) -> None:
-    """Mark the largest value of a parameter, or the least life."""
-    if field.name == "life":
-        mark_largest(axes, x, y, -values, "least life")
-    else:
-        mark_largest(axes, x, y, values)
-
-
-def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: Array, levels: Any) -> Any:
+def _draw_surface(axes: Axes, view: StepView, field: DataArray, limits: Any) -> None:
     """Draw a map of the surface with the outlines of contact and stick area."""
     part = Part.around([view], _MARGIN)
-    x, y = field["x"].values * part.factor, field["y"].values * part.factor
-    drawn = axes.contourf(x, y, values, levels, cmap=map_of(field))
+    mark = _color(axes, field["x"].values * part.factor, field["y"].values * part.factor, field, limits)
     part.show(axes)
     meshes = [("contact area", "white", mesh_of(view, view.pressure, True))]
     if view.friction != 0.0 and view.has("zone"):
         meshes.append(("stick area", "red", view.stick_mesh()))
     for name, color, mesh in meshes:
-        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": EDGED}
+        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": style.EDGED}
         for polygon in mesh.outlines():
             axes.plot(*(polygon * part.factor).T, label=f"{name} in step {view.number}", **look)
-    mark_worst(axes, x, y, field, values)
-    return drawn
+    mark()
 
 
-def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, values: Array, levels: Any) -> Any:
+def _draw_section(axes: Axes, view: StepView, field: DataArray, limits: Any) -> None:
     """Draw a section, with contact and stick as bars above the surface."""
     x, y = field["x"].values, field["y"].values
     along, depth, words = section_of(field)
-    drawn = axes.contourf(along, depth, values, levels, cmap=map_of(field))
+    mark = _color(axes, along, depth, field, limits)
     draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
-    mark_worst(axes, along, depth, field, values)
+    mark()
     axes.set_ylim(depth.max(), depth.min() - 0.06 * np.ptp(depth))
     axes.set(**words, aspect="equal")
-    return drawn
 
 
-def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
+def section_of(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
     """Return places along a section and depths in a unit, with the labels of the axes."""
     x, y = field["x"].values, field["y"].values
     along = x if np.ptp(y) == 0.0 else y if np.ptp(x) == 0.0 else np.hypot(x - x[0, 0], y - y[0, 0])
@@ -277,7 +239,7 @@ def section_of(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
     return along * factor, field["depth"].values * factor, words
 
 
-_COLUMNS = 3  # panels beside each other
+_COLUMNS = 3  # panels, or maps, beside each other
 _LEGEND = 10  # curves of a legend at most
 _NAMES = {
     "von_mises_stress": "von Mises stress",
@@ -296,30 +258,30 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "bl
 
 
 @figure("lines", "tables along a line, or at points by step", needs="[[stress]] or [[fatigue]]")
-def lines(result: Result | xarray.Dataset) -> Figure:
+def lines(result: Result | Dataset) -> Figure:
     """Draw the tables [[stress]] and [[fatigue]] of the deck along lines, and at points over the steps."""
-    result = result if isinstance(result, Result) else Result(result)
+    result = as_result(result)
     names = [name for name, table in tables_of(result.deck).items() if table.line or table.points]
     if not names:
         raise NotInResult("the deck has no table [[stress]] or [[fatigue]] of a line or of points")
     return draw_tables(list(at_hand(result, kept_steps(result), names)), title_of(result.dataset))
 
 
-def draw_tables(shown: Sequence[tuple[str, xarray.Dataset]], title: str) -> Figure:
+def draw_tables(shown: Sequence[tuple[str, Dataset]], title: str) -> Figure:
     """Draw tables of a line or of points, below each other."""
     panels = [_panels(found) for _, found in shown]
     rows = [-(-len(of_table) // _COLUMNS) for of_table in panels]
     columns = min(_COLUMNS, max(map(len, panels)))
-    canvas = new_figure(3.7 * columns + 0.6, sum(2.5 * n + 0.35 for n in rows) + 0.4)
+    canvas = style.new_figure(3.7 * columns + 0.6, sum(2.5 * n + 0.35 for n in rows) + 0.4)
     heights = [2.5 * n + 0.35 for n in rows]
     parts = canvas.subfigures(len(shown), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (name, found), of_table in zip(parts, shown, panels, strict=True):
         _draw_table(part, name, found, of_table, columns)
-    set_title(canvas, title)
+    style.set_title(canvas, title)
     return canvas
 
 
-def _panels(found: xarray.Dataset) -> list[list[str]]:
+def _panels(found: Dataset) -> list[list[str]]:
     """Return the quantities of each panel: those of one unit share it, if each is a single curve."""
     names = [str(name) for name, field in found.data_vars.items() if field.attrs.get("units") != "rad"]
     if "distance" not in found.sizes or found.sizes.get("step") != 1:  # several steps or points; fatigue
@@ -329,10 +291,10 @@ def _panels(found: xarray.Dataset) -> list[list[str]]:
 
 
 def _draw_table(
-    part: SubFigure, name: str, found: xarray.Dataset, panels: Sequence[Sequence[str]], columns: int
+    part: SubFigure, name: str, found: Dataset, panels: Sequence[Sequence[str]], columns: int
 ) -> None:
     """Draw the panels of a table, with its name and place above."""
-    grid = part.subplots(-(-len(panels) // columns), columns, squeeze=False).ravel()
+    grid = style.panels_of(part, len(panels), columns)
     on_line = "distance" in found.sizes
     steps: list[int] = found["step"].values.tolist() if "step" in found.coords else []
     points = np.stack([np.ravel(found[axis]) for axis in ("x", "y", "depth")], axis=1)
@@ -345,7 +307,7 @@ def _draw_table(
         labels = [", ".join(_length(place) for place in point) for point in points.tolist()]
     else:
         place, words = np.arange(1.0, len(points) + 1.0), "point"
-    for axes, names in zip(grid, panels, strict=False):
+    for axes, names in zip(grid, panels, strict=True):
         curves = np.concatenate([found[name].values.reshape(-1, len(points)) for name in names])
         _draw_curves(axes, place, curves.T if steps and not on_line else curves, found[names[0]], len(names))
         axes.set_xlabel(words)
@@ -353,24 +315,22 @@ def _draw_table(
             axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         if len(names) > 1:
             _legend_beside(axes, [_named(name).removesuffix(" stress") for name in names])
-    for axes in grid[len(panels) :]:
-        axes.set_visible(False)
     if len(labels) > _LEGEND:
-        color_scale(part, grid[: len(panels)].tolist(), labels, shades(len(labels)))
+        style.color_scale(part, grid, labels, style.shades(len(labels)))
     elif len(labels) > 1:
-        _legend_beside(grid[len(panels) - 1], labels, None if on_line else "x, y, depth")
+        _legend_beside(grid[-1], labels, None if on_line else "x, y, depth")
     at = f"step {steps[0]}" if len(steps) == 1 else ""
     about = (visible(name).replace("$", r"\$"), f"body {found.attrs['body']}", at, where)
     part.suptitle(", ".join(filter(None, about)), fontsize=9)
 
 
-def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArray, quantities: int) -> None:
+def _draw_curves(axes: Axes, place: Array, curves: Array, field: DataArray, quantities: int) -> None:
     """Draw curves of a quantity in its unit; life on a logarithmic scale."""
     finite = curves[np.isfinite(curves)]
     units = str(field.attrs["units"])
     largest = float(abs(finite).max()) if finite.size else 0.0
     factor, unit = scaled(largest, units) if " " not in units else (1.0, units)
-    colors = _COLORS if len(curves) in (1, quantities) else shades(len(curves))
+    colors = _COLORS if len(curves) in (1, quantities) else style.shades(len(curves))
     look: dict[str, Any] = {"lw": 1.2}
     if "distance" not in field.dims:
         look |= {"marker": "o" if place.size <= 60 else "", "ms": 3.0}
@@ -383,8 +343,8 @@ def _draw_curves(axes: Axes, place: Array, curves: Array, field: xarray.DataArra
     if field.name == "life":
         axes.set_yscale("log")
     else:
-        axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
-    axes.set_ylabel(titled(named, unit))
+        axes.axhline(0.0, color=style.GUIDE, lw=0.6, zorder=0)
+    axes.set_ylabel(style.titled(named, unit))
     axes.grid(color="0.9", lw=0.5)
 
 
@@ -393,7 +353,7 @@ def _legend_beside(axes: Axes, labels: Sequence[str], title: str | None = None) 
     axes.legend(labels, title=title, loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=1.2)
 
 
-def _along(found: xarray.Dataset) -> tuple[Array, str, str]:
+def _along(found: Dataset) -> tuple[Array, str, str]:
     """Return the places along a line, the words of their axis, and the coordinates that do not change."""
     axes = {name: found[name].values for name in ("x", "y", "depth")}
     moving = [name for name, values in axes.items() if np.ptp(values) > 0.0]
@@ -415,59 +375,35 @@ def _named(name: str) -> str:
     return f"${head}_{{{last}}}$" if head else _NAMES.get(name, spelled(name))
 
 
-_BESIDE = 3  # maps beside each other
-
-
 @figure("table", "the file of one table of stresses or fatigue", needs="a table")
-def table(table: xarray.Dataset) -> Figure:
-    """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth.
-
-    Parameters
-    ----------
-    table : xarray.Dataset
-        The dataset of a file of stresses or fatigue parameters.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+def table(table: Dataset) -> Figure:
+    """Draw a table of a deck: curves along a line or at points, maps of a plane or of a depth."""
     title, _, name = str(table.attrs["title"]).rpartition(": ")
     if {"distance", "point"} & table.sizes.keys():
         return draw_tables([(name, table)], title)
     fields = [_worst(field) for field in table.data_vars.values() if field.attrs["units"] != "rad"]
-    columns = min(_BESIDE, len(fields))
-    rows = -(-len(fields) // columns)
     places = [_places(field) for field in fields]
     height = max(float(np.ptp(along) / np.ptp(across)) for across, along, _ in places)
-    canvas = new_figure(3.6 * columns + 0.2, (2.9 * height + 1.5) * rows + 0.4)
-    panels = canvas.subplots(rows, columns, squeeze=False).ravel()
-    for axes, field, (across, along, words) in zip(panels, fields, places, strict=False):
-        values, _, scale = colored_values(field)
-        drawn = axes.contourf(across, along, values, LEVELS, cmap=map_of(field))
-        mark_worst(axes, across, along, field, values)
+    columns = min(_COLUMNS, len(fields))
+    canvas, panels = style.new_panels(len(fields), columns, 3.6 + 0.2 / columns, 2.9 * height + 1.5, 0.4)
+    for axes, field, (across, along, words) in zip(panels, fields, places, strict=True):
+        _color(axes, across, along, field)()
         axes.set(**words, aspect="equal", title=_place(field))
         if words["ylabel"].startswith("depth"):
             axes.invert_yaxis()
-        canvas.colorbar(drawn, ax=axes, location="bottom", shrink=0.9, **scale)
-    for axes in panels[len(fields) :]:
-        axes.set_visible(False)
-    set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
+    style.set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
     return canvas
 
 
-def _worst(field: xarray.DataArray) -> xarray.DataArray:
+def _worst(field: DataArray) -> DataArray:
     """Return a field at the step and depth of the value that counts."""
-    word = "least" if field.name == "life" else "largest"
-    for name in ("step", "depth"):
-        if name in field.sizes:
-            values = np.where(np.isfinite(field), field, np.nan)
-            axes = tuple(k for k, dimension in enumerate(field.dims) if dimension != name)
-            ends = np.nanmin(values, axis=axes) if word == "least" else np.nanmax(values, axis=axes)
-            field = field.isel({name: int(np.nanargmin(ends) if word == "least" else np.nanargmax(ends))})
-    return field
+    values = np.where(np.isfinite(field), field, np.nan)
+    worst = np.nanargmin(values) if field.name == "life" else np.nanargmax(values)
+    at = dict(zip(field.dims, np.unravel_index(worst, values.shape), strict=True))
+    return field.isel({name: int(at[name]) for name in ("step", "depth") if name in at})
 
 
-def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
+def _places(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
     """Return the coordinates of a map in a unit, with the labels of the axes."""
     if np.ptp(field["depth"].values) > 0.0:
         return section_of(field)
@@ -476,7 +412,7 @@ def _places(field: xarray.DataArray) -> tuple[Array, Array, dict[str, str]]:
     return x * factor, y * factor, {"xlabel": f"x ({unit})", "ylabel": f"y ({unit})"}
 
 
-def _place(field: xarray.DataArray) -> str:
+def _place(field: DataArray) -> str:
     """Name step and depth of a map."""
     words = [f"step {int(field['step'])}"] if "step" in field.coords else []
     if not np.ptp(field["depth"].values):

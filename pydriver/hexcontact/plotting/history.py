@@ -1,9 +1,9 @@
-"""Quantities with one value for each load step: histories, loops of load and motion, compliance."""
+"""Numbers of each load step, or each case of a study: histories, loops of load and motion, compliance."""
 
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,47 +13,47 @@ from matplotlib.ticker import MaxNLocator
 from ..analytic.compare import CIRCULAR, ClosedForms
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
 from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
-from ..result.view import Results, as_list, dataset_of, title_of
-from ..text import scaled, worded
-from ..variables import PANELS, VARIABLES, names_where, spelled
+from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
+from ..text import quantity, scaled, worded
+from ..variables import PANELS, SUMMARY, VARIABLES, names_where, spelled
+from . import style
 from .registry import SEVERAL_RUNS, figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
-
-if TYPE_CHECKING:
-    import xarray
-
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
 
-def _known(dataset: xarray.Dataset) -> list[str]:
+def _known(dataset: Dataset) -> list[str]:
     return [
         str(n) for n in dataset.data_vars if dataset[n].dims == ("step",) and dataset[n].dtype.kind in "fi"
     ]
 
 
-def values_of(dataset: xarray.Dataset, name: str) -> Array:
+def values_of(dataset: Dataset, name: str) -> Array:
     """Return the history of a quantity."""
     return np.asarray(dataset[name].values, dtype=float)
 
 
-def vectors_of(dataset: xarray.Dataset, name: str) -> Array:
+def vectors_of(dataset: Dataset, name: str) -> Array:
     """Return the history of a vector, its components in rows."""
     return np.stack([values_of(dataset, f"{name}_{axis}") for axis in "xy"])
 
 
-def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
-    values = np.concatenate([values_of(dataset, name) for name in names])
-    finite = values[np.isfinite(values)]
-    return float(np.abs(finite).max()) if finite.size else 0.0
+def _largest(dataset: Dataset, names: Sequence[str]) -> float:
+    values = np.concatenate([np.ravel(values_of(dataset, name)) for name in names])
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _scaled(dataset: Dataset, names: Sequence[str]) -> tuple[float, str]:
+    """Return factor and unit for an axis with quantities of one unit."""
+    return scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
 
 
 def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
@@ -80,9 +80,7 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
 
 def begins_at_zero(names: Sequence[str]) -> bool:
     """Return whether quantities are 0 before the first load step, so that curves begin at step 0."""
-    shown = names_where(lambda v: not v.is_field and (v.title or v.summary))
-    if "mean_gap" in names:
-        return False
+    shown = names_where(lambda v: not v.is_field and (v.title or v.summary) and v.before == 0.0)
     return all(name.removesuffix("_fit") in shown for name in names)
 
 
@@ -98,7 +96,7 @@ def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
     return fits if all(name in known for name in fits) else names
 
 
-def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
+def _chosen(dataset: Dataset) -> list[tuple[str, ...]]:
     """Return the quantities that a history shows by default, in panels."""
     known = _known(dataset)
     if "stick_area" not in known:
@@ -109,7 +107,7 @@ def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
 
 @figure("history", "loads, motions, areas, p_max by step or over a load")
 def history(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     quantities: Sequence[str] | None = None,
     over: str = "step",
     ax: Axes | None = None,
@@ -141,10 +139,10 @@ def history(
         if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
             raise DeckError("ax holds quantities of one unit; expected some in quantities")
         draw_history(ax, dataset, [name for names in panels for name in names], over)
-        return drawing(ax, 0.0, 0.0)[0]
+        return style.drawing(ax, 0.0, 0.0)[0]
     columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    canvas = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
+    canvas = style.new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
     grid = canvas.subplots(rows, columns, sharex=True, squeeze=False)
     empty = grid.size - len(panels)  # at the end of the first row
     slots = [*grid[0, : columns - empty], *grid[1:].flat]
@@ -154,21 +152,21 @@ def history(
         draw_history(axes, dataset, names, over)
     for axes in grid[:-1].flat:
         axes.set_xlabel("")
-    set_title(canvas, title_of(dataset))
+    style.set_title(canvas, title_of(dataset))
     return canvas
 
 
-def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over: str = "step") -> None:
+def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str = "step") -> None:
     """Draw quantities of one unit over the load steps, or over another quantity."""
-    factor, unit = scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
+    factor, unit = _scaled(dataset, names)
     place, label = dataset["step"].values, "load step"
     if over != "step":
-        along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-        place, label = values_of(dataset, over) * along, titled(_spelled(over), length)
+        along, length = _scaled(dataset, [over])
+        place, label = values_of(dataset, over) * along, style.titled(_spelled(over), length)
     begun = begins_at_zero([*names, *([over] if over != "step" else [])])
     place = np.insert(place, 0, 0.0) if begun else place
     marker = "o" if place.size <= _MANY else ""
-    lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
+    lines = (style.COMPUTED, "-", marker), (style.EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
         values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
@@ -177,7 +175,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     named = _spelled(names[0] if len(names) == 1 else _common(names))
-    axes.set(xlabel=label, ylabel=titled(named, unit))
+    axes.set(xlabel=label, ylabel=style.titled(named, unit))
     if len(names) > 1:
         axes.legend([_apart(name, names) for name in names], handlelength=2.2)
     axes.grid(color="0.9", lw=0.5)
@@ -185,7 +183,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
         cast(MaxNLocator, axes.xaxis.get_major_locator()).set_params(integer=True)
         if "segment" in dataset:
             for change in np.flatnonzero(np.diff(dataset["segment"].values)):
-                axes.axvline(float(place[change + begun]), color=GUIDE, lw=0.7, ls=":", zorder=0)
+                axes.axvline(float(place[change + begun]), color=style.GUIDE, lw=0.7, ls=":", zorder=0)
 
 
 def _spelled(name: str) -> str:
@@ -209,7 +207,7 @@ def _apart(name: str, names: Sequence[str]) -> str:
 
 @figure("loop", "tangential load against shift", needs="tangential load")
 def loop(
-    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+    result: Result | Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
     """Draw the tangential load against the shift; for similar spheres also the closed solution.
 
@@ -224,7 +222,7 @@ def loop(
         raise NotInResult("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
-    canvas, axes = drawing(ax, 4.6, 3.8)
+    canvas, axes = style.drawing(ax, 4.6, 3.8)
     to_force = _draw_loop(
         axes,
         (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
@@ -238,23 +236,23 @@ def loop(
     room = 0.04 * (high - low)
     for level in (-bound * to_force, bound * to_force):
         if 1.3 * low < level < 1.3 * high:
-            axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+            axes.axhline(level, color=style.GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
-    axes.legend(handles=handles_of(axes))
-    set_title(canvas, title_of(dataset), ax)
+    axes.legend(handles=style.handles_of(axes))
+    style.set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
 @figure("torsion", "torque against twist", needs="torque")
 def torsion(
-    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+    result: Result | Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
 ) -> Figure:
     """Draw the torque against the twist; for similar spheres also the solution of Lubkin."""
     dataset = _before_wear(dataset_of(result))
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise NotInResult("there is no torque in this result")
-    canvas, axes = drawing(ax, 4.6, 3.8)
+    canvas, axes = style.drawing(ax, 4.6, 3.8)
     _draw_loop(
         axes,
         (values_of(dataset, "twist"), r"twist $\vartheta$", "rad"),
@@ -264,14 +262,14 @@ def torsion(
         cycles,
     )
     axes.legend()
-    set_title(canvas, title_of(dataset), ax)
+    style.set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
 Axis = tuple[Array, str, str]  # values, name and unit of the quantity on an axis
 
 
-def _before_wear(dataset: xarray.Dataset) -> xarray.Dataset:
+def _before_wear(dataset: Dataset) -> Dataset:
     """Return the load history without the cycles of wear, of which only the end is recorded."""
     if "wear_cycles" not in dataset:
         return dataset
@@ -290,13 +288,13 @@ def _draw_loop(
     (x, x_name, x_unit), (y, y_name, y_unit) = motion, load
     to_x, x_unit = scaled(float(np.abs(x).max()), x_unit)
     to_y, y_unit = scaled(float(np.abs(y).max()), y_unit)
-    axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=0)
-    axes.axvline(0.0, color=GUIDE, lw=0.5, zorder=0)
+    axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
+    axes.axvline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
     size = 3.5 if x.size <= 2 * _MANY else 2.0
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9}
     found = cycles_of(x, y)
     numbers = [-1] * bool(found) if chosen is None else [chosen] if isinstance(chosen, int) else [*chosen]
-    colors = [COMPUTED] if len(numbers) < 2 else shades(len(numbers))
+    colors = [style.COMPUTED] if len(numbers) < 2 else style.shades(len(numbers))
     for number, color in zip(numbers, colors, strict=False):
         place = number if number < 0 else number - 1
         if number == 0 or not -len(found) <= place < len(found):
@@ -309,14 +307,14 @@ def _draw_loop(
             axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)
     if chosen is None:
         line = {"ls": ""} if closed is not None else {"lw": 0.7}
-        axes.plot(x * to_x, y * to_y, color=COMPUTED, label="computed", zorder=3, **look, **line)
+        axes.plot(x * to_x, y * to_y, color=style.COMPUTED, label="computed", zorder=3, **look, **line)
     if closed is not None:
-        axes.plot(closed[0] * to_x, closed[1] * to_y, color=EXACT, lw=1.1, label=name, zorder=2)
+        axes.plot(closed[0] * to_x, closed[1] * to_y, color=style.EXACT, lw=1.1, label=name, zorder=2)
     axes.set(xlabel=f"{x_name} ({x_unit})", ylabel=f"{y_name} ({y_unit})")
     return to_y
 
 
-def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
+def initial_compliance(dataset: Dataset) -> tuple[float, float]:
     """Return the shift of the first step with a tangential load over that of Mindlin, and its Q/(mu P).
 
     Spheres are pressed, then sheared at a constant normal load; another result is an error.
@@ -365,9 +363,11 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
-    canvas, axes = drawing(ax, 4.6, 3.6)
-    axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
-    colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
+    canvas, axes = style.drawing(ax, 4.6, 3.6)
+    axes.axhline(1.0, color=style.GUIDE, lw=0.8, ls=":", label="Mindlin")
+    colors = dict(
+        zip(sorted({mu for mu, _ in series}), (style.COMPUTED, style.EXACT, style.THIRD), strict=False)
+    )
     for (mu, coupling), points in sorted(series.items()):
         beta, ratio_of = np.array(sorted(points)).T
         full = coupling == "full"
@@ -378,5 +378,85 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
     axes.legend()
     low, high = min(shares), max(shares)
     at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
+    style.set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
     return canvas
+
+
+# --- studies ------------------------------------------------------------------------------------------------
+
+_LEGEND = 8  # curves, more of which get a scale of colors
+
+
+def _varying(study: Dataset) -> list[str]:
+    """Return the quantities of a summary that differ between the cases."""
+    found = []
+    for name in ("approach", *SUMMARY):
+        values = study[name].values if name in study else np.array([])
+        finite = values[np.isfinite(values)]
+        if finite.size and np.ptp(finite) > 1e-6 * np.abs(finite).max():
+            found.append(name)
+    return found
+
+
+@figure("study", "quantities of the cases over a parameter", needs="a study")
+def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "") -> Figure:
+    """Draw quantities of the last load step over a parameter of a study; cases not on a grid are points.
+
+    Parameters
+    ----------
+    study : xarray.Dataset
+        The result of a study.
+    quantities : sequence of str, optional
+        Names of quantities, one for each panel; by default those of a summary that vary.
+    over : str
+        Parameter on the horizontal axis; by default the one with the most values.
+
+    Raises
+    ------
+    DeckError
+        If there is no such name, or no case is done.
+    """
+    study = last_steps(study)
+    numbers = [n for n in parameters_of(study) if study[n].dtype.kind in "fi" and study[n].ndim == 1]
+    if not numbers or (over and over not in numbers):
+        expected = f"expected {' or '.join(numbers)}" if numbers else "none of its parameters is a number"
+        raise DeckError(f"over = {over!r}: {expected}")
+    over = over or max(numbers, key=lambda name: study[name].size)
+    names = _varying(study) if quantities is None else list(quantities)
+    if unknown := [name for name in names if name not in study.data_vars]:
+        raise DeckError(f"{unknown[0]} is no quantity of this study")
+    if not names:
+        raise DeckError("no quantity differs between its cases; are any done?")
+    [along] = study[over].dims
+    others = [dim for dim in study["status"].dims if dim != along]
+    curves = study.stack(curve=others) if others else study.expand_dims("curve")
+    labels = [_label(study, others, place) for place in curves["curve"].values] if others else [""]
+    canvas, panels = style.new_panels(len(names), min(len(names), 2), 3.4, 2.1, 0.5)
+    colors = style.shades(len(labels)) if others else [style.COMPUTED]
+    (to_place, length), order = _scaled(curves, [over]), np.argsort(curves[over].values)
+    look: dict[str, Any] = {"ls": "-" if along != "case" else "", "marker": "o", "ms": 3}
+    for axes, name in zip(panels, names, strict=True):
+        factor, unit = _scaled(curves, [name])
+        for k, label in enumerate(labels):
+            place, values = (curves[over].values * to_place), curves[name].isel(curve=k).values * factor
+            axes.plot(place[order], values[order], label=label, color=colors[k], **look)
+        named = _spelled(name) if name in VARIABLES else name
+        axes.set(xlabel=style.titled(over, length), ylabel=style.titled(named, unit))
+        axes.grid(color="0.9", lw=0.5)
+    if 1 < len(labels) <= _LEGEND:
+        style.legend_under(canvas, panels[0].get_lines())
+    elif others:
+        style.color_scale(canvas, panels, labels, colors)
+    style.set_title(canvas, str(study.attrs.get("title", "")))
+    return canvas
+
+
+def _label(study: Dataset, dims: Sequence[object], place: object) -> str:
+    """Return the values of the other parameters of a curve."""
+    values = place if isinstance(place, tuple) else (place,)
+    words = []
+    for dim, value in zip(dims, values, strict=True):
+        unit = str(study[dim].attrs.get("units", "1")).removesuffix("1")
+        text = value if isinstance(value, str) else quantity(float(value), unit) if unit else f"{value:g}"
+        words.append(f"{dim} {text}")
+    return ", ".join(words)

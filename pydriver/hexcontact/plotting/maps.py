@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefiner
 
 from ..analytic.compare import ClosedForms, PartialSlip
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core.edges import ZoneMesh
 from ..core.lattice import linear
 from ..errors import DeckError
@@ -26,11 +26,7 @@ from ..result.view import Results, StepView, as_list, dataset_of, title_of
 from ..text import scaled
 from ..variables import MAPS, VARIABLES
 from .registry import figure, styled
-from .style import EXACT, drawing, legend_above, set_title
-
-if TYPE_CHECKING:
-    import xarray
-
+from .style import EXACT, drawing, legend_above, panels_of, set_title
 
 Limits = tuple[float, float, float, float]
 
@@ -182,7 +178,7 @@ def views_of(
     """Return views of steps of one or several results, a label for each, and the title of the figure."""
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
-    views = [StepView.of(result, step, source) for result in several for step in chosen]
+    views = [StepView(result, step, source) for result in several for step in chosen]
     titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]
@@ -224,10 +220,8 @@ def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tup
     height = rows * (float(np.clip((cell - 0.2) * part.aspect, 0.6, most)) + 0.17 * lines + 0.24) + 0.95
     figure = Figure(figsize=(cell * columns + 0.6, height), layout="compressed")
     cast(Any, figure.get_layout_engine()).set(h_pad=0.1)  # between a title and the panel above
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in panels.flat[count:]:
-        axes.set_visible(False)
-    for number, (axes, label) in enumerate(zip(panels.flat, labels, strict=False)):
+    panels = panels_of(figure, count, columns, sharex=True, sharey=True)
+    for number, (axes, label) in enumerate(zip(panels, labels, strict=True)):
         part.show(axes)
         axes.set_title(label)
         if number + columns < count:  # axis labels only at the lower and left panels
@@ -236,7 +230,7 @@ def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tup
             axes.tick_params(labelbottom=True)
         if number % columns:
             axes.set_ylabel("")
-    return figure, list(panels.flat[:count])
+    return figure, panels
 
 
 DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node
@@ -313,27 +307,21 @@ class _Field:
         return parts[0] if self.vector is None else np.asarray(np.hypot(*parts))
 
 
-_FIELDS = {
-    "pressure": _Field("pressure $p$", "Pa", "map of the contact pressure"),
-    "traction": _Field(
-        "shear traction $|q|$",
-        "Pa",
-        "map of the size of the shear traction, with arrows",
-        ("traction_x", "traction_y"),
-    ),
-    "traction_x": _Field("shear traction $q_x$", "Pa", "map of its component along x"),
-    "traction_y": _Field("shear traction $q_y$", "Pa", "map of its component along y"),
-    "slip_increment": _Field(
-        "slip in the step",
-        "m",
-        "map of the slip of body 1 in the step, with arrows",
-        ("slip_increment_x", "slip_increment_y"),
-    ),
-}
-for _title, (_name, *_others) in MAPS.items():
-    if not _others and _name not in _FIELDS:
-        _row = VARIABLES[_name]
-        _FIELDS[_name] = _Field(_title[0].lower() + _title[1:], _row.units, f"map of the {_row.long_name}")
+def _fields() -> Iterator[tuple[str, _Field]]:
+    """Yield the fields with a map by their names: lengths of vectors, and each with a symbol or alone."""
+    for title, names in MAPS.items():
+        words, row = title[0].lower() + title[1:], VARIABLES[names[0]]
+        if len(names) == 2:
+            label = f"{words} $|{row.symbol[0]}|$" if row.symbol else words
+            about = f"map of the size of the {words}, with arrows"
+            yield names[0].removesuffix("_x"), _Field(label, row.units, about, (names[0], names[1]))
+        for name in names if row.symbol or len(names) == 1 else ():
+            row = VARIABLES[name]
+            label = f"{words} ${row.symbol}$" if row.symbol else words
+            yield name, _Field(label, row.units, f"map of the {row.long_name}")
+
+
+_FIELDS = dict(_fields())
 
 
 def draw_field(
@@ -393,7 +381,7 @@ def draw_field(
 @styled
 def field_map(
     name: str,
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     with_arrows: bool | None = None,
     ax: Axes | None = None,
@@ -424,7 +412,7 @@ def field_map(
 
 @figure("pressure", _FIELDS["pressure"].help)
 def pressure_field(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     ax: Axes | None = None,
     source: str | None = None,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from ..analytic.compare import ClosedForms
+from ..arrays import Dataset
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from .history import draw_history, fitted
@@ -17,18 +18,15 @@ from .sections import Cut, draw_section, draw_shear
 from .style import legend_above, legend_below, new_figure, set_title
 from .zones import draw_zones, zone_legend
 
-if TYPE_CHECKING:
-    import xarray
-
 
 @figure("overview", "pressure and a section; with friction shear, zones", first=True)
-def overview(result: Result | xarray.Dataset, step: int = -1, source: str | None = None) -> Figure:
+def overview(result: Result | Dataset, step: int = -1, source: str | None = None) -> Figure:
     """Draw maps, a section and the history of a load step.
 
     Without friction: the pressure over the plane and along x; with friction also the shear traction, the
     zones and the history.
     """
-    view = StepView.of(result, step, source)
+    view = StepView(result, step, source)
     with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
     canvas = _frictional(dataset_of(result), view) if with_friction else _frictionless(view)
     set_title(canvas, view.title)
@@ -52,7 +50,7 @@ def _frictionless(view: StepView) -> Figure:
     return canvas
 
 
-def _frictional(dataset: xarray.Dataset, view: StepView) -> Figure:
+def _frictional(dataset: Dataset, view: StepView) -> Figure:
     """Draw maps of pressure, shear traction and zones; below them a section and the history."""
     part = Part.around([view])
     exact = ClosedForms(dataset).partial_slip(view.number)

@@ -60,24 +60,10 @@ class Entry:
         return inspect.signature(self.draw).parameters
 
     @property
-    def of_a_result(self) -> bool:
-        """Whether it shows a result."""
-        return not (self.of_a_study or self.of_a_table or self.of_a_deck)
-
-    @property
-    def of_a_study(self) -> bool:
-        """Whether it shows a study."""
-        return "study" in self.options
-
-    @property
-    def of_a_table(self) -> bool:
-        """Whether it shows a table [[stress]] or [[fatigue]]."""
-        return "table" in self.options
-
-    @property
-    def of_a_deck(self) -> bool:
-        """Whether it shows a deck."""
-        return "case" in self.options
+    def shows(self) -> str:
+        """What it shows: a "result", a "study", a "table" [[stress]] or [[fatigue]], or a "deck"."""
+        kinds = {"study": "study", "table": "table", "case": "deck"}
+        return next((kind for option, kind in kinds.items() if option in self.options), "result")
 
     @property
     def of_several(self) -> bool:

@@ -69,8 +69,8 @@ def drawn_data(
 
 def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     """Return limits, maps (pictures in base64), arrows, zones and sections along x of some load steps."""
-    last = StepView.of(result, numbers[-1])
-    part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
+    last = StepView(result, numbers[-1])
+    part = Part.around((StepView(result, number) for number in numbers), 1.2, 0.2)
     known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
     if last.friction == 0.0:
         known = {title: names for title, names in known.items() if not VARIABLES[names[0]].frictional}
@@ -92,10 +92,10 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     zones: list[str] = []
     sections = []
     noise = _NOISE * float(np.abs(result.dataset["approach"].values).max())
-    line = line_of((StepView.of(result, number) for number in numbers), 0.0)
+    line = line_of((StepView(result, number) for number in numbers), 0.0)
     place = np.linspace(0.0, line.length, _CUT)
     for number in numbers:
-        view = StepView.of(result, number)
+        view = StepView(result, number)
         contact = view.touches(*plane.points)
         weight = np.where(contact, view.at(*plane.points, view.contact.astype(float)), 1.0)
         for title, names in known.items():
@@ -218,12 +218,12 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         largest = max(peak(name, histories) for name in names)
         factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
         values = {
-            word: rounded([0.0, *(factor * float(history[name]) for history in histories)], 5)
-            for name, word in names.items()
+            word: rounded([factor * float(v) for v in (VARIABLES[n].before, *(h[n] for h in histories))], 5)
+            for n, word in names.items()
         }
         return {"unit": unit, "curves": values}
 
-    steps = [0, *(history["step"] for history in histories)]  # all quantities are 0 before the first
+    steps = [0, *(history["step"] for history in histories)]
     panels = panels_of(histories)
     over: dict[str, Any] = {"x": steps, "xlabel": "load step"}
     charts = [{"title": title, **over, **curves_of(names)} for title, names in panels.items()]

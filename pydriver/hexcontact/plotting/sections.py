@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,32 +12,16 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 
 from ..analytic.compare import PartialSlip
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..core.lattice import section_ends
 from ..errors import DeckError, NotInResult
 from ..result.result import Result
 from ..result.step import Line
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
+from . import style
 from .maps import closed_solutions, views_of
 from .registry import figure
-from .style import (
-    COMPUTED,
-    EXACT,
-    GUIDE,
-    THIRD,
-    color_scale,
-    drawing,
-    legend_below,
-    legend_under,
-    new_figure,
-    set_title,
-    shades,
-)
-
-if TYPE_CHECKING:
-    import xarray
-
 
 Point = tuple[float, float]
 
@@ -185,10 +169,12 @@ def draw_pressures(axes: Axes, views: Sequence[StepView], cut: Cut, always: bool
     place, fine = cut.along(cut.place), cut.along(cut.fine)
     single = len(views) == 1
     look = cut.look() if single else _JOINED
-    for view, p, color in zip(views, pressures, [COMPUTED] if single else shades(len(views)), strict=True):
+    for view, p, color in zip(
+        views, pressures, [style.COMPUTED] if single else style.shades(len(views)), strict=True
+    ):
         axes.plot(place, p * to_stress, color=color, label="computed", zorder=3, **look)
         if len(views) <= _COMPARED and (view.hertz_holds or (always and view.hertz is not None)):
-            line = cut.beside(EXACT) if single else {**_THIN, "zorder": 5}
+            line = cut.beside(style.EXACT) if single else {**_THIN, "zorder": 5}
             name = "Hertz" if view.hertz_holds else "Hertz (no friction)"
             axes.plot(fine, cut.hertz(view, cut.fine) * to_stress, label=name, **line)
     axes.set(ylabel=f"pressure $p$ ({stress})", ylim=(0.0, 1.08 * largest * to_stress or 1.0))
@@ -207,18 +193,18 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
     axes.set_xlabel("")
     axes.legend(loc="lower center")
 
-    def draw_difference(p: Array, **style: Any) -> None:
+    def draw_difference(p: Array, **look: Any) -> None:
         difference = 100 * (p - cut.hertz(view, cut.place)) / hertz.max_pressure
-        bottom.plot(cut.along(cut.place), difference, lw=0.7, **style)
+        bottom.plot(cut.along(cut.place), difference, lw=0.7, **look)
 
-    bottom.axhline(0.0, color=GUIDE, lw=0.7)
+    bottom.axhline(0.0, color=style.GUIDE, lw=0.7)
     dots = {"marker": "o" if cut.at_nodes else "", "ms": 2.5}
     squares: dict[str, Any] = {"marker": "s" if cut.at_nodes else "", "mfc": "none", "ms": 3.5}
     edges = view.tractions.source == "edges"
-    color = THIRD if edges else COMPUTED
+    color = style.THIRD if edges else style.COMPUTED
     draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)
     if edges:
-        draw_difference(cut.values(view), color=COMPUTED, label="to the edge", **dots)
+        draw_difference(cut.values(view), color=style.COMPUTED, label="to the edge", **dots)
         bottom.legend(fontsize=8, ncols=2, handlelength=1.2)
     bottom.set_ylabel(f"{'error' if view.hertz_holds else 'difference'}\n(% of $p_0$)")
     cut.show(bottom)
@@ -226,7 +212,7 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
 
 @figure("section", "pressure along a line, and its difference from Hertz")
 def section(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     step: int = -1,
     angle: float = 0.0,
     through: Point | None = None,
@@ -240,14 +226,14 @@ def section(
     ax : matplotlib.axes.Axes, optional
         Axes for the pressure, without its difference from Hertz; by default those of a new figure.
     """
-    view = StepView.of(result, step, source)
+    view = StepView(result, step, source)
     if ax is not None:
         draw_pressures(ax, [view], Cut.of([view], angle, through), always=True)
         ax.legend(loc="lower center")
-        return drawing(ax, 0.0, 0.0)[0]
-    canvas = new_figure(4.6, 4.2)
+        return style.drawing(ax, 0.0, 0.0)[0]
+    canvas = style.new_figure(4.6, 4.2)
     draw_section(canvas, view, angle, through)
-    set_title(canvas, view.title)
+    style.set_title(canvas, view.title)
     return canvas
 
 
@@ -256,7 +242,7 @@ def section(
 
 @figure("tractions", "pressure and shear traction along a line, at some steps", needs="friction")
 def tractions(
-    result: Result | xarray.Dataset,
+    result: Result | Dataset,
     steps: int | Sequence[int] = -1,
     angle: float = 0.0,
     through: Point | None = None,
@@ -280,17 +266,17 @@ def tractions(
         if len(views) > 1:
             raise DeckError(f"ax holds the tractions of one load step, not of {len(views)}")
         draw_shear(ax, views[0], exact[0], cut)
-        return drawing(ax, 0.0, 0.0)[0]
+        return style.drawing(ax, 0.0, 0.0)[0]
     if len(views) > 1:
         return _family(views, labels, exact, cut, title)
-    canvas = new_figure(4.8, 5.0)
+    canvas = style.new_figure(4.8, 5.0)
     upper, lower = canvas.subplots(2, 1, sharex=True, height_ratios=(2, 3))
     draw_pressures(upper, views, cut)
     draw_shear(lower, views[0], exact[0], cut)
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
     upper.legend(loc="lower center")
-    set_title(canvas, title)
+    style.set_title(canvas, title)
     return canvas
 
 
@@ -316,26 +302,20 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
         for sign in used:
             edge = sign * bound * to_stress
             axes.fill_between(cut.along(cut.fine), edge, color="0.92", lw=0, zorder=0)
-            axes.plot(
-                cut.along(cut.fine),
-                edge,
-                color=GUIDE,
-                lw=0.8,
-                label=name if sign == used[0] else None,
-                zorder=1,
-            )
-    axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
-    for values, color, name in zip((along, across), (COMPUTED, THIRD), cut.names(), strict=True):
+            label = name if sign == used[0] else None
+            axes.plot(cut.along(cut.fine), edge, color=style.GUIDE, lw=0.8, label=label, zorder=1)
+    axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=1)
+    for values, color, name in zip((along, across), (style.COMPUTED, style.THIRD), cut.names(), strict=True):
         axes.plot(place, values * to_stress, color=color, label=name, zorder=4, **cut.look())
     if exact is not None:
         for values, label in zip(cut.exact_tractions(exact), (exact.name, None), strict=True):
-            axes.plot(cut.along(cut.fine), values * to_stress, label=label, **cut.beside(EXACT))
+            axes.plot(cut.along(cut.fine), values * to_stress, label=label, **cut.beside(style.EXACT))
     below, above = (largest if sign in used else reach for sign, reach in ((-1.0, low), (1.0, high)))
     room = 0.1 * (largest or 1.0 / to_stress)
     axes.set_ylim(-(below + room) * to_stress, (above + room) * to_stress)
     axes.set_ylabel(f"shear traction ({stress})")
     cut.show(axes)
-    legend_below(axes, ncols=3, columnspacing=1.2)
+    style.legend_below(axes, ncols=3, columnspacing=1.2)
 
 
 def _family(
@@ -349,16 +329,16 @@ def _family(
     tractions = np.array([cut.tractions(view) for view in views])  # step, component, place
     peaks = np.abs(tractions).max(axis=(0, 2))
     shown = [k for k in (0, 1) if peaks[k] > 0.005 * peaks.max()] or [0]
-    canvas = new_figure(6.6, 2.4 + 2.3 * len(shown))
+    canvas = style.new_figure(6.6, 2.4 + 2.3 * len(shown))
     panels = list(canvas.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0])
-    colors, mu = shades(len(views)), views[-1].friction
+    colors, mu = style.shades(len(views)), views[-1].friction
     draw_pressures(panels[0], views, cut)
     to_stress, stress = scaled(float(peaks.max()), "Pa")
     place = cut.along(cut.place)
     sides: set[float] = set()
     limit = mu * cut.values(views[-1]) if np.isfinite(mu) else np.zeros(place.size)
     for axes, k in zip(panels[1:], shown, strict=True):
-        axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
+        axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=1)
         for q, solution, color in zip(tractions[:, k], exact, colors, strict=True):
             axes.plot(place, q * to_stress, color=color, zorder=3, **_JOINED)
             if solution is not None and len(views) <= _COMPARED:
@@ -366,24 +346,24 @@ def _family(
                 axes.plot(cut.along(cut.fine), closed, zorder=5, **_THIN)
         for sign in (1.0, -1.0):  # on the sides where the traction lies
             if (sign * tractions[:, k]).max() > 0.05 * limit.max() > 0.0:
-                axes.plot(place, sign * limit * to_stress, color=GUIDE, lw=0.9, ls=":", zorder=1)
+                axes.plot(place, sign * limit * to_stress, color=style.GUIDE, lw=0.9, ls=":", zorder=1)
                 sides.add(sign)
         axes.set_ylabel(f"{cut.names()[k]} ({stress})")
         cut.show(axes)
     for axes in panels[:-1]:
         axes.set_xlabel("")
         axes.tick_params(labelbottom=False)
-    color_scale(canvas, panels, labels, colors)
+    style.color_scale(canvas, panels, labels, colors)
     named = ["Hertz"] if any(view.hertz_holds for view in views) else []
     named += sorted({solution.name for solution in exact if solution is not None})
     handles = [Line2D([], [], color=colors[0], label="computed", **_JOINED)]
     if sides:
         name = rf"{_SIDES[-1.0 in sides, 1.0 in sides]} in step {views[-1].number}"
-        handles.append(Line2D([], [], color=GUIDE, ls=":", lw=0.9, label=name))
+        handles.append(Line2D([], [], color=style.GUIDE, ls=":", lw=0.9, label=name))
     if named and len(views) <= _COMPARED:
         handles.append(Line2D([], [], label=", ".join(named), **_THIN))
-    legend_under(canvas, handles)
-    set_title(canvas, title)
+    style.legend_under(canvas, handles)
+    style.set_title(canvas, title)
     return canvas
 
 
@@ -391,7 +371,7 @@ _CURVES = 7
 
 
 @figure("wear", "pressure and worn depth along a line, by cycles of wear", needs="wear")
-def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
+def wear(result: Result | Dataset, angle: float = 0.0, through: Point | None = None) -> Figure:
     """Draw pressure and worn depth in a section of the contact, for several cycles of wear."""
     dataset = dataset_of(result)
     if "wear_cycles" not in dataset or "worn_depth" not in dataset:
@@ -403,12 +383,12 @@ def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | N
     deepest = dataset["max_worn_depth"].values[steps]
     wanted = np.linspace(0.0, deepest[-1], min(_CURVES, steps.size))
     places = np.unique(np.abs(deepest[:, None] - wanted).argmin(axis=0))
-    views = [StepView.of(result, int(dataset["step"].values[step])) for step in steps[places]]
+    views = [StepView(result, int(dataset["step"].values[step])) for step in steps[places]]
     cut = Cut.of(views, angle, through)
 
-    canvas = new_figure(5.6, 5.0)
+    canvas = style.new_figure(5.6, 5.0)
     above, below = canvas.subplots(2, 1, sharex=True)
-    colors = shades(len(views))
+    colors = style.shades(len(views))
     depths = [cut.values(view, view.data["worn_depth"].values) for view in views]
     pressures = [cut.values(view) for view in views]
     to_stress, stress = scaled(float(max(values.max() for values in pressures)), "Pa")
@@ -421,7 +401,7 @@ def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | N
     cut.show(below)
     below.invert_yaxis()
     labels = [f"{float(view.data['wear_cycles']):,.0f}".replace(",", "\u2009") for view in views]
-    color_scale(canvas, [above, below], labels, colors)
+    style.color_scale(canvas, [above, below], labels, colors)
     canvas.axes[-1].set_title("cycles", fontsize=9)
-    set_title(canvas, title_of(dataset))
+    style.set_title(canvas, title_of(dataset))
     return canvas

@@ -43,6 +43,21 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def panels_of(part: Figure | SubFigure, count: int, columns: int, **options: Any) -> list[Axes]:
+    """Return panels in rows of some columns; those that the last row has left over are hidden."""
+    panels = list(part.subplots(-(-count // columns), columns, squeeze=False, **options).flat)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return panels[:count]
+
+
+def new_panels(count: int, columns: int, *size: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure of panels: their width, their height, and the room for title and legend in inches."""
+    width, height, room = size
+    canvas = new_figure(width * columns, height * -(-count // columns) + room)
+    return canvas, panels_of(canvas, count, columns)
+
+
 def drawing(ax: Axes | None, width: float, height: float, equal: bool = False) -> tuple[Figure, Axes]:
     """Return the axes of the caller with their figure, or new ones of a size in inches.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +15,7 @@ from matplotlib.path import Path
 from matplotlib.tri import Triangulation
 
 from ..analytic.compare import PartialSlip
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core import measures
 from ..core.edges import ZoneMesh
 from ..core.measures import ROUND
@@ -25,32 +25,18 @@ from ..result.netcdf import triangles
 from ..result.result import Result
 from ..result.view import Results, StepView
 from ..text import worded
+from . import style
 from .maps import FEWER_ARROWS, Part, closed_solutions, map_panels, mesh_of, views_of
 from .registry import figure
-from .style import (
-    COMPUTED,
-    EXACT,
-    GUIDE,
-    IN_CONTACT,
-    THIRD,
-    drawing,
-    handles_of,
-    legend_under,
-    set_title,
-    shades,
-)
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def draw_zones(axes: Axes, view: StepView, exact: PartialSlip | None, part: Part) -> None:
     """Fill the stick and the slip zone of a step; outline contact area (Hertz) and exact stick area."""
 
-    def fill(mesh: ZoneMesh, **style: Any) -> None:
+    def fill(mesh: ZoneMesh, **look: Any) -> None:
         if polygons := mesh.outlines():
             paths = (Path(polygon * part.factor, closed=True) for polygon in polygons)
-            axes.add_patch(PathPatch(Path.make_compound_path(*paths), **style))
+            axes.add_patch(PathPatch(Path.make_compound_path(*paths), **look))
 
     contact = mesh_of(view, view.pressure, True)
     fill(contact, facecolor=SLIP, edgecolor="none")
@@ -71,7 +57,7 @@ def zone_legend(views: Sequence[StepView], exact: Sequence[PartialSlip | None]) 
     named = sorted({solution.name for solution in exact if solution is not None})
     if named:
         label = f"stick area, {' or '.join(named)}"
-        handles.append(Line2D([], [], color=EXACT, ls="--", lw=1.2, label=label))
+        handles.append(Line2D([], [], color=style.EXACT, ls="--", lw=1.2, label=label))
     return handles
 
 
@@ -117,8 +103,8 @@ def zones(
             name = "traction" if arrows == "traction" else "slip_increment"
             vector = view.field(f"{name}_x"), view.field(f"{name}_y")
             part.arrows(axes, view, vector, "black", FEWER_ARROWS)
-    legend_under(canvas, zone_legend(views, exact), ax)
-    set_title(canvas, title, ax)
+    style.legend_under(canvas, zone_legend(views, exact), ax)
+    style.set_title(canvas, title, ax)
     return canvas
 
 
@@ -128,11 +114,11 @@ def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None 
     views, labels, title = views_of(results, steps)
     part = Part.around(views, 1.15)
     height = float(np.clip(3.9 * part.aspect, 2.0, 6.0)) + 0.8
-    canvas, axes = drawing(ax, 6.4, height, equal=True)
-    colors = shades(len(views))
+    canvas, axes = style.drawing(ax, 6.4, height, equal=True)
+    colors = style.shades(len(views))
     for view, label, color in zip(views, labels, colors, strict=True):
         for polygon in mesh_of(view, view.pressure, True).outlines():
-            axes.plot(*(polygon * part.factor).T, color=GUIDE, lw=0.6, zorder=1)
+            axes.plot(*(polygon * part.factor).T, color=style.GUIDE, lw=0.6, zorder=1)
         name: str | None = label
         for polygon in view.stick_mesh().outlines():
             axes.plot(*(polygon * part.factor).T, color=color, label=name)
@@ -143,7 +129,7 @@ def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None 
     thin: dict[str, Any] = {"color": "black", "lw": 0.7, "linestyle": ":"}
     for solution in exact:
         part.outline(axes, solution.ellipse, solution.center, solution.stick_ratio, **thin)
-    axes.plot([], [], color=GUIDE, lw=0.6, label="contact area")
+    axes.plot([], [], color=style.GUIDE, lw=0.6, label="contact area")
     if exact:
         names = " or ".join(sorted({solution.name for solution in exact}))
         axes.plot([], [], label=f"stick area,\n{names}", **thin)
@@ -153,7 +139,7 @@ def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None 
         canvas.legend(loc="outside right center", **beside)
     else:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **beside)
-    set_title(canvas, title, ax)
+    style.set_title(canvas, title, ax)
     return canvas
 
 
@@ -161,17 +147,17 @@ _APART = 80  # spacings across the picture up to which nodes are distinguishable
 
 
 @figure("boundary", "nodes in contact (and stick), fitted circle or ellipse")
-def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
+def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
     With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).
     """
-    view = StepView.of(result, step)
+    view = StepView(result, step)
     if not view.contact.any():
         raise NotInResult("no node is in contact")
     part = Part.around([view], 1.2)
     width, height = part.size()
-    canvas, axes = drawing(ax, max(width, 4.6), height + 0.6, equal=True)
+    canvas, axes = style.drawing(ax, max(width, 4.6), height + 0.6, equal=True)
     x_min, x_max, y_min, y_max = part.limits
     x, y, rim = view.x * part.factor, view.y * part.factor, measures.boundary(view.contact)
     across = part.width / view.spacing
@@ -186,7 +172,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
     dot: dict[str, Any] = {"marker": "o", "mew": 0, "ls": "", "rasterized": across > _APART}
     stick = view.contact & view.stick if view.friction else None
     if stick is None:
-        groups = [(view.contact & ~rim, IN_CONTACT, "in contact")]
+        groups = [(view.contact & ~rim, style.IN_CONTACT, "in contact")]
     else:
         groups = [(stick, STICK, "stick"), (view.contact & ~stick, SLIP, "slip")]
     for nodes, color, label in groups:
@@ -204,7 +190,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
         pieces.set_label(f"edge, {size}")
         axes.add_collection(pieces)
     fitted, words = _fitted(view, view.contact, "a", view.center)
-    color = COMPUTED if stick is None else "black"
+    color = style.COMPUTED if stick is None else "black"
     part.outline(axes, fitted, fitted.center, label=f"fitted {words}", linestyle="-", color=color)
     if view.hertz is not None:
         a, b = view.hertz.semi_major, view.hertz.semi_minor
@@ -212,12 +198,12 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes |
         part.outline(axes, view.hertz, view.center, label=f"Hertz, {exact}")
     if stick is not None and np.count_nonzero(stick) > 2:
         fitted, words = _fitted(view, stick, "c")
-        part.outline(axes, fitted, fitted.center, label=f"stick: {words}", linestyle="-", color=THIRD)
+        part.outline(axes, fitted, fitted.center, label=f"stick: {words}", linestyle="-", color=style.THIRD)
     part.show(axes)
-    legend = legend_under(canvas, handles_of(axes), ax, size=8)
+    legend = style.legend_under(canvas, style.handles_of(axes), ax, size=8)
     for handle in legend.legend_handles[: len(groups) + 1]:
         cast(Line2D, handle).set_markersize(4.0)
-    set_title(canvas, view.title, ax)
+    style.set_title(canvas, view.title, ax)
     return canvas
 
 

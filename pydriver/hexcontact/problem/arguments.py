@@ -61,16 +61,8 @@ def refuse_unknown(keywords: Iterable[str], known: Collection[str], title: str) 
 class Body(Argument, deck_keys.Body):
     """One of the two bodies, an argument of `hexcontact.Case`.
 
-    Attributes
-    ----------
-    young_modulus : float or None
-        Young's modulus (Pa); None for a rigid body.
-    poisson_ratio : float or None
-        Poisson's ratio; None for a rigid body.
-    rigid : bool
-        Whether the body is rigid.
-    surface : Surface or None
-        Shape of its surface; None for a flat one, or if the case has a gap.
+    Young's modulus (Pa) and Poisson's ratio are None for a rigid body; the surface is None for a flat one, or
+    if the case has a gap.
     """
 
     @known_keywords

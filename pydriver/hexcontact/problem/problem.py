@@ -82,20 +82,10 @@ class Problem:
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Self:
-        """Read a deck.
+        """Read a deck; DeckError if it cannot be read, or with a sentence for each fault.
 
-        Parameters
-        ----------
-        path : str or Path
-            The deck.
-        overrides : mapping, optional
-            Values for single keys in place of the deck's: ``{"grid.spacing": "0.1 mm", "load.1.steps": 5}``.
-            Entries of arrays count from 1; None removes a key.
-
-        Raises
-        ------
-        DeckError
-            If it cannot be read, or with a sentence for each fault.
+        `overrides` are values for single keys in place of the deck's: ``{"grid.spacing": "0.1 mm",
+        "load.1.steps": 5}``. Entries of arrays count from 1; None removes a key.
         """
         data, text = toml.read_toml(path)
         if "parameter" in data and "body" not in data:

@@ -7,13 +7,14 @@ import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import netcdf_library
 from .._version import __version__
+from ..arrays import DataFrame, Dataset
 from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
@@ -25,10 +26,6 @@ from . import netcdf
 from .netcdf import is_mesh
 from .result import Result, at_hand
 from .step import is_kept, with_shown
-
-if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
 
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
 _TRIANGLE = 5  # number of this kind of cell in VTK
@@ -65,7 +62,7 @@ def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
     return steps
 
 
-def _fields(result: Result, number: int, source: str | None = "nodes") -> xarray.Dataset:
+def _fields(result: Result, number: int, source: str | None = "nodes") -> Dataset:
     """Return the fields of a step, with the tractions of a source."""
     one = result.step(number)
     if source != "nodes":
@@ -173,7 +170,7 @@ def _vtu(result: Result, number: int, source: str | None) -> str:
     )
 
 
-def _vts(result: Result, found: xarray.Dataset) -> str:
+def _vts(result: Result, found: Dataset) -> str:
     """Return quantities below the surface as a structured grid in XML; z points into body 1."""
     points, shape = as_volume(found)
     extent = " ".join(f"0 {n - 1}" for n in reversed(shape))
@@ -306,7 +303,7 @@ def to_csv(
     return written + [write_table(tables[name], target) for name, target in wanted.items()]
 
 
-def flat(found: xarray.Dataset) -> pandas.DataFrame:
+def flat(found: Dataset) -> DataFrame:
     """Return quantities at or below the surface as a table, a line for each point and step."""
     dims = [str(dim) for dim in next(iter(found.data_vars.values())).dims]
     columns = [name for name in ("step", "x", "y", "depth", "distance") if name in found.coords]
@@ -315,7 +312,7 @@ def flat(found: xarray.Dataset) -> pandas.DataFrame:
     return table.rename(columns={name: f"{name} [{unit}]" for name, unit in units.items() if unit})
 
 
-def write_table(table: pandas.DataFrame, target: Path) -> Path:
+def write_table(table: DataFrame, target: Path) -> Path:
     """Write a table as CSV."""
     require_replaceable(target, _beginning(table))
     _make(target.parent)
@@ -324,7 +321,7 @@ def write_table(table: pandas.DataFrame, target: Path) -> Path:
     return target
 
 
-def _beginning(table: pandas.DataFrame) -> str:
+def _beginning(table: DataFrame) -> str:
     """Return the start of the file of a table, by which it is known again."""
     return ",".join(table.columns[:4])
 

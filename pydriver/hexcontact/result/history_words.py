@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import half_axes, line_of, turning_points
 from ..deck.below import Stage
@@ -25,9 +26,6 @@ from ..variables import (
     names_where,
     spelled,
 )
-
-if TYPE_CHECKING:
-    import xarray
 
 History = Mapping[str, Any]
 Extent = tuple[float, float]
@@ -523,8 +521,8 @@ def _steps(names: Sequence[str]) -> str:
 
 
 def worn_by_cycle(
-    coefficient: float, steps: Iterable[Mapping[str, NDArray[Any]]], plane: xarray.Dataset, cell: float
-) -> xarray.Dataset:
+    coefficient: float, steps: Iterable[Mapping[str, NDArray[Any]]], plane: Dataset, cell: float
+) -> Dataset:
     """Return the wear of a cycle at the nodes, see `hexcontact.Result.wear`.
 
     `steps` have the fields `WEARING`; `plane` has the coordinates of the nodes; `cell` is the area of a node

@@ -7,22 +7,17 @@ import io
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, Dataset
 from ..errors import NotInResult
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
 from .history_words import extent_of, step_rows
 from .layout import history_of
 from .view import StepView
-
-if TYPE_CHECKING:
-    import xarray
-
 
 # Colors of zones in all pictures, which differ in black and white, too.
 STICK, SLIP = "#0072b2", "#f0c05a"
@@ -68,7 +63,7 @@ _ZONES = ("#ffffff", STICK, SLIP)
 _PIXELS = 240  # of the longer side of a picture
 
 
-def result_header(dataset: xarray.Dataset, path: str) -> str:
+def result_header(dataset: Dataset, path: str) -> str:
     """Return the header of a result: title, file, steps, nodes, spacing."""
     sizes, attributes = dataset.sizes, dataset.attrs
     steps = f"{sizes['step']} load step{'s' * (sizes['step'] != 1)}"
@@ -82,7 +77,7 @@ def result_header(dataset: xarray.Dataset, path: str) -> str:
     return visible(", ".join(filter(None, named))) + f"\n  {about}, spacing {spacing}"
 
 
-def result_rows(dataset: xarray.Dataset) -> list[Row]:
+def result_rows(dataset: Dataset) -> list[Row]:
     """Return rows of a table of the last step of a result."""
     last = dataset.isel(step=-1)
     history = {name: last[name].item() for name in history_of(dataset)}
@@ -92,7 +87,7 @@ def result_rows(dataset: xarray.Dataset) -> list[Row]:
         return [(spelled(name), f"{value}") for name, value in history.items()]
 
 
-def doubts(dataset: xarray.Dataset) -> list[str]:
+def doubts(dataset: Dataset) -> list[str]:
     """Return the warnings and notes that a result has of its case, marked."""
     return [
         f"{kind}: {line}"
@@ -101,7 +96,7 @@ def doubts(dataset: xarray.Dataset) -> list[str]:
     ]
 
 
-def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
+def result_html(dataset: Dataset, path: str, quantities: str) -> str:
     """Return the last step of a result as a table beside maps of it; `quantities` (HTML) unfold below."""
     title, _, about = result_header(dataset, path).partition("\n")
     last, stopped = f"Load step {int(dataset['step'][-1])}", dataset.attrs.get("stopped")
@@ -112,7 +107,7 @@ def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
     return f'<div><div style="{row}"><div>{table}</div>{"".join(_pictures(dataset))}</div>{below}</div>'
 
 
-def _pictures(dataset: xarray.Dataset) -> Iterable[str]:
+def _pictures(dataset: Dataset) -> Iterable[str]:
     """Yield maps of the last step: pressure, and zones of a contact with friction."""
     try:
         view = StepView(dataset, -1)

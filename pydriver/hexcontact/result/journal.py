@@ -153,6 +153,7 @@ class Journal:
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         self._left = [folder / name for name in names if name == STOPPED or _is_temporary(name, folder)]
         self._headers = [folder / HEADER] if HEADER in names else []
+        self._loads: dict[Path, list[Any]] = {}  # that records add
 
     def __len__(self) -> int:
         """Return the number of finished steps."""
@@ -168,6 +169,7 @@ class Journal:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
                 raise DeckError(f"{record} does not belong to the records before it: its run is another")
+            self._loads[record] = about["loads"]
             yield step
 
     @cached_property
@@ -183,7 +185,7 @@ class Journal:
         """The header with the loads that the records of a session add."""
         header = dataclasses.replace(self.header, loads=copy.copy(self.header.loads))
         for record in self.records[header.steps :] if header.loads is not None else ():
-            header.follow(read_about(record)["loads"])
+            header.follow(self._loads.get(record) or read_about(record)["loads"])
         return header
 
     @property

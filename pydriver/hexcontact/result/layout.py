@@ -6,27 +6,25 @@ The quantities are those of `hexcontact.variables`. `Layout` has dimensions, coo
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import integer
+from ..arrays import Dataset, integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
-
-if TYPE_CHECKING:
-    import xarray
 
 COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
@@ -202,15 +200,30 @@ class Layout:
             return values
         return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
 
-    def complete_fixed(self, known: dict[str, NDArray[Any]], step: Step) -> None:
-        """Complete the `known` part of the fields of all steps, on the whole window, by those of `step`."""
-        for name in FIXED:
-            if name in self.variables and name in step.fields:
-                before = known.get(name)
-                if before is None:
-                    known[name] = self.padded(name, step)
-                elif (unknown := np.isnan(before)).any():
-                    known[name] = np.where(unknown, self.padded(name, step), before)
+    def fill(self, columns: Mapping[str, Any], steps: Iterable[Step], lock: Any = None) -> None:
+        """Fill columns of `fields` from the steps, which are read once; the lock is held to write."""
+        lock = lock or contextlib.nullcontext()
+        fixed: dict[str, NDArray[Any]] = {}  # fields of all steps, as far as they are known
+        block: list[Step] = []
+        for position, step in enumerate(steps):
+            block.append(step)
+            if len(block) == self.block or position == len(self.steps) - 1:
+                first = position - len(block) + 1
+                with lock:
+                    for name in (name for name in columns if name not in FIXED):
+                        values = [self.field(name, first + place, one) for place, one in enumerate(block)]
+                        whole = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
+                        columns[name][first : position + 1] = whole
+                block.clear()
+            for name in FIXED:
+                if name in columns and name in step.fields:
+                    if name not in fixed:
+                        fixed[name] = self.padded(name, step)
+                    elif (unknown := np.isnan(fixed[name])).any():
+                        fixed[name] = np.where(unknown, self.padded(name, step), fixed[name])
+        with lock:
+            for name, field in fixed.items():
+                columns[name][...] = field
 
 
 def _union(windows: Sequence[Lattice]) -> Lattice:
@@ -240,12 +253,12 @@ def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[A
     return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
 
 
-def lattice_of(dataset: xarray.Dataset) -> Lattice:
+def lattice_of(dataset: Dataset) -> Lattice:
     """Return the lattice window of a result."""
     return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
 
 
-def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
+def step_of(dataset: Dataset, number: int) -> Dataset:
     """Return a load step of a result by its number, see `hexcontact.Result.step`."""
     number = integer(number, "step", "the number of a load step, from 1; -1 is the last one")
     numbers = dataset["step"].values
@@ -256,7 +269,7 @@ def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
     raise NoSuchStep(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
 
 
-def history_of(dataset: xarray.Dataset) -> list[str]:
+def history_of(dataset: Dataset) -> list[str]:
     """Return the names of the quantities of a result with one value by step."""
     return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("step",)]
 
@@ -267,7 +280,7 @@ def assemble(
     complete: bool = True,
     trials: Mapping[str, Sequence[Any]] | None = None,
     stopped: str = "",
-) -> xarray.Dataset:
+) -> Dataset:
     """Return the dataset of the steps of a run, which are read twice: no generator.
 
     `complete`: these are all steps of the run; `trials` as of `Layout`; `stopped`: reason of an early end.
@@ -279,14 +292,9 @@ def assemble(
     values = {
         name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
         for name in layout.fields
-        if name not in FIXED
     }
-    fixed: dict[str, NDArray[Any]] = {}
-    for position, step in enumerate(steps):
-        for name, array in values.items():
-            array[position] = layout.field(name, position, step)
-        layout.complete_fixed(fixed, step)
-    values |= fixed | layout.histories() | layout.coordinates() | layout.trials
+    layout.fill(values, steps)
+    values |= layout.histories() | layout.coordinates() | layout.trials
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

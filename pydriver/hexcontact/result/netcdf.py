@@ -13,7 +13,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Dataset
 from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
@@ -28,7 +29,6 @@ from ..errors import DeckError
 from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
 from ..variables import (
-    FIXED,
     INTERFACE,
     LARGEST,
     NOT_KEPT,
@@ -44,7 +44,6 @@ from .step import Step
 
 if TYPE_CHECKING:
     import netCDF4
-    import xarray
 
     from .result import Result
 
@@ -116,7 +115,7 @@ _LATER = {
 }
 
 
-def fault_of_result(dataset: xarray.Dataset) -> str:
+def fault_of_result(dataset: Dataset) -> str:
     """Return a fault of the dataset of a result file, whose fields may be unread; empty if there is none."""
     attributes = {str(name): value for name, value in dataset.attrs.items()}
     if fault := _fault_of_attributes(attributes):
@@ -163,7 +162,7 @@ def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
     return ""
 
 
-def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
+def _fault_of_coordinates(dataset: Dataset) -> str:
     """Return a fault of steps, rows and columns, which count one by one."""
     if dataset["step"].values[0] != 1:
         return "its steps do not begin with 1"
@@ -177,7 +176,7 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
     return ""
 
 
-def _fault_of_histories(dataset: xarray.Dataset) -> str:
+def _fault_of_histories(dataset: Dataset) -> str:
     """Return a fault of the numbers by step; empty if there is none."""
     known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
     history = {name: dataset[name].values for name in known}
@@ -188,13 +187,7 @@ def _fault_of_histories(dataset: xarray.Dataset) -> str:
             return _NO_STEP.format(name)
     lattice = lattice_of(dataset)
     window = lattice.size * lattice.cell_area
-    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]), window)
-
-
-def _fault_of_numbers(
-    history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str, window: float
-) -> str:
-    """Return a fault of values by step; a resumed run may have several tolerances."""
+    parameters, story = dataset.attrs, str(dataset.attrs["history"])  # which may have several tolerances
     given = [parameters.get("tolerance", 1.0), parameters.get("cycle_tolerance", 0.0)]
     tolerances = [*given, *map(float, chain(*re.findall(_CHANGED, story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
@@ -225,7 +218,7 @@ def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, 
     return low, high
 
 
-def _fault_of_fields(dataset: xarray.Dataset) -> str:
+def _fault_of_fields(dataset: Dataset) -> str:
     """Return a fault of the deck, or of the fields, which are read step by step; empty if there is none."""
     try:
         tomllib.loads(str(dataset.attrs["deck"]))
@@ -388,18 +381,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             for column, values in given:
                 column[...] = values
             write_mesh(file, layout.window)
-        fixed: dict[str, NDArray[Any]] = {}
-        of_all_steps = {name: columns.pop(name) for name in FIXED if name in columns}
-        block: list[Step] = []
-        for position, step in enumerate(steps):
-            block.append(step)
-            if len(block) == layout.block or position == len(layout.steps) - 1:
-                _write_block(columns, layout, position - len(block) + 1, block)
-                block.clear()
-            layout.complete_fixed(fixed, step)
-        with LOCK:
-            for name, column in of_all_steps.items():
-                column[...] = fixed[name]
+        layout.fill(columns, steps, LOCK)
 
 
 @contextlib.contextmanager
@@ -416,17 +398,6 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
-
-
-def _write_block(
-    columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
-) -> None:
-    """Write the fields of load steps, of which `first` is the place of the first."""
-    with LOCK:
-        for name, column in columns.items():
-            values = [layout.field(name, first + place, step) for place, step in enumerate(steps)]
-            block = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
-            column[first : first + len(values)] = block
 
 
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:

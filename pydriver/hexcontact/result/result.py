@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analytic.hertz_gap import friction_of
-from ..arrays import Array, has_entries, integer, number
+from ..arrays import Array, DataArray, DataFrame, Dataset, has_entries, integer, number
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stress, cycle_of
 from ..deck.faults import NOWHERE
@@ -26,9 +26,6 @@ from .layout import Quantities, history_of, lattice_of, step_of
 from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
-
     from ..analytic.compare import Comparison
 
 
@@ -48,27 +45,21 @@ class Result:
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; ``result.dataset`` is the
-    `xarray.Dataset` of all.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset or callable
-        As `assemble` makes it or `hexcontact.open_result` reads it; or what makes it when it is first used.
-    path : str
-        Its file; empty if there is none.
+    `xarray.Dataset` of all. It is made from that, or from what makes it when it is first used, and the path
+    of its file, empty if there is none.
     """
 
-    def __init__(self, dataset: xarray.Dataset | Callable[[], xarray.Dataset], path: str = "") -> None:
+    def __init__(self, dataset: Dataset | Callable[[], Dataset], path: str = "") -> None:
         self._made, self.path = dataset, path
 
     @property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> Dataset:
         """All quantities, and attributes of the run."""
         if callable(self._made):
             self._made = self._made()
         return self._made
 
-    def __getattr__(self, name: str) -> xarray.DataArray:
+    def __getattr__(self, name: str) -> DataArray:
         """Return a quantity."""
         if name.startswith("_") or name in ("dataset", "path"):
             raise AttributeError(name)
@@ -78,12 +69,12 @@ class Result:
             raise AttributeError(error.args[0]) from None
 
     @overload
-    def __getitem__(self, name: str) -> xarray.DataArray: ...
+    def __getitem__(self, name: str) -> DataArray: ...
 
     @overload
-    def __getitem__(self, name: slice) -> xarray.Dataset: ...
+    def __getitem__(self, name: slice) -> Dataset: ...
 
-    def __getitem__(self, name: str | slice) -> xarray.DataArray | xarray.Dataset:
+    def __getitem__(self, name: str | slice) -> DataArray | Dataset:
         """Return a quantity, also ``step``, which is a method as an attribute; a slice: those load steps.
 
         Slices count as those of ``list(result)``: ``result[1:3]`` has the load steps 2 and 3.
@@ -110,7 +101,7 @@ class Result:
         """Test whether there is a quantity of this name."""
         return name in self.dataset.variables
 
-    def __iter__(self) -> Iterator[xarray.Dataset]:
+    def __iter__(self) -> Iterator[Dataset]:
         """Iterate over the load steps."""
         return (self.dataset.isel(step=place) for place in range(len(self)))
 
@@ -144,26 +135,16 @@ class Result:
         """The lattice window of the result."""
         return lattice_of(self.dataset)
 
-    def step(self, number: int) -> xarray.Dataset:
-        """Return one load step.
-
-        Parameters
-        ----------
-        number : int
-            Number of the step, the first is 1; -1 is the last one.
-
-        Raises
-        ------
-        IndexError
-            If there is no such step.
-        """
+    def step(self, number: int) -> Dataset:
+        """Return a load step by its number, from 1; -1 is the last one; IndexError if there is none."""
         return step_of(self.dataset, number)
 
     def traction_field(self, number: int = -1, source: str | None = None) -> TractionField:
         """Return pressure and shear traction of a load step at any point: p, q_x, q_y of x and y (m).
 
         They go to zero like square roots at the edge of the contact, and keep to friction up to the edge of
-        the stick area, both between the nodes. ``field.at_nodes()`` has the values at the nodes.
+        the stick area, both between the nodes. ``field.at_nodes()`` has the values at the nodes. DeckError if
+        pressure or gap were not kept, IndexError if there is no such step.
 
         Parameters
         ----------
@@ -173,11 +154,6 @@ class Result:
             ``"edges"``, or ``"nodes"``: the solution at the nodes, joined linearly. By default the edges,
             if the gap was kept and they are sharp; ``field.source`` is the one taken. Of unknown laws of
             friction the shear traction is that of the nodes (``field.sheared``).
-
-        Raises
-        ------
-        DeckError, IndexError
-            If pressure or gap were not kept, or there is no such step.
         """
         return self._nodal(number).traction_field(source)
 
@@ -186,17 +162,17 @@ class Result:
         return PressureField.of(self.traction_field(number, "edges"))
 
     @property
-    def history(self) -> pandas.DataFrame:
+    def history(self) -> DataFrame:
         """Table of all quantities with one value by step."""
         return self.dataset[history_of(self.dataset)].to_dataframe()
 
     @property
-    def segments(self) -> pandas.DataFrame:
+    def segments(self) -> DataFrame:
         """Segments of the load history: label, first and last step, energy that friction dissipated (J)."""
         return self._parts(segments)
 
     @property
-    def cycles(self) -> pandas.DataFrame:
+    def cycles(self) -> DataFrame:
         """Closed cycles of a load history with friction, a line each; empty if there are none.
 
         Columns: kind of loading ("shear", "torsion", "normal"), first and last step, energy that friction
@@ -206,7 +182,7 @@ class Result:
         """
         return self._parts(cycles)
 
-    def _parts(self, of: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> pandas.DataFrame:
+    def _parts(self, of: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> DataFrame:
         import pandas
 
         rows = of(cast(Any, self.history.to_dict("records")))
@@ -215,28 +191,11 @@ class Result:
     # --- between the nodes ----------------------------------------------------------------------------------
 
     def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1, source: str | None = None) -> Array:
-        """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
+        """Return a field (SI), such as "pressure", at points of the plane x, y (m, broadcast) in a load step.
 
-        Parameters
-        ----------
-        name : str
-            Name of the field, such as "pressure". The zone at a point is that of the nearest node.
-        x, y : array_like
-            Points (m), broadcast.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
-        source : str, optional
-            As of `traction_field`.
-
-        Returns
-        -------
-        ndarray
-            Values (SI). Outside the window tractions and slip are 0, other fields NaN.
-
-        Raises
-        ------
-        DeckError, IndexError
-            If there is no such field in the output, or no such step.
+        Tractions go to the edges, others are linear on the triangles; the zone is that of the nearest node.
+        Outside the window tractions and slip are 0, other fields NaN. Step and source are as of
+        `traction_field`. DeckError or IndexError if there is no such field in the output, or no such step.
         """
         return self._nodal(step).at(name, x, y, source)
 
@@ -248,7 +207,7 @@ class Result:
         step: int = -1,
         points: int | None = None,
         source: str | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fields along a line between two points.
 
         Along a line a field is a polygon. By default the points are its corners, so that straight lines
@@ -260,24 +219,16 @@ class Result:
             Names of fields, such as "pressure"; default: all of the output.
         start, end : tuple of float
             Ends of the line, m.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
+        step, source : int, str, optional
+            As of `traction_field`; the attribute ``tractions`` is the source taken.
         points : int, optional
             Number of evenly spaced points instead.
-        source : str, optional
-            As of `traction_field`; the attribute ``tractions`` is the one taken.
 
         Returns
         -------
         xarray.Dataset
-            Dimension ``distance`` (m) from the start; ``x`` and ``y`` (m) are coordinates.
-
-        Raises
-        ------
-        DeckError
-            If there is no such field in the output, or the line has no length.
-        IndexError
-            If there is no such step.
+            Dimension ``distance`` (m) from the start; ``x`` and ``y`` (m) are coordinates. DeckError or
+            IndexError if there is no such field or step, or the line has no length.
         """
         return self._nodal(step).profile(*names, start=start, end=end, points=points, source=source)
 
@@ -289,32 +240,16 @@ class Result:
         step: int = -1,
         points: int | None = None,
         source: str | None = None,
-    ) -> xarray.Dataset:
-        """Return fields along a line across the whole contact.
+    ) -> Dataset:
+        """Return fields along a line across the whole contact; other arguments and result as of `profile`.
 
         Parameters
         ----------
-        *names : str
-            Names of fields, such as "pressure"; default: all of the output.
         angle : float
             Direction of the line from x, rad.
         through : tuple of float, optional
             A point on it (m), from which ``distance`` counts; default: the node next to the center of
-            pressure.
-        step, points, source : int, int and str, optional
-            As for `profile`.
-
-        Returns
-        -------
-        xarray.Dataset
-            As for `profile`.
-
-        Raises
-        ------
-        DeckError
-            If there is no such field in the output, or nothing is in contact.
-        IndexError
-            If there is no such step.
+            pressure, DeckError if nothing is in contact.
         """
         along: dict[str, Any] = {"angle": angle, "through": through, "points": points, "source": source}
         return self._nodal(step).section(*names, **along)
@@ -324,7 +259,7 @@ class Result:
         coefficient: float,
         segment: str | Sequence[str] | None = None,
         steps: Sequence[int] | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return the wear of one cycle of the loads, of a run with friction and without [wear].
 
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
@@ -352,7 +287,7 @@ class Result:
         body: int = 1,
         source: str | None = None,
         **where: Any,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return stresses and displacements (SI) below the surface, see docs/stress.md.
 
         `components` are names of `hexcontact.variables.STRESSES`; several numbers of a step give the dataset
@@ -386,8 +321,11 @@ class Result:
         steps: Sequence[int] | None = None,
         body: int = 1,
         **given: Any,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fatigue parameters (SI) over a closed cycle, see docs/fatigue.md.
+
+        DeckError if a name, a constant or the body is wrong, the segments are no closed cycle, or fields of
+        its steps were not kept; ResourceError if there is not enough memory.
 
         Parameters
         ----------
@@ -403,14 +341,6 @@ class Result:
         **given
             Constants of the parameters, as in the table [[fatigue]] of a deck: ``findley_slope`` and others,
             in SI or text with a unit; and the region as of `stress`, by default the nodes of the surface.
-
-        Raises
-        ------
-        DeckError
-            If a name, a constant or the body is wrong, the segments are no closed cycle, or fields of its
-            steps were not kept.
-        ResourceError
-            If there is not enough memory.
         """
         constants = {key: given.pop(key) for key in [*given] if key in Criteria.model_fields}
         criteria = Criteria.parse({"parameters": parameters, **constants}, NOWHERE)
@@ -435,7 +365,7 @@ class Result:
         steps: Sequence[int] | None = None,
         body: int = 1,
         **where: Any,
-    ) -> Iterator[pandas.DataFrame]:
+    ) -> Iterator[DataFrame]:
         """Yield the stresses of a cycle by point and load step, in MPa, as pyLife takes them, block by block.
 
         Arguments as of `fatigue`. The index is ``node_id, load_step``; the columns are ``x``, ``y`` and
@@ -495,26 +425,13 @@ class Result:
         """Names, units and meanings of all quantities; printed, a table."""
         return Quantities([str(name) for name in self.dataset.variables])
 
-    def to_dataframe(self, *names: str, step: int | None = None) -> pandas.DataFrame:
-        """Return quantities as a table; ``attrs["units"]`` of it has their units.
+    def to_dataframe(self, *names: str, step: int | None = None) -> DataFrame:
+        """Return quantities (SI) as a table; ``attrs["units"]`` of it has their units.
 
-        Parameters
-        ----------
-        *names : str
-            Names of quantities; default: all with one value by step. A line of the table is a load step, with
-            fields a node of a load step.
-        step : int, optional
-            Number of one step; -1 is the last one; default: all.
-
-        Returns
-        -------
-        pandas.DataFrame
-            SI units. The index is ``step``, or ``step, row, col`` with columns ``x`` and ``y``.
-
-        Raises
-        ------
-        KeyError, IndexError
-            If there is no such quantity, or no such step.
+        By default these are all with one value by step: a line is a load step, with fields a node of a load
+        step, and the index is ``step``, or ``step, row, col`` with columns ``x`` and ``y``. `step` is the
+        number of one, -1 the last; default: all. KeyError or IndexError if there is no such quantity, or no
+        such step.
         """
         data = self.dataset if step is None else self.dataset.sel(step=[int(self.step(step)["step"])])
         chosen = [self[name].name for name in names] or list(self.history.columns)
@@ -540,20 +457,14 @@ class Result:
             closed solutions are found from the deck and the load history: Hertz, Sneddon and others for the
             pressure, Cattaneo, Mindlin and Deresiewicz for shear, Lubkin for torsion, Spence for dissimilar
             bodies. The table has those that hold.
-        step : int
-            Number of the load step, the first is 1; -1 is the last one.
-        name : str
-            Name of a given solution.
+        step, name : int, str
+            Number of the load step, the first is 1, -1 the last one; and name of a given solution.
 
         Returns
         -------
         Comparison
             A table: quantity, solution, exact, computed, error. Empty, with a reason, if none is known.
-
-        Raises
-        ------
-        KeyError, IndexError
-            If there is no such quantity, or no such step.
+            KeyError or IndexError if there is no such quantity, or no such step.
         """
         from ..analytic.compare import compare
 
@@ -583,9 +494,14 @@ class Result:
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())
 
 
+def as_result(result: Result | Dataset) -> Result:
+    """Return a result by its dataset, or itself."""
+    return result if isinstance(result, Result) else Result(result)
+
+
 def at_hand(
     result: Result, kept: list[int], names: list[str] | None = None, anew: bool = False
-) -> Iterator[tuple[str, xarray.Dataset]]:
+) -> Iterator[tuple[str, Dataset]]:
     """Yield name and dataset of each table, or of those named, of the deck of a result.
 
     Tables of the run are read from their files; with `anew` all are computed.
@@ -600,7 +516,7 @@ def at_hand(
             yield name, found
 
 
-def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> xarray.Dataset:
+def _of_table(result: Result, name: str, table: Stress | Fatigue, kept: list[int]) -> Dataset:
     """Return the dataset of a table of the deck."""
     if isinstance(table, Fatigue):
         constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}

@@ -13,13 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..analytic.hertz_gap import friction_of, is_compliant
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
@@ -27,10 +27,6 @@ from ..deck.below import SOURCES
 from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
 from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
-
-if TYPE_CHECKING:
-    import xarray
-
 
 Point = tuple[float, float]
 Fields = Mapping[str, NDArray[Any]]
@@ -121,7 +117,7 @@ class NodalStep:
 
     def profile(
         self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fields along a line between two points; see `hexcontact.Result.profile`."""
         return self._along(Line(start, end), names, points, source)
 
@@ -132,14 +128,12 @@ class NodalStep:
         through: Point | None = None,
         points: int | None = None,
         source: str | None = None,
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return fields along a line across the contact; see `hexcontact.Result.section`."""
         pressure = chosen_fields(["pressure"], self.fields, self.number)["pressure"]
         return self._along(Line(*section_ends(self.lattice, pressure, angle, through)), names, points, source)
 
-    def _along(
-        self, line: Line, names: Sequence[str], points: int | None, source: str | None
-    ) -> xarray.Dataset:
+    def _along(self, line: Line, names: Sequence[str], points: int | None, source: str | None) -> Dataset:
         fields = chosen_fields(names, self.fields, self.number)
         return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
 
@@ -148,7 +142,7 @@ class NodalStep:
         return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
 
-def nodal(step: xarray.Dataset, lattice: Lattice) -> NodalStep:
+def nodal(step: Dataset, lattice: Lattice) -> NodalStep:
     """Return a load step of a result, whose fields are read at their first use."""
     known = step.attrs
     return NodalStep(
@@ -173,7 +167,7 @@ def loaded(step: NodalStep, more: Sequence[str] = (), edges: bool = True) -> dic
     return dict(chosen_fields(names, step.fields, step.number))
 
 
-def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
+def with_shown(step: Dataset, lattice: Lattice, source: str | None = None) -> Dataset:
     """Return a load step of a result with the tractions of a source at the nodes."""
     names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]
     if "pressure" not in names:
@@ -184,19 +178,11 @@ def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None
 
 
 class PressureField:
-    """The pressure of a solution at any point.
+    """The pressure of a solution at any point, from pressure (Pa) and gap (m) at the nodes.
 
     Near the edge of the contact its square is interpolated, which is linear in the distance; elsewhere, and
-    where the contact ends at nodes that can never touch, the pressure itself is.
-
-    Parameters
-    ----------
-    pressure, gap : ndarray, shape (n_row, n_col)
-        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where the bodies cannot touch.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
+    where the contact ends at nodes that can never touch (the gap is NaN), the pressure itself is. `basis` has
+    the basis vectors of the lattice as rows (m), `start` is the position of node [0, 0] (m).
     """
 
     def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:
@@ -279,7 +265,7 @@ def profile(
     points: int | None = None,
     tractions: TractionField | None = None,
     **attributes: Any,
-) -> xarray.Dataset:
+) -> Dataset:
     """Return fields along a line, over ``distance`` (m), with `attributes` of the dataset.
 
     Without a number of `points` they are the corners of the polygon of a field, so that straight lines
@@ -434,7 +420,7 @@ class Step(NodalStep):
 
     def stress_at(
         self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
-    ) -> xarray.Dataset:
+    ) -> Dataset:
         """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
         from ..interior.stress import Loaded, below
 

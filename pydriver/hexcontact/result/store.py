@@ -23,22 +23,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import Lock, begun, flush, make_anew, names_a_run, reading, replacing, require_utf8
-from .journal import (
-    HEADER,
-    LARGE,
-    STOPPED,
-    SUFFIX,
-    Header,
-    Journal,
-    TrialFolder,
-    foreign_file,
-    journal_of,
-    linked_folder,
-    read_record,
-    remove_all,
-    write_header,
-    write_record,
-)
+from . import journal as records
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
@@ -51,36 +36,23 @@ _LACKING = {*LACKING, None}
 
 
 def open_result(path: str | os.PathLike[str]) -> Result:
-    """Open the result of a run, finished or not.
+    """Open the result of a run, finished or not; fields of a finished one are read at their first use.
 
-    Parameters
-    ----------
-    path : path
-        The output file, which may be missing if the journal of an unfinished run is beside it; or the folder
-        of a journal.
-
-    Returns
-    -------
-    Result
-        Fields of a finished run are read from the file at their first use.
-
-    Raises
-    ------
-    DeckError
-        If there is no such file, or it is damaged, of another kind or of another version.
+    `path` is the output file, which may be missing if the journal of an unfinished run is beside it; or the
+    folder of a journal. DeckError if there is no such file, or it is damaged, of another kind or version.
     """
     target = Path(path)
     for _ in range(2):  # again if a run that just finished deleted its journal meanwhile
         with contextlib.suppress(FileNotFoundError):
             if target.is_dir():
-                if journal := Journal(target):
+                if journal := records.Journal(target):
                     return journal.result(target)
                 raise DeckError(f"{target} is a folder without finished steps in it")
             output = read_output(target) if target.exists() else None
             if output is not None and output.complete:
                 return output
-            journal = Journal(journal_of(target))
-            if not journal and output is None and (trials := TrialFolder(journal.folder)):
+            journal = records.Journal(records.journal_of(target))
+            if not journal and output is None and (trials := records.TrialFolder(journal.folder)):
                 return trials.result(target)
             if journal and (output is None or _continues(journal, output)):
                 if output is not None:
@@ -91,7 +63,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     raise DeckError(f"there is no file {target}")
 
 
-def _continues(journal: Journal, output: Result) -> bool:
+def _continues(journal: records.Journal, output: Result) -> bool:
     """Test whether the steps of `output` are the first ones of `journal`."""
     return len(journal) >= len(output) and journal.run == output.dataset.attrs.get("run")
 
@@ -126,7 +98,7 @@ class Store:
 
     def describe(self, metadata: Metadata, loads: list[str] | None = None) -> None:
         """Set the metadata, of a session with its loads apart, which `append` may add to."""
-        self._header, self._described = Header(metadata, loads, len(self.heads)), False
+        self._header, self._described = records.Header(metadata, loads, len(self.heads)), False
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
@@ -154,7 +126,7 @@ class Store:
         """Set the paths of an output that can be written."""
         require_utf8(path, "a netCDF file")
         self.path = Path(os.path.realpath(path))
-        self.folder = journal_of(self.path)
+        self.folder = records.journal_of(self.path)
         self.heads: list[Step] = []
         self._last: Step | None = None  # with its fields, unless they are large
         self._mutex = threading.RLock()  # close() may come from another thread than append()
@@ -177,7 +149,7 @@ class Store:
 
         The time at which the run `began` shows whether a complete output is its own if it left no records.
         """
-        journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
+        journal, trials = records.Journal(self.folder, companions=True), records.TrialFolder(self.folder)
         left = trials.metadata if trials else None
         output = None
         with contextlib.suppress(DeckError):  # another file is not replaced
@@ -193,11 +165,11 @@ class Store:
                 "again with --overwrite (overwrite=True in Python)"
             )
         if ours and complete:  # killed while it deleted the journal
-            remove_all(self.folder)
+            records.remove_all(self.folder)
             return None
         if left is not None:
             self.metadata = left
-            self._refuse_newer(not ours, trials.folder / HEADER)
+            self._refuse_newer(not ours, trials.folder / records.HEADER)
             return None
         if not journal and output is not None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
@@ -234,7 +206,7 @@ class Store:
         """Prepare a reopened journal for further steps."""
         self.metadata = metadata
         with self.writing("the journal"):
-            Journal(self.folder).tidy()
+            records.Journal(self.folder).tidy()
 
     def _locked(self) -> tuple[Lock, bool]:
         """Return the lock of the journal, and whether its folder was there before."""
@@ -248,7 +220,8 @@ class Store:
             flush(self.path.parent)
             left = there and names_a_run(self.folder / "lock")
             if there and (
-                foreign := linked_folder(self.folder) or (None if left else foreign_file(self.folder))
+                foreign := records.linked_folder(self.folder)
+                or (None if left else records.foreign_file(self.folder))
             ):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
@@ -259,7 +232,9 @@ class Store:
 
     def _take_over(self, overwrite: bool, there: bool) -> None:
         """Refuse or delete an existing output or unfinished run, whose folder is `there`."""
-        left, trials = (Journal(self.folder), TrialFolder(self.folder)) if there else (None, None)
+        left, trials = (
+            (records.Journal(self.folder), records.TrialFolder(self.folder)) if there else (None, None)
+        )
         if (left or trials) and not overwrite:
             count, what = (len(trials.solutions), "lattice") if trials else (len(left or ()), "step")
             raise DeckError(
@@ -285,7 +260,7 @@ class Store:
                     if old is not None:
                         old.close()
             if there:
-                remove_all(self.folder)
+                records.remove_all(self.folder)
 
     def __enter__(self) -> Self:
         """Return the store."""
@@ -310,7 +285,7 @@ class Store:
         """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
         planned, count = self.metadata.planned_steps, len(self.heads)
-        finished = TrialFolder(self.folder).kept
+        finished = records.TrialFolder(self.folder).kept
         if self.heads and planned:
             finished = f"{count} of {planned} load steps are finished"
         elif self.heads:
@@ -350,24 +325,24 @@ class Store:
             self._require_open()
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
-            record = self.folder / f"{step.number:06d}{SUFFIX}"
+            record = self.folder / f"{step.number:06d}{records.SUFFIX}"
             try:
                 with self.writing(f"step {step.number}"):
                     if not self._described:
-                        write_header(self.folder, self._header)
+                        records.write_header(self.folder, self._header)
                     with self._replacing(record) as path:
-                        write_record(path, self._header.metadata.run, step, loads)
+                        records.write_record(path, self._header.metadata.run, step, loads)
             except BaseException:
                 if not self.heads:
-                    (self.folder / HEADER).unlink(missing_ok=True)
+                    (self.folder / records.HEADER).unlink(missing_ok=True)
                 raise
             self._described = True
             if loads:
                 self._header.follow(loads)
             if step.companion and "until" in step.control and step.number > 2:
-                self._lighten(self.folder / f"{step.number - 2:06d}{SUFFIX}")
+                self._lighten(self.folder / f"{step.number - 2:06d}{records.SUFFIX}")
             self.heads.append(step.head)
-            self._last = step if sum(v.nbytes for v in step.fields.values()) < LARGE else None
+            self._last = step if sum(v.nbytes for v in step.fields.values()) < records.LARGE else None
 
     def publish(self) -> None:
         """Write an interim output if one is due; errors as those of `append`, but all steps remain."""
@@ -384,9 +359,9 @@ class Store:
     def _lighten(self, record: Path) -> None:
         """Remove restart data from an older record; the last two keep it, since one may be lost."""
         with self.writing("the journal"):
-            about, before = read_record(record)
+            about, before = records.read_record(record)
             with self._replacing(record) as path:
-                write_record(path, about["run"], before, about["loads"])
+                records.write_record(path, about["run"], before, about["loads"])
 
     def finish(
         self,
@@ -406,13 +381,13 @@ class Store:
                 layout = Layout(self.metadata, heads, trials)
                 self._put_together(layout, (steps or self._steps)(), complete=True)
             self.finished = True
-            remove_all(self.folder)
+            records.remove_all(self.folder)
             self.close()
 
     def _steps(self) -> Iterator[Step]:
         """Yield the finished steps: their records, and the last one as it is."""
         recorded = len(self.heads) - (self._last is not None)
-        yield from itertools.islice(Journal(self.folder, ours=True), recorded) if recorded else ()
+        yield from itertools.islice(records.Journal(self.folder, ours=True), recorded) if recorded else ()
         if self._last is not None:
             yield self._last
 
@@ -426,10 +401,10 @@ class Store:
             if self._closed:
                 return
             self._closed = True
-            if reason and (self.heads or TrialFolder(self.folder)):
+            if reason and (self.heads or records.TrialFolder(self.folder)):
                 with contextlib.suppress(OSError):
-                    make_anew(self.folder / STOPPED)
-                    (self.folder / STOPPED).write_text(reason, encoding="utf-8")
+                    make_anew(self.folder / records.STOPPED)
+                    (self.folder / records.STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it
                 self.folder.rmdir()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
+from typing import Protocol, TypeAlias, cast
 
 import numpy as np
 
 from ..analytic.hertz_gap import QuadraticGap, friction_of, is_worn, pressure_is_frictionless
-from ..arrays import Array, Mask
+from ..arrays import Array, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.lattice import linear
 from ..errors import NotInResult
@@ -19,10 +19,6 @@ from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelle
 from .layout import lattice_of, step_of
 from .step import is_kept, nodal
 
-if TYPE_CHECKING:
-    import xarray
-
-
 STICK = 1  # value of zone at a sticking node
 
 
@@ -30,24 +26,25 @@ class HasDataset(Protocol):
     """An object with a data set, such as a result."""
 
     @property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> Dataset:
         """Its data set."""
         ...
 
 
-AnyResult: TypeAlias = "HasDataset | xarray.Dataset"
+AnyResult: TypeAlias = "HasDataset | Dataset"
 Results: TypeAlias = "AnyResult | Sequence[AnyResult]"
 
 
-def title_of(dataset: xarray.Dataset) -> str:
+def title_of(dataset: Dataset) -> str:
     """Return the title of a result for pictures, with escaped dollars."""
     return visible(str(dataset.attrs.get("title", ""))).replace("$", r"\$")
 
 
 class StepView:
-    """One load step of a result for pictures; SI units, arrays over the nodes of the window."""
+    """A load step of a result, from 1 (-1: the last), for pictures: SI units, arrays over the nodes."""
 
-    def __init__(self, dataset: xarray.Dataset, step: int, source: str | None = None) -> None:
+    def __init__(self, result: AnyResult, step: int, source: str | None = None) -> None:
+        dataset = dataset_of(result)
         self.source = source  # of the tractions; None: the edges where they are known
         self.data = step_of(dataset, step)
         self.number = int(self.data["step"])
@@ -66,11 +63,6 @@ class StepView:
         several = f"step {self.number}" if dataset.sizes["step"] > 1 else ""
         named = ", ".join(filter(None, (title_of(dataset), several)))
         self.title = f"{named} ({_loads(self.data)})".lstrip()
-
-    @classmethod
-    def of(cls, result: AnyResult, step: int, source: str | None = None) -> StepView:
-        """Return the view of step number ``step`` (from 1; -1 is the last one) of a result."""
-        return cls(dataset_of(result), step, source)
 
     @property
     def friction(self) -> float:
@@ -182,7 +174,7 @@ class StepView:
         return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
 
 
-def _loads(one: xarray.Dataset) -> str:
+def _loads(one: Dataset) -> str:
     """Name the loads of a step: the normal load, tangential ones that are more than noise, bulk stress."""
     normal = float(one["normal_load"])
     mu = float(one.attrs.get("friction_coefficient", 1.0))
@@ -208,12 +200,17 @@ def as_list(results: Results) -> list[AnyResult]:
     return list(results) if isinstance(results, Sequence) else [results]
 
 
-def dataset_of(result: AnyResult) -> xarray.Dataset:
+def dataset_of(result: AnyResult) -> Dataset:
     """Return the dataset of a result, or the dataset itself."""
-    return cast("xarray.Dataset", getattr(result, "dataset", result))
+    return cast(Dataset, getattr(result, "dataset", result))
 
 
-def last_steps(study: xarray.Dataset) -> xarray.Dataset:
+def parameters_of(study: Dataset) -> list[str]:
+    """Return the names of the parameters of a study."""
+    return [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
+
+
+def last_steps(study: Dataset) -> Dataset:
     """Return the result of a study with the last load step of each case only."""
     if "step" not in study.dims:
         return study

@@ -13,18 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core import steps as core
 from ..core.friction import ContactState
-from ..core.steps import (
-    FAILED,
-    LIMITED,
-    OUTGROWN,
-    REJECTED,
-    begin_step,
-    forget_changes,
-    new_steps,
-    record_of,
-    restored,
-)
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
@@ -70,10 +60,10 @@ class AdaptivePath(GivenPath):
         self._whole: ContactState | None = None  # the path in whole steps; None: the same as in halves
         control = before[-1].control if before else {}
         area = float(control["area"]) if before else window.largest_contact_area()
-        self._steps = new_steps(case.solver.step_tolerance, not case.full_contact, area)
+        self._steps = core.new_steps(case.solver.step_tolerance, not case.full_contact, area)
         if before:
             self.position, fraction = int(control["position"]), float(control["fraction"])
-            self._steps = restored(self._steps._replace(fraction=fraction), control["chooser"])
+            self._steps = core.restored(self._steps._replace(fraction=fraction), control["chooser"])
             if before[-1].companion:
                 state: dict[str, Any] = {**before[-1].companion, **control["companion"]}
                 self._whole = ContactState(**state)
@@ -88,7 +78,7 @@ class AdaptivePath(GivenPath):
         """Solve the rest of an adaptive segment, or a given load step; yield each step and its end."""
         if target.ramp is None:
             for step, reached in super().steps(state, self._numbered(target), begun):
-                self._steps, self._whole = forget_changes(self._steps)._replace(fraction=1.0), None
+                self._steps, self._whole = core.forget_changes(self._steps)._replace(fraction=1.0), None
                 yield self._placed(step), reached
             return
         place = self.position
@@ -105,7 +95,7 @@ class AdaptivePath(GivenPath):
                 "traction_step_error": now.traction_error,
                 "traction_step_change": now.traction_change,
                 "rejected_steps": now.rejected,
-                "step_limited": int(now.verdict == LIMITED),
+                "step_limited": int(now.verdict == core.LIMITED),
                 "segment_fraction": now.end,
             }
             state = reached
@@ -124,7 +114,7 @@ class AdaptivePath(GivenPath):
             "load_steps": count,
             "done": 1.0 if self.position == count else done,
             "area": self._steps.area,
-            "chooser": record_of(self._steps),
+            "chooser": core.record_of(self._steps),
         }
         companion: dict[str, Any] = {}
         if self._whole is not None:
@@ -138,22 +128,22 @@ class AdaptivePath(GivenPath):
     ) -> tuple[ContactState | None, ContactState]:
         """Attempt load steps on a growing window until one is taken; return the states before and after."""
         assert target.ramp is not None
-        self._steps = begin_step(self._steps, target.ramp.largest)
+        self._steps = core.begin_step(self._steps, target.ramp.largest)
         while True:
             middle = 0.5 * (self._steps.start + self._steps.end)
             parts = [self._numbered(target.until(part)) for part in (middle, self._steps.end)]
             driven = [(part, part.values(begun)) for part in parts]
             self._steps, reached, whole = self.window.attempt(self._steps, state, self._whole, driven)
-            if self._steps.verdict == FAILED:
+            if self._steps.verdict == core.FAILED:
                 from . import nonconvergence
 
                 failed = driven[self._steps.reached != middle]
                 raise nonconvergence.error(self.case, self.window.lattice, reached, *failed)
-            if self._steps.verdict == OUTGROWN:
+            if self._steps.verdict == core.OUTGROWN:
                 smaller = self.window.lattice
                 self.window = self.window.grown(reached, self._numbered(target))
                 state = self.window.carried(state, smaller)
                 self._whole = self.window.carried(self._whole, smaller)
-            elif self._steps.verdict != REJECTED:
+            elif self._steps.verdict != core.REJECTED:
                 self._whole = whole
                 return state, reached

@@ -5,6 +5,11 @@ history, until the last two agree to the target. Then four shifted copies of the
 which together have as many nodes as the finest, show the scatter, and errors are estimated. If they miss the
 target, the next level follows. The solutions are independent, since the solvers start every load step on
 coarser lattices of their own.
+
+The difference of a solution and the limit of vanishing spacing has two parts: a trend with the spacing, and a
+scatter, since the contact lies differently on every lattice, often the larger part, which shifted copies show
+at the least cost. The core fits both parts to the last solutions, for every scalar of the history and every
+load step (fortran/path/discretization_error.f90).
 """
 
 from __future__ import annotations
@@ -17,16 +22,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..core.measures import limits_of_error, unresolved_slip_zones
 from ..errors import DeckError, ResourceError
+from ..problem.loads import LoadStep
 from ..problem.preview import SHIFTS, Trial
 from ..problem.problem import LEAST_LEVELS, RATIO, Problem
 from ..result.journal import Journal, Solution, TrialFolder, journal_of
 from ..result.layout import Metadata
 from ..result.step import Step
 from ..result.store import Store
-from ..variables import ESTIMATED, spelled
-from . import accuracy
+from ..variables import ESTIMATED, LOADS, VARIABLES, spelled
 from .events import Listener
 from .memory_needed import require_memory
 from .steps import check_step, steps
@@ -48,13 +55,13 @@ class Refinement:
     def parameters(self) -> dict[str, Any]:
         """Attributes of the result."""
         reached = _meets(self.relative, self.target)
-        found = {"accuracy_estimate": accuracy.worst(self.relative)[1], "accuracy_reached": np.int32(reached)}
+        found = {"accuracy_estimate": worst(self.relative)[1], "accuracy_reached": np.int32(reached)}
         return found if reached else {**found, "accuracy_shortfall": self.shortfall}
 
     @property
     def shortfall(self) -> str:
         """Sentence on the quantity that missed the target, and the reason."""
-        name, error = accuracy.worst(self.relative)
+        name, error = worst(self.relative)
         return (
             f"accuracy.target = {self.target:g} is not reached: the estimated error of {name} is {error:.2g} "
             f"of its largest value; {self.limit}"
@@ -104,14 +111,14 @@ def refine(case: Problem, solver: InMemory | OnDisk) -> Refinement:
             if limit:
                 raise ResourceError(f"{limit}; errors cannot be told from fewer than {LEAST_LEVELS} lattices")
             continue
-        if not limit and not _meets(accuracy.changes(levels[-2], levels[-1], case.load_steps), target):
+        if not limit and not _meets(changes(levels[-2], levels[-1], case.load_steps), target):
             continue
         coarse = len(levels) - LEAST_LEVELS
         copies += [solved(Trial(coarse, copy)) for copy in range(1, len(SHIFTS) + 1)]
         solutions = [*levels, *copies]
-        errors = accuracy.estimated_errors(solutions, case.load_steps)
-        relative = accuracy.relative_errors(levels[-1].histories, errors)
-        name, error = accuracy.worst(relative)
+        errors = estimated_errors(solutions, case.load_steps)
+        relative = relative_errors(levels[-1].histories, errors)
+        name, error = worst(relative)
         words = spelled(name.removesuffix("_fit"))
         text = f"estimated error {100 * error:.2g} % ({words}), target {100 * target:.3g} %"
         solver.listener.said("errors", text, worst=name, error=error, target=target)
@@ -229,10 +236,90 @@ class OnDisk:
 
     def finish(self, refinement: Refinement) -> None:
         """Write the output and delete the journal."""
-        best = accuracy.finest(refinement.solutions)
+        best = finest(refinement.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))
         self._store.finish(
             refinement.metadata(self._store.metadata),
             lambda: map(refinement.with_errors, journal),
             refinement.trials,
         )
+
+
+# --- distance from the limit of vanishing spacing -----------------------------------------------------------
+
+LEVELS_FITTED = 4  # the finest ones, with their shifted copies
+
+JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
+"""Quantities that have the target."""
+
+_ZONES = ("contact_area_fit", "stick_area_fit", "max_traction", "max_pressure")
+"""Quantities of a load step that show the width of its slip zone."""
+
+
+def finest(solutions: Sequence[Solution]) -> Solution:
+    """Return the solution on the finest lattice, which is the result."""
+    return max(solutions, key=lambda solution: (solution.level, -solution.copy))
+
+
+def driven(target: LoadStep) -> set[str]:
+    """Return the prescribed loads and motions of a load step, which have no error."""
+    motions = zip(LOADS.values(), target.targets, strict=True)
+    return {pair[motion.control == "displacement"] for pair, motion in motions}
+
+
+def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep]) -> list[dict[str, float]]:
+    """Estimate the discretization error of every scalar of the finest solution, by load step.
+
+    The error has the unit of its quantity: 0 if that is prescribed, NaN without a value on one of the
+    lattices. Three levels and shifted copies are needed, else ValueError.
+    """
+    best = finest(solutions)
+    used = [s for s in solutions if s.level > best.level - LEVELS_FITTED]
+    used.sort(key=lambda solution: (-solution.level, solution.copy))
+    names = [name for name in ESTIMATED if name in best.histories[0]]
+    values = np.array([[[h[name] for name in names] for h in s.histories] for s in used], dtype=float)
+    spacings = np.array([s.spacing for s in used]) / best.spacing
+    rough = np.tile([VARIABLES[name].rough for name in names], len(targets))
+    narrow: NDArray[np.bool_] = np.zeros(values.shape[1:], dtype=bool)
+    if set(_ZONES) <= set(names):
+        columns = (values[0][:, names.index(name)] for name in _ZONES)
+        zones = unresolved_slip_zones(best.spacing, *columns)
+        narrow = np.outer(zones, [VARIABLES[name].slip_zone for name in names])
+    flat = values.reshape(len(used), -1)
+    errors = limits_of_error(spacings, flat, rough, narrow.ravel()).reshape(values.shape[1:])
+    found = []
+    for target, row in zip(targets, errors, strict=True):
+        prescribed = driven(target)
+        found.append({
+            name: 0.0 if name in prescribed else float(error) for name, error in zip(names, row, strict=True)
+        })  # fmt: skip
+    return found
+
+
+def relative_errors(
+    histories: Sequence[Mapping[str, Any]], errors: Sequence[Mapping[str, float]]
+) -> dict[str, float]:
+    """Return the largest error of each of the `JUDGED` quantities, over its largest value."""
+    found = {}
+    for name in JUDGED:
+        if name in errors[0]:
+            largest = max(abs(float(history[name])) for history in histories)
+            error = float(np.max([step[name] for step in errors]))  # NaN if one is
+            found[name] = error / largest if largest else math.inf if error else 0.0
+    return found
+
+
+def changes(coarse: Solution, fine: Solution, targets: Sequence[LoadStep]) -> dict[str, float]:
+    """Return the relative differences of two solutions, lower bounds of `relative_errors`."""
+    names = [name for name in JUDGED if name in fine.histories[0]]
+    differences = [
+        {name: 0.0 if name in driven(target) else abs(float(one[name]) - float(two[name])) for name in names}
+        for target, one, two in zip(targets, coarse.histories, fine.histories, strict=True)
+    ]
+    return relative_errors(fine.histories, differences)
+
+
+def worst(relative: Mapping[str, float]) -> tuple[str, float]:
+    """Return the quantity with the largest error, and the error."""
+    name = max(relative, key=lambda name: relative[name] if relative[name] == relative[name] else math.inf)
+    return name, relative[name]

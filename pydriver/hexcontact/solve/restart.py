@@ -51,7 +51,9 @@ def resume(
 ) -> Result:
     """Resume a run that was interrupted, was killed, met a full disk or did not converge.
 
-    The result is bit-identical to that of a run in one go, on the same machine with as many threads.
+    The result, also of a finished run, is bit-identical to that of a run in one go, on the same machine with
+    as many threads. DeckError if there is no unfinished run, another run is writing it, or the case is not
+    that of the run; other errors as of `hexcontact.Case.run`.
 
     Parameters
     ----------
@@ -65,18 +67,6 @@ def resume(
         Called with each further `Step`.
     progress : Listener or bool, optional
         Follows the run; True: a bar on a terminal, lines otherwise.
-
-    Returns
-    -------
-    Result
-        Also of a finished run.
-
-    Raises
-    ------
-    DeckError
-        If there is no unfinished run, another run is writing it, or the case is not that of the run.
-    ConvergenceError, ResourceError
-        As `hexcontact.Case.run`.
 
     Examples
     --------

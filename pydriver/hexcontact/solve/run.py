@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arrays import Dataset
 from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.preview import coarser, parameters_of
 from ..problem.problem import Problem
@@ -24,8 +25,6 @@ from .memory_needed import require_memory
 from .steps import steps
 
 if TYPE_CHECKING:
-    import xarray
-
     from ..result.result import Result
 
 
@@ -188,7 +187,7 @@ def write_stresses(
 
 def _on_coarser(
     result: Result, case: Problem | None, names: list[str], listener: Listener
-) -> Iterator[tuple[float, dict[str, xarray.Dataset]]]:
+) -> Iterator[tuple[float, dict[str, Dataset]]]:
     """Solve the case of a result on coarser lattices; yield the spacing and some tables of each."""
     from ..result.export import kept_steps
     from ..result.result import Result, at_hand

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
+from ..arrays import DataFrame
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.keys import Load
 from ..deck.toml import as_toml, load_as_toml, plain
@@ -30,9 +31,8 @@ from .run import metadata_of
 from .wear import without_ends
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-
     from ..result.result import Result
+
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -57,36 +57,19 @@ def _one_at_a_time(call: Callable[Concatenate[Session, _P], _T]) -> Callable[Con
 
 
 class Session:
-    """A run that waits between its load steps; made by `hexcontact.Case.start`.
+    """A run that waits between its load steps; made by `hexcontact.Case.start`; ``case`` is its problem.
 
     Iterating over it solves the loads of the case one by one. `advance` applies other loads instead of the
     remaining ones of the case.
 
     A step that does not converge, or slides, raises an exception and leaves the session at the step before,
-    from which other loads can be applied.
+    from which other loads can be applied. The first window follows from the loads of the case, and grows with
+    the contact.
 
     With an output each step is on the disk before the next begins; `close`, or the end of a ``with`` block,
     completes the file. Its deck has the applied loads. If loads of the case remain and none was applied by
-    `advance`, the run is unfinished and `hexcontact.resume` continues it.
-
-    Parameters
-    ----------
-    case : Problem
-        The problem; the size of the first window follows from its loads, and grows with the contact.
-    output : path, optional
-        netCDF file to write. Without it all steps are in memory.
-    overwrite : bool
-        Replace an output that exists.
-
-    Attributes
-    ----------
-    case : Problem
-        The problem.
-
-    Raises
-    ------
-    DeckError
-        If the output cannot be written.
+    `advance`, the run is unfinished and `hexcontact.resume` continues it. Without an output all steps are in
+    memory.
 
     Examples
     --------
@@ -145,7 +128,7 @@ class Session:
         return tuple(self._steps)
 
     @property
-    def history(self) -> pandas.DataFrame:
+    def history(self) -> DataFrame:
         """Table of everything that has one value by step, by the number of the step."""
         import pandas
 
@@ -153,13 +136,7 @@ class Session:
         return pandas.DataFrame([dict(step.history) for step in self._steps], index=numbers)
 
     def result(self) -> Result:
-        """Return all finished steps as a result.
-
-        Raises
-        ------
-        DeckError
-            If there is none.
-        """
+        """Return all finished steps as a result; DeckError if there is none."""
         from ..result.result import Result
 
         _ = self.step
@@ -181,15 +158,10 @@ class Session:
 
     @_one_at_a_time
     def __next__(self) -> Step:
-        """Solve the next load step of the case.
+        """Solve the next load step of the case; StopIteration after the last, or if `advance` applied others.
 
-        Raises
-        ------
-        StopIteration
-            If all loads of the case are done, or `advance` applied others.
-        DeckError, ConvergenceError, ResourceError
-            As `hexcontact.Case.run`. If an interim output cannot be written, the step is finished all the
-            same.
+        Errors as of `hexcontact.Case.run`. If an interim output cannot be written, the step is finished all
+        the same.
         """
         if self._whole:
             raise StopIteration
@@ -224,6 +196,12 @@ class Session:
     ) -> Step:
         """Advance to other loads or motions, at most one of each pair; the others do not change.
 
+        Return the last step. DeckError if the loads are wrong, such as more than friction can carry, or the
+        contact outgrows a fixed window; ConvergenceError if a step does not converge, or the bodies slide:
+        the steps before it are done; ResourceError if there is not enough memory or disk: for an interim
+        output (DeckError, too) the step is finished all the same; TypeError if there is no such load, with
+        the nearest.
+
         Parameters
         ----------
         normal_load, approach : float, optional
@@ -236,28 +214,8 @@ class Session:
             Bulk stress (Pa) of the body that [bulk] names.
         mean_pressure, mean_gap, mean_traction_x, mean_traction_y : float, optional
             Loads over the area (Pa), or mean of the gap (m), of a window that repeats.
-        steps : int
-            Number of equal increments.
-        label : str
-            Name of the segment in the result.
-
-        Returns
-        -------
-        Step
-            The last one.
-
-        Raises
-        ------
-        DeckError
-            If the loads are wrong, such as more than friction can carry, or the contact outgrows a fixed
-            window.
-        ConvergenceError
-            If a step does not converge, or the bodies slide; the steps before it are done.
-        ResourceError
-            If there is not enough memory or disk. For an interim output (DeckError, too) the step is finished
-            all the same.
-        TypeError
-            If there is no such load; it names the nearest.
+        steps, label : int, str
+            Number of equal increments, and name of the segment in the result.
         """
         given = {name: value for name, value in locals().items() if name != "self"}
         self._check_open()
@@ -293,18 +251,7 @@ class Session:
 
     @_one_at_a_time
     def back(self, steps: int = 1) -> None:
-        """Undo the last steps.
-
-        Parameters
-        ----------
-        steps : int
-            Number of steps.
-
-        Raises
-        ------
-        DeckError
-            If there are fewer, or the session writes a file.
-        """
+        """Undo the last steps; DeckError if there are fewer, or the session writes a file."""
         self._check_open()
         if self._store is not None:
             raise DeckError("a session that writes a file cannot go back; start it without an output")

@@ -15,18 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core import steps as core
 from ..core.friction import CONTROLS, ContactState
-from ..core.steps import (
-    FAILED,
-    LIMITED,
-    OUTGROWN,
-    PENDING,
-    CyclesOfWear,
-    WearProgress,
-    WearSettings,
-    record_of,
-    restored,
-)
 from ..errors import DeckError, PathWarning
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
@@ -52,14 +42,14 @@ class WearPath(GivenPath):
         self._wear, self._number = case.deck.wear, len(before)
         self._last = before[-1] if self._number > len(case.load_steps) else None
         self._targets: list[LoadStep] = [case.load_steps[-1], *case.cycle]
-        numbers: dict[str, Any] = dict.fromkeys(WearSettings._fields, 0)
+        numbers: dict[str, Any] = dict.fromkeys(core.WearSettings._fields, 0)
         numbers |= {"coefficient": self._wear.coefficient, "cycles": self._wear.cycles}
         numbers |= {"jump": 0 if isinstance(self._wear.jump, str) else self._wear.jump}
         numbers |= {"tolerance": self._wear.tolerance, "residual": case.solver.tolerance}
         numbers |= {"cycle_tolerance": self._wear.cycle_tolerance(case.solver.tolerance)}
         numbers |= {"most_unworn": MOST_UNWORN, "grows": not case.full_contact}
         numbers |= {"interpolated": case.solver.entry == "interpolated", "size": 1.0, "first": 0.5}
-        self._settings = WearSettings(**numbers)
+        self._settings = core.WearSettings(**numbers)
 
     def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
         """Solve a load step before the first cycle that wears."""
@@ -78,12 +68,12 @@ class WearPath(GivenPath):
             yield self._recorded(cycles, now, state, before, started)
             started, done = time.perf_counter(), now.cycles
 
-    def _begun(self, state: ContactState) -> CyclesOfWear:
+    def _begun(self, state: ContactState) -> core.CyclesOfWear:
         """Return the cycles from the end of the load history, or from the last record of a resumed run."""
         last, settings = self._last, self._settings
         if last is not None:
             known = {"unworn": last.history["unworn_cycles"], "left": last.history["unworn_cycle_change"]}
-            settings = restored(settings._replace(**known), last.control["chooser"])
+            settings = core.restored(settings._replace(**known), last.control["chooser"])
         steps = [
             (
                 [CONTROLS[motion.control] for motion in target.targets],
@@ -93,7 +83,7 @@ class WearPath(GivenPath):
             )
             for target in self._targets
         ]
-        cycles = CyclesOfWear(settings, self.case.pair, steps, state)
+        cycles = core.CyclesOfWear(settings, self.case.pair, steps, state)
         if last is not None:
             depth, change, energy, amplitude = (np.array(last.fields[name]) for name in WORN)
             ahead = [np.array(last.companion["ahead"])] if "ahead" in last.companion else []
@@ -107,20 +97,20 @@ class WearPath(GivenPath):
                     cycles.restore_end(place + 1, solved, np.array(motions), np.array(tractions))
         return cycles
 
-    def _solved(self, cycles: CyclesOfWear) -> WearProgress:
+    def _solved(self, cycles: core.CyclesOfWear) -> core.WearProgress:
         """Solve a cycle load step by load step, on a window that grows with the contact."""
         while True:
             try:
                 now = cycles.advance(self.window.contact)
             except DeckError as error:
                 raise DeckError(f'wear.cycle = "{self._wear.cycle}": {error}') from None
-            if now.verdict == PENDING:
+            if now.verdict == core.PENDING:
                 continue
-            if now.verdict not in (FAILED, OUTGROWN):
+            if now.verdict not in (core.FAILED, core.OUTGROWN):
                 break
             target = dataclasses.replace(self._targets[now.place - 1], index=self._number)
             reached = cycles.solution(self.window.contact)
-            if now.verdict == FAILED:
+            if now.verdict == core.FAILED:
                 from . import nonconvergence
 
                 values = now.driven_z, now.driven_x, now.driven_y, now.driven_twist
@@ -136,8 +126,8 @@ class WearPath(GivenPath):
 
     def _recorded(
         self,
-        cycles: CyclesOfWear,
-        now: WearProgress,
+        cycles: core.CyclesOfWear,
+        now: core.WearProgress,
         state: ContactState,
         before: ContactState,
         started: float,
@@ -159,7 +149,7 @@ class WearPath(GivenPath):
             "cycle_dissipated_energy": now.cycle_spent,
         }
         if now.rejected >= 0:
-            history |= {"rejected_steps": now.rejected, "step_limited": int(now.verdict == LIMITED)}
+            history |= {"rejected_steps": now.rejected, "step_limited": int(now.verdict == core.LIMITED)}
         self._number += 1
         ends = [*cycles.ends(len(self._targets), self.window.lattice)]
         beside = {f"{_END}{place}": end[2] for place, end in enumerate(ends) if end[0] >= 0.0}
@@ -176,7 +166,7 @@ class WearPath(GivenPath):
         )
 
     def _control(
-        self, cycles: Sequence[float], motions: np.ndarray, now: WearProgress | None = None
+        self, cycles: Sequence[float], motions: np.ndarray, now: core.WearProgress | None = None
     ) -> dict[str, Any]:
         """Return the control data of a record."""
         count, done = len(self.case.load_steps), now.cycles / self._wear.cycles if now else 0.0
@@ -187,7 +177,7 @@ class WearPath(GivenPath):
             "fraction": done,
             "load_steps": count,
             "done": done,
-            "chooser": record_of(now or self._settings),
+            "chooser": core.record_of(now or self._settings),
             "until": now.until if now else 0.0,
         }
 

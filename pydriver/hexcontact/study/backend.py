@@ -45,30 +45,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a case.
+    """The outcome of a case."""
 
-    Attributes
-    ----------
-    hash : str
-        Name of the case.
-    exit_code : int
-        0 if it is done, else the exit code of ``hexcontact run``.
-    message : str
-        Why it failed.
-    seconds : float
-        Wall time of this attempt.
-    lasting : bool
-        Whether the case itself caused the failure, not memory, disk or signals.
-    hexcontact_version : str
-        Version of the program that ran it.
-    """
-
-    hash: str
-    exit_code: int = 0
-    message: str = ""
-    seconds: float = 0.0
-    lasting: bool = True
-    hexcontact_version: str = __version__
+    hash: str  # name of the case
+    exit_code: int = 0  # 0 if it is done, else that of ``hexcontact run``
+    message: str = ""  # why it failed
+    seconds: float = 0.0  # wall time of this attempt
+    lasting: bool = True  # whether the case itself caused the failure, not memory, disk or signals
+    hexcontact_version: str = __version__  # of the program that ran it
 
 
 def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:

@@ -14,26 +14,22 @@ import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .. import netcdf_library
 from .._version import __version__
+from ..arrays import DataFrame, Dataset
 from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import Lock, reading, replacing, require_ordinary, require_utf8, text_of
 from ..netcdf_library import attributes
 from ..result.netcdf import check_seal, missing_stresses, stress_files
-from ..result.view import last_steps
+from ..result.view import last_steps, parameters_of
 from ..text import quantity, text_table, visible
 from ..variables import CONVENTIONS, SUMMARY, VARIABLES
 from .backend import Outcome, holds
 from .plan import Axis, Plan, PlannedCase
-
-if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
-
 
 INDEX = "index.json"
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
@@ -177,7 +173,7 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
         }
 
 
-def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> xarray.Dataset:
+def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> Dataset:
     """Combine the finished cases in one dataset: the last load step of each, or all along ``step``.
 
     Values of other cases are NaN, for the reason in ``status``, ``exit_code`` and ``message``.
@@ -257,7 +253,7 @@ def refuse_foreign(path: Path) -> None:
             raise DeckError(f"{path} exists and is not the result of a study; choose another output")
 
 
-def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
+def write(dataset: Dataset, path: Path, about: dict[str, str]) -> None:
     """Write the result of a study; an older one is replaced as a whole.
 
     The texts `about` are attributes of the group ``study``: xarray does not combine datasets whose own
@@ -294,7 +290,7 @@ def study_of(path: Path) -> Path | None:
     return path if "study_version" in netcdf_library.attributes(path) else None
 
 
-def read_study(path: Path) -> xarray.Dataset:
+def read_study(path: Path) -> Dataset:
     """Read the result of a study, with its title among the attributes."""
     with reading(path), netcdf_library.opened_by_xarray(path) as found:
         found.load()
@@ -302,12 +298,7 @@ def read_study(path: Path) -> xarray.Dataset:
         return found.assign_attrs(title=about.attrs.get("title", ""))
 
 
-def parameters_of(study: xarray.Dataset) -> list[str]:
-    """Return the names of the parameters of a study."""
-    return [str(name) for name, values in study.coords.items() if "deck_key" in values.attrs]
-
-
-def table_of(study: xarray.Dataset) -> pandas.DataFrame:
+def table_of(study: Dataset) -> DataFrame:
     """Return a row for each case, or for each load step of each case."""
     words = np.vectorize(STATES.get, otypes=[object])(study["status"].values)
     study = study.assign(status=(study["status"].dims, words))
@@ -320,13 +311,13 @@ def table_of(study: xarray.Dataset) -> pandas.DataFrame:
     return table[[*numbers, *rest, *_STATE]]
 
 
-def with_units(study: xarray.Dataset) -> dict[str, str]:
+def with_units(study: Dataset) -> dict[str, str]:
     """Return the headers of the columns of a table."""
     units = {str(name): str(values.attrs.get("units", "1")) for name, values in study.variables.items()}
     return {name: f"{name} [{unit}]" for name, unit in units.items() if unit not in ("1", "")}
 
 
-def lines_of(study: xarray.Dataset) -> str:
+def lines_of(study: Dataset) -> str:
     """Return title, size and table of a study for a terminal."""
     table, names = table_of(last_steps(study)), parameters_of(study)
     whole = (table["status"] == STATES[DONE]).all()
@@ -358,7 +349,7 @@ def _cell(value: Any, unit: str) -> str:
     return quantity(float(value), unit) if unit else f"{value:g}"
 
 
-def content_of(study: xarray.Dataset, path: Path) -> dict[str, Any]:
+def content_of(study: Dataset, path: Path) -> dict[str, Any]:
     """Return a study as the object that ``info --json`` prints."""
     parameters = {
         name: {key: study[name].attrs.get(key, "") for key in ("deck_key", "units")}

@@ -434,27 +434,13 @@ _MOST_LINES = 20  # of a message about wrong cases
 
 @dataclass(frozen=True)
 class PlannedCase:
-    """A case of a study.
+    """A case of a study."""
 
-    Attributes
-    ----------
-    position : int
-        Position in the study, from 0.
-    settings : mapping of str to object
-        Its parameters by key, as in the deck.
-    deck : str
-        Its merged deck.
-    fault : str
-        Message about a wrong deck; empty if it can be run.
-    names : mapping of str to str
-        Names of its parameters in the study, by key.
-    """
-
-    position: int
-    settings: Mapping[str, Any]
-    deck: str
-    fault: str = ""
-    names: Mapping[str, str] = field(default_factory=dict)
+    position: int  # in the study, from 0
+    settings: Mapping[str, Any]  # its parameters by key, as in the deck
+    deck: str  # its merged deck
+    fault: str = ""  # message about a wrong deck; empty if it can be run
+    names: Mapping[str, str] = field(default_factory=dict)  # of its parameters in the study, by key
 
     @property
     def hash(self) -> str:

@@ -16,9 +16,10 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from .._version import __version__
+from ..arrays import Dataset
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
@@ -31,9 +32,6 @@ from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
 from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
 from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
-
-if TYPE_CHECKING:
-    import xarray
 
 
 class StudyLines(Lines):
@@ -86,6 +84,9 @@ __all__ = ["Outcome", "PlannedCase", "Study", "run_study"]
 class Study:
     """Cases of one deck with different values of some keys; the constructor checks all of them.
 
+    ``plan`` has cases and parameters, ``output`` is the file of the result. DeckError with a sentence for
+    each fault of the study or of a case.
+
     Parameters
     ----------
     deck : path or mapping
@@ -102,18 +103,6 @@ class Study:
         Leave out wrong cases, with the status ``invalid`` in the result.
     **keys
         Other keys of a study file: title, combine, samples, seed, steps, dask.
-
-    Attributes
-    ----------
-    plan : Plan
-        Cases and parameters.
-    output : Path
-        File of the result.
-
-    Raises
-    ------
-    DeckError
-        With a sentence for each fault of the study or of a case.
     """
 
     def __init__(
@@ -148,23 +137,17 @@ class Study:
         check: bool | CheckLevel = True,
         skip_invalid: bool = False,
     ) -> Self:
-        """Read a study file.
+        """Read a study file; DeckError with a sentence for each fault of the study, its deck or a case.
 
         Parameters
         ----------
-        path : path
-            The study file.
-        output : path, optional
-            File of the result; default: that of the study file, else its name with .nc in this folder.
+        path, output : path
+            The study file, and the file of the result; default: that of the study file, else its name with
+            .nc in this folder.
         check : bool or str
             Check every case, its window by a coarse solution; ``"decks"``: without the windows.
         skip_invalid : bool
             Leave out wrong cases, with the status ``invalid`` in the result.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each fault of the study, its deck or a case.
         """
         data, text = read_toml(path, "a study")
         if "body" in data and "parameter" not in data:
@@ -227,10 +210,12 @@ class Study:
         retry: bool = False,
         listener: Listener | None = None,
         cancel: threading.Event | None = None,
-    ) -> xarray.Dataset:
-        """Run the missing cases and combine the results.
+    ) -> Dataset:
+        """Run the missing cases, write the result to `output` and return it.
 
-        In a script this belongs under ``if __name__ == "__main__":``, since it starts processes.
+        In a script this belongs under ``if __name__ == "__main__":``, since it starts processes. DeckError if
+        another run holds the study, the output is another file, or Dask is not installed; ResourceError if
+        the result cannot be written.
 
         Parameters
         ----------
@@ -243,19 +228,7 @@ class Study:
         listener : Listener, optional
             Receives the progress, besides the log.
         cancel : threading.Event, optional
-            Set by another thread, it ends the run; finished cases stay.
-
-        Returns
-        -------
-        xarray.Dataset
-            The result, also written to `output`; if it was canceled, that of the finished cases, not written.
-
-        Raises
-        ------
-        DeckError
-            If another run holds the study, the output is another file, or Dask is not installed.
-        ResourceError
-            If the result cannot be written.
+            Set by another thread, it ends the run; finished cases stay, and their result is not written.
         """
         listener, cancel = Listeners(Log(), listener or Listener()), cancel or threading.Event()
         refuse_foreign(self.output)
@@ -306,21 +279,9 @@ class Study:
         return LocalPool, jobs
 
     def run_case(self, number: int, retry: bool = False, listener: Listener | None = None) -> Outcome:
-        """Run one case in this process unless it is done; for job arrays.
+        """Run a case by its number in this process unless it is done, for job arrays; return its outcome.
 
-        Parameters
-        ----------
-        number : int
-            Number of the case, as in the names of the files.
-        retry : bool
-            Also if it would fail again.
-        listener : Listener, optional
-            Receives the progress, besides the log.
-
-        Returns
-        -------
-        Outcome
-            Outcome of this run, or of the one before.
+        With `retry` it runs also if it would fail again; the listener receives the progress, besides the log.
         """
         known = {self.folder.number(case): case for case in self.cases}
         if number not in known:
@@ -337,20 +298,17 @@ class Study:
         """Return whether the result of a case exists."""
         return any(self.folder.number(case) == number and self.folder.done(case) for case in self.cases)
 
-    def collect(self) -> xarray.Dataset:
+    def collect(self) -> Dataset:
         """Combine the finished cases, write the result to `output`, and return it.
 
-        Raises
-        ------
-        DeckError, ResourceError
-            If it cannot be written.
+        DeckError or ResourceError if it cannot be written.
         """
         dataset = self._combined()
         study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
         write(dataset, self.output, {"title": self.title, "study": study})
         return dataset
 
-    def _combined(self) -> xarray.Dataset:
+    def _combined(self) -> Dataset:
         """Return the data set of the finished cases."""
         self.folder.enter(self.plan)
         attributes = {
@@ -367,6 +325,6 @@ class Study:
         return f"Study({self.title!r}, {self.file.combine} over {axes}: {len(self)} cases, {self.output})"
 
 
-def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> xarray.Dataset:
+def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> Dataset:
     """Read a study file and run its missing cases; options as of `Study.run`."""
     return Study.from_toml(path, output).run(**options)

@@ -199,7 +199,6 @@ def test_a_ball_from_a_file_has_the_pressure_of_hertz_and_its_own_orientation(fi
             {},
             "not 2; choose one with variable",
         ),
-        ("a.opd", "abc", {}, "this format is read by the package SurfaceTopography: pip install SurfaceTop"),
     ],
 )
 def test_a_file_that_is_no_map_is_refused(file: Any, name: str, content: Any, keys: Any, words: str) -> None:
@@ -287,7 +286,13 @@ def test_keys_that_the_file_answers_are_refused_if_they_differ(file: Any) -> Non
 def test_formats_of_microscopes_are_read_by_surface_topography(
     file: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The library is a stand-in with the parts that are called."""
+    """The library is missing, then a stand-in with the parts that are called."""
+    path = file("scan.opd", "abc")
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    missing = (
+        "this format is read by the package SurfaceTopography: pip install SurfaceTopography; without it"
+    )
+    assert missing in complaint(of_file(path))
     channels = [
         SimpleNamespace(
             name=name,
@@ -313,7 +318,6 @@ def test_formats_of_microscopes_are_read_by_surface_topography(
         return Reader(channels=channels)
 
     monkeypatch.setitem(sys.modules, "SurfaceTopography", SimpleNamespace(open_topography=opened))
-    path = file("scan.opd", "abc")
     assert 'expected a variable, one of "Height" and "Phase"' in complaint(of_file(path))
     assert 'one of its channels "Height" and "Phase" as variable, not "z"' in complaint(
         of_file(path, variable="z")
@@ -453,6 +457,10 @@ def test_a_map_of_one_period_repeats_with_or_without_its_last_point(file: Any) -
         first = {"center": [5e-6 * (points - 1), 5e-6 * (points - 1)]}  # so that the first point is a node
         surface = of_file(file(f"{points}.csv", rows_of(waves(points))), **keys, **first)
         assert largest(surface, load=load, **CELL) == pytest.approx(formula, rel=1e-4)
+        x, y = np.random.default_rng(7).uniform(-1e-3, 2e-3, (2, 500))
+        exact = 1e-6 - 0.5e-6 * (np.cos(2 * np.pi * x / 640e-6) + np.cos(2 * np.pi * y / 640e-6))
+        heights = Map(**surface).repeating((640e-6, 640e-6)).height(x, y)
+        np.testing.assert_allclose(heights, exact, atol=1e-11)
         moved = {**surface, "offset": ["0.13 mm", "0.07 mm"]}
         assert largest(moved, load=load, **CELL) == pytest.approx(formula, rel=1e-2)
 

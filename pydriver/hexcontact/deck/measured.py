@@ -168,7 +168,7 @@ class Measured(Surface):
             self.field  # noqa: B018 (read here, cached)
         except DeckError as error:
             if self.file is None:
-                refuse_key("heights", MISSING, str(error))
+                refuse_key("heights", MISSING, str(error).removeprefix("heights: "))
             name = str(self.file)
             lines = [line.removeprefix(name).lstrip(":, ") for line in str(error).splitlines()]
             refuse_key("file", name, "; ".join(lines))
@@ -199,16 +199,7 @@ class Measured(Surface):
         assert self.file is not None
         found = read_map(self.file, self.variable, profile)
         scale = self._scale("units", found.units)
-        values = found.values * self._scale("height_units", found.value_units)
-        if self.holes == "refuse" and (count := int(np.isnan(values).sum())):
-            first = ", ".join(str(place + 1) for place in np.argwhere(np.isnan(values))[0])
-            refuse_key(
-                "holes",
-                MISSING,
-                f"{count} of {values.size} points of {self.file} have no height, the first one at {first}; "
-                'expected "fill", or "open" if nothing can touch there',
-            )
-        return found, values, scale
+        return found, found.values * self._scale("height_units", found.value_units), scale
 
     @property
     def holes_found(self) -> int:
@@ -225,17 +216,25 @@ class Measured(Surface):
         if self.level == "mean":
             return float(z[there].mean()), 0.0, 0.0
         u, v = np.meshgrid(_centered(x), _centered(y), indexing="ij")
-        size = max(float(np.ptp(x)), float(np.ptp(y)))
-        terms = np.stack([np.ones(there.sum()), u[there] / size, v[there] / size], axis=1)
+        width, height = (float(np.ptp(at)) or 1.0 for at in (x, y))
+        terms = np.stack([np.ones(there.sum()), u[there] / width, v[there] / height], axis=1)
         mean, along, across = np.linalg.lstsq(terms, z[there], rcond=None)[0].tolist()
-        return mean, along / size, across / size
+        return mean, along / width, across / height
 
     @cached_property
     def field(self) -> HeightMap:
         """Heights towards the other body (m), 0 at the lowest point, over the coordinates of the map."""
         x, y, z, _ = self.points
+        if not (np.isfinite(x).all() and np.isfinite(y).all()) or np.isinf(z).any():
+            raise DeckError("expected finite numbers, and NaN in holes of the heights only")
         if not np.isfinite(z).any():
             raise DeckError("expected heights; no point has one")
+        if self.holes == "refuse" and (count := self.holes_found):
+            row, col = np.argwhere(np.isnan(z))[-1]
+            at = [f"x = {quantity(float(x[row]), 'm')}", f"y = {quantity(float(y[col]), 'm')}"]
+            where = ", ".join(at[self.extruded :])
+            sentence = f"{count} points have no height, one of them at {where}; expected "
+            refuse_key("holes", MISSING, f'{sentence}"fill", or "open" if nothing can touch there')
         mean, along, across = self.plane
         height = z - mean - along * _centered(x)[:, None] - across * _centered(y)
         if self.upwards:
@@ -301,7 +300,7 @@ class Measured(Surface):
             x, y = (
                 low + np.mod(at - low, side)
                 for at, low, side in zip(
-                    (x, y), (self.points.x[0], self.points.y[0]), self._period, strict=True
+                    (x, y), (self.points.x.min(), self.points.y.min()), self._period, strict=True
                 )
             )
         return np.asarray(self.field(x, y))
@@ -582,8 +581,11 @@ def _closed(at: Array, height: Array, axis: int, side: float, taper: float | Non
         )
         heights = heights + (first - last) * seam / 2
         seam = 0.0 * seam
-    beside = float(np.nanmax(np.abs(np.diff(heights, axis=0))))
-    if (largest := float(np.nanmax(np.abs(seam)))) > 1.001 * beside:
+    largest, beside = (
+        float(np.fmax.reduce(np.abs(steps), axis=None, initial=0.0))
+        for steps in (seam, np.diff(heights, axis=0))
+    )
+    if largest > 1.001 * beside:
         raise DeckError(
             f"the map does not repeat: between its opposite ends in {name} it steps by {readable(largest)}, "
             f"between neighboring points by {readable(beside)} at most; level it, or give taper, the width "

@@ -41,11 +41,17 @@ contains
     if (stat == 0) self%values = 0.0_wp
   end subroutine reserve
 
-  !> Return the address of the memory.
-  type(c_ptr) function place(self)
+  !> Return the address of the memory, from a number on.
+  type(c_ptr) function place(self, after)
     class(scratch_t), intent(in), target :: self
+    !> Numbers of eight bytes before it; absent: none
+    integer(int64), intent(in), optional :: after
 
-    place = c_loc(self%values)
+    if (present(after)) then
+      place = c_loc(self%values(after + 1))
+    else
+      place = c_loc(self%values)
+    end if
   end function place
 
   !> Count one user less.

@@ -38,8 +38,6 @@ module hc_linear_system
     procedure :: product_packed
     !> z = M r at the active nodes
     procedure :: precondition_packed
-    !> Free what products keep for the next one
-    procedure :: release
   end type linear_system_t
 
   !> Linear constraints on the unknowns; at the active nodes (n_active, number of constraints, may be 0).
@@ -129,12 +127,6 @@ contains
 
     call self%space%copy(r, z)
   end subroutine precondition_packed
-
-  !> Free what products keep: by default nothing is kept.
-  subroutine release(self)
-    class(linear_system_t), intent(inout) :: self
-
-  end subroutine release
 
   !> Compute M B, the constraint vectors after the preconditioner.
   subroutine precondition_constraints(system, nodes, n, constraint, mb, error)

@@ -85,7 +85,6 @@ contains
       call take_step()
       iteration%made = iteration%made + directions
     end do
-    call system%release()
 
   contains
 

@@ -32,6 +32,8 @@ module hc_flexibility
   contains
     !> Relative displacements of given tractions
     procedure(apply), deferred :: apply
+    !> Tractions replaced by the relative displacements that they cause
+    procedure :: replace
     !> Do the arrays fit the window and the components?
     procedure :: check
     !> Add one product to the count
@@ -87,6 +89,21 @@ contains
     length = lattice%extent
     if (.not. lattice%is_periodic()) length = good_size(2*lattice%extent - 1)
   end function transform_length
+
+  !> Replace tractions by the displacements along the same components that they cause together; by default with a copy.
+  subroutine replace(self, components, values, error)
+    class(flexibility_t), intent(inout) :: self
+    !> Components that act and are wanted: normal, along_x, along_y
+    integer, intent(in) :: components(:)
+    !> Their tractions [Pa], then the displacements [m] (n_col, n_row, size(components))
+    real(wp), intent(inout), contiguous :: values(:, :, :)
+    !> Allocated on failure: the shapes do not fit the window
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: traction(:, :, :)
+
+    allocate (traction, source=values)
+    call self%apply(components, traction, components, values, error)
+  end subroutine replace
 
   !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)

@@ -37,6 +37,7 @@ module hc_flexibility_fft
     integer, private :: n_component = 0, at_once = 1
   contains
     procedure :: apply => fft_apply
+    procedure :: replace => fft_replace
   end type fft_flexibility_t
 
   !> The blocks of the operator at lattice offsets, over the unit of the bodies.
@@ -248,6 +249,25 @@ contains
     end if
     call self%count(from, onto)
   end subroutine fft_apply
+
+  !> Multiply in the place of the tractions, unless these are needed to the end or are multiplied apart.
+  subroutine fft_replace(self, components, values, error)
+    class(fft_flexibility_t), intent(inout) :: self
+    integer, intent(in) :: components(:)
+    real(wp), intent(inout), contiguous :: values(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: traction(:, :, :)
+
+    if (size(components) > self%at_once .or. self%medium%spring_compliance() > 0.0_wp) then
+      allocate (traction, source=values)
+      call self%apply(components, traction, components, values, error)
+      return
+    end if
+    call self%check(components, values, components, values, error)
+    if (allocated(error)) return
+    call self%convolution%convolve_in_place(self%index(components, components), values)
+    call self%count(components, components)
+  end subroutine fft_replace
 
   !> Multiply pressure and shear traction one after the other, which do not move each other; the pressure is the first component.
   subroutine apply_apart(self, from, traction, onto, displacement)

@@ -201,6 +201,7 @@ contains
       end associate
     end do
     state%operator_applications = work
+    self%iterate = normal_iterate_t()
   end subroutine solve
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.

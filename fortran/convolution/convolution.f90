@@ -12,7 +12,7 @@
 !> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int, c_f_pointer
-  use, intrinsic :: iso_fortran_env, only: int8, int64
+  use, intrinsic :: iso_fortran_env, only: int8, int64, real64
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
@@ -55,6 +55,8 @@ module hc_convolution
   type :: convolution_t
     !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
+    !> Spectrum of a single even kernel in double precision, which stands for it if it is there; its owner outlives the convolution
+    real(real64), pointer, contiguous :: wide(:, :) => null()
     !> Factor of the results
     real(wp) :: factor = 1.0_wp
     !> The kernel `complement` is this times the first one less the second one
@@ -507,7 +509,9 @@ contains
         call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
         call fftw_execute_dft(self%held%plans%column, given(:, i), transformed(:, i))
       end do
-      if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
+      if (associated(self%wide)) then
+        call multiply_one(size(given, 1), real(self%wide(:, b), wp), transformed(:, 1), given(:, 1))
+      else if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
       else
         call multiply(self%spectrum(:, b, :), self%first_odd, self%whole, kernel, transformed, given)

@@ -6,7 +6,7 @@
 !> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
@@ -162,10 +162,15 @@ contains
     type(contact_state_t) :: coarse
     type(normal_iterate_t), allocatable :: passing
     real(wp) :: work, coarse_tolerance
-    integer :: l
+    integer :: l, stat
 
     call check_target([control], [target], tolerance, max_sweeps, error)
     if (allocated(error)) return
+    call self%scratch%take(stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+      return
+    end if
     goal = load_target_t([control], [target])
     work = 0.0_wp
     do l = size(self%level), 1, -1
@@ -201,7 +206,9 @@ contains
       end associate
     end do
     state%operator_applications = work
+    ! files are written before the next load
     self%iterate = normal_iterate_t()
+    call self%scratch%free()
   end subroutine solve
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.

@@ -77,7 +77,6 @@ contains
     type(rounded_kernel_t) :: rounded
     type(kernel_key_t) :: key
     logical :: found
-    integer :: block
 
     self%space = space
     ! on a window that repeats, single precision is rounded from the spectrum of the other
@@ -96,14 +95,7 @@ contains
                          beside=before_last(self) + self%lattice%size()*(storage_size(1.0_sp)/8))
     if (allocated(error)) return
     if (self%exact) then
-      ! copied as fast as it would be found
-      call self%single%find_spectra(found, error)
-      if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(self%space%threads)
-      do block = 1, self%single%n_block
-        self%single%spectrum(:, block, 1) = real(self%flexibility%convolution%spectrum(:, block, 1), sp)
-      end do
-      !$omp end parallel do
+      self%single%wide => self%flexibility%convolution%spectrum(:, :, 1)
     else
       key = new_kernel_key(of_pressure_rounded, self%lattice, self%medium)
       call self%single%find_spectra(found, error, cache, key)

@@ -160,15 +160,12 @@ contains
     logical, intent(in) :: tangential
     !> Row transforms share the memory of others; absent: they have their own
     logical, intent(in), optional :: shared
-    integer, parameter :: long = selected_int_kind(18)
     integer :: n_component
 
     n_component = merge(2, 1, tangential)
     if (present(shared)) n_component = merge(0, n_component, shared)
     preconditioner_memory = convolution_memory(extent, good_size(extent), merge(n_tangential, 1, tangential), n_component, &
                                                threads)
-    ! fields in single precision; those of the tangential one belong to the shear system
-    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory
 
   !> Estimate the traction that causes a given displacement, in any units of ratio `unit`.

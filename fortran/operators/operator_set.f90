@@ -82,17 +82,17 @@ contains
   end subroutine new_operators
 
   !> Count the bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared)
+  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
     !> The materials are unlike
     logical, intent(in) :: unlike
-    !> Row transforms share the memory of those of a finer lattice
-    logical, intent(in) :: shared
+    !> Row transforms share the memory of those of a finer lattice; the window repeats
+    logical, intent(in) :: shared, periodic
 
-    operators_memory = fft_memory(extent, .false., threads, unlike, shared) &
+    operators_memory = fft_memory(extent, .false., threads, unlike, shared, periodic) &
                        + preconditioner_memory(extent, threads, .false., shared=.true.) &
                        + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory

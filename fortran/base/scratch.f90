@@ -12,10 +12,14 @@ module hc_scratch
   type :: scratch_t
     private
     real(wp), allocatable :: values(:)
+    !> Numbers that there should be
+    integer(int64) :: wanted = 0
     integer :: users = 0
   contains
     !> Add a user that needs a number of bytes
     procedure :: reserve
+    !> Free the memory while nobody works; take it again before
+    procedure :: free, take
     !> Address of the memory, whose contents are those of the last user
     procedure :: place
   end type scratch_t
@@ -30,22 +34,45 @@ contains
     integer, intent(out) :: stat
     integer(int64) :: n
 
-    stat = 0
     self%users = self%users + 1
     n = (bytes + storage_size(1.0_wp)/8 - 1)/(storage_size(1.0_wp)/8)
-    if (allocated(self%values)) then
-      if (size(self%values, kind=int64) >= n) return
-      deallocate (self%values)
-    end if
-    allocate (self%values(n), stat=stat)
-    if (stat == 0) self%values = 0.0_wp
+    self%wanted = max(self%wanted, n)
+    call self%take(stat)
   end subroutine reserve
 
-  !> Return the address of the memory.
-  type(c_ptr) function place(self)
-    class(scratch_t), intent(in), target :: self
+  !> Take the memory that the users need.
+  subroutine take(self, stat)
+    class(scratch_t), intent(inout) :: self
+    !> Not zero: there is not enough memory
+    integer, intent(out) :: stat
 
-    place = c_loc(self%values)
+    stat = 0
+    if (allocated(self%values)) then
+      if (size(self%values, kind=int64) >= self%wanted) return
+      deallocate (self%values)
+    end if
+    allocate (self%values(self%wanted), stat=stat)
+    if (stat == 0) self%values = 0.0_wp
+  end subroutine take
+
+  !> Free the memory.
+  subroutine free(self)
+    class(scratch_t), intent(inout) :: self
+
+    if (allocated(self%values)) deallocate (self%values)
+  end subroutine free
+
+  !> Return the address of the memory, from a number on.
+  type(c_ptr) function place(self, after)
+    class(scratch_t), intent(in), target :: self
+    !> Numbers of eight bytes before it; absent: none
+    integer(int64), intent(in), optional :: after
+
+    if (present(after)) then
+      place = c_loc(self%values(after + 1))
+    else
+      place = c_loc(self%values)
+    end if
   end function place
 
   !> Count one user less.

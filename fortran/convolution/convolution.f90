@@ -12,7 +12,7 @@
 !> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int, c_f_pointer
-  use, intrinsic :: iso_fortran_env, only: int8, int64
+  use, intrinsic :: iso_fortran_env, only: int8, int64, real64
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
@@ -55,6 +55,8 @@ module hc_convolution
   type :: convolution_t
     !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
+    !> Spectrum of a single even kernel in double precision, which stands for it if it is there; its owner outlives the convolution
+    real(real64), pointer, contiguous :: wide(:, :) => null()
     !> Factor of the results
     real(wp) :: factor = 1.0_wp
     !> The kernel `complement` is this times the first one less the second one
@@ -71,6 +73,8 @@ module hc_convolution
     integer, private :: n_frequency = 0, leading = 0
     !> Number of kernels, the first odd one
     integer, private :: n_kernel = 0, first_odd = 0
+    !> Numbers of the row transforms
+    integer(int64), private :: n_work = 0
     type(holdings_t), private :: held
     !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share; the same as vectors
     complex(wp), pointer, contiguous, private :: work(:, :, :) => null(), lines(:, :) => null()
@@ -79,8 +83,10 @@ module hc_convolution
     !> One column block of each component before and after its transform, for each thread; column by column
     complex(wp), allocatable, private :: block_buffer(:, :, :, :)
   contains
-    !> Sums of weighted convolutions
-    procedure :: convolve
+    !> Sums of weighted convolutions, and the same in the place of the fields
+    procedure :: convolve, convolve_in_place
+    !> Memory beside the row transforms, whose content is lost when another convolution uses the scratch
+    procedure :: beside
     !> Take spectra from a cache, and store them there
     procedure :: find_spectra, store_spectra
     !> Spectra of kernels given at the lattice offsets
@@ -110,7 +116,7 @@ module hc_convolution
 contains
 
   !> Make plans and scratch space for convolutions over a window; the spectra come next, by `find_spectra`.
-  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd)
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd, beside)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
@@ -125,6 +131,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> The first odd kernel; absent: all are even
     integer, intent(in), optional :: first_odd
+    !> Bytes of memory beside the row transforms; absent: none
+    integer(int64), intent(in), optional :: beside
+    integer(int64) :: bytes
     integer :: stat
 
     self%space = space
@@ -140,7 +149,10 @@ contains
     self%held%place = address(self%held)
     self%held%scratch => space%scratch
     if (.not. associated(self%held%scratch)) allocate (self%held%scratch)
-    call self%held%scratch%reserve(int(self%leading, int64)*even(extent(2))*n_component*(storage_size((1.0_wp, 0.0_wp))/8), stat)
+    self%n_work = int(self%leading, int64)*even(extent(2))*n_component
+    bytes = self%n_work*(storage_size((1.0_wp, 0.0_wp))/8)
+    if (present(beside)) bytes = bytes + beside
+    call self%held%scratch%reserve(bytes, stat)
     if (stat == 0) allocate (self%row_buffer(padded(1), 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
     if (stat == 0) allocate (self%block_buffer(self%width*padded(2), n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), &
                              stat=stat)
@@ -322,28 +334,94 @@ contains
     real(wp), intent(in), contiguous :: field(:, :, :)
     !> Sums of the convolutions (n_col, n_row, onto)
     real(wp), intent(out), contiguous :: result(:, :, :)
-    integer :: n(2), i, o, row, b, thread
 
-    n = self%extent
+    call take_work(self, max(size(field, 3), size(result, 3)))
+    call transform_fields(self, field)
+    call multiply_columns(self, kernel)
+    call transform_back(self, result)
+  end subroutine convolve
+
+  !> Replace fields by the sums of their convolutions.
+  subroutine convolve_in_place(self, kernel, field)
+    class(convolution_t), intent(inout) :: self
+    !> Number of the kernel (onto, from), negative to reverse its sign, or `complement`; as many fields as sums
+    integer, intent(in) :: kernel(:, :)
+    !> Fields to be convolved; then their sums (n_col, n_row, from)
+    real(wp), intent(inout), contiguous :: field(:, :, :)
+
+    call take_work(self, size(field, 3))
+    call transform_fields(self, field)
+    call multiply_columns(self, kernel)
+    call transform_back(self, field)
+  end subroutine convolve_in_place
+
+  !> Point to the memory of the row transforms.
+  subroutine take_work(self, n_component)
+    class(convolution_t), intent(inout) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+
+    call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(self%extent(2)), n_component])
+    self%lines(1:self%leading*even(self%extent(2)), 1:n_component) => self%work
+  end subroutine take_work
+
+  !> Return the address of the memory beside the row transforms.
+  type(c_ptr) function beside(self)
+    class(convolution_t), intent(in) :: self
+
+    beside = self%held%scratch%place(self%n_work*(storage_size((1.0_wp, 0.0_wp))/64))
+  end function beside
+
+  !> Transform the rows of fields.
+  subroutine transform_fields(self, field)
+    class(convolution_t), intent(inout) :: self
+    !> Fields to be convolved (n_col, n_row, from)
+    real(wp), intent(in), contiguous :: field(:, :, :)
+    integer :: i, row, thread
+
     thread = 1
-    call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(n(2)), max(size(field, 3), size(result, 3))])
-    self%lines(1:self%leading*even(n(2)), 1:size(self%work, 3)) => self%work
-    !$omp parallel num_threads(self%space%threads) private(i, o, row, b) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(i, row) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    self%row_buffer(n(1) + 1:, 1, thread) = 0.0_wp
+    self%row_buffer(self%extent(1) + 1:, 1, thread) = 0.0_wp
     do i = 1, size(field, 3)
       !$omp do schedule(static)
-      do row = 1, n(2), 2
+      do row = 1, self%extent(2), 2
         call transform_rows(self, row, i, thread, field(:, :, i))
       end do
       !$omp end do nowait
     end do
-    !$omp barrier
+    !$omp end parallel
+  end subroutine transform_fields
+
+  !> Transform the columns, multiply with the spectra, and transform them back.
+  subroutine multiply_columns(self, kernel)
+    class(convolution_t), intent(inout) :: self
+    !> Number of the kernel (onto, from), negative to reverse its sign, or `complement`
+    integer, intent(in) :: kernel(:, :)
+    integer :: b, thread
+
+    thread = 1
+    !$omp parallel num_threads(self%space%threads) private(b) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
     !$omp do schedule(static)
     do b = 1, self%n_block
       call convolve_block(self, b, kernel, thread)
     end do
     !$omp end do
+    !$omp end parallel
+  end subroutine multiply_columns
+
+  !> Transform the rows back.
+  subroutine transform_back(self, result)
+    class(convolution_t), intent(inout) :: self
+    !> Sums of the convolutions (n_col, n_row, onto)
+    real(wp), intent(inout), contiguous :: result(:, :, :)
+    integer :: n(2), o, row, thread
+
+    n = self%extent
+    thread = 1
+    !$omp parallel num_threads(self%space%threads) private(o, row) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
     do o = 1, size(result, 3)
       !$omp do schedule(static)
       do row = 1, n(2), 2
@@ -360,7 +438,7 @@ contains
     end do
     !$omp end parallel
     if (perturb_convolution) call perturb(result)
-  end subroutine convolve
+  end subroutine transform_back
 
   !> Change every value by two units in the last place of the largest one; the parity of the bits of the value decides the sign.
   pure subroutine perturb(result)
@@ -431,7 +509,9 @@ contains
         call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
         call fftw_execute_dft(self%held%plans%column, given(:, i), transformed(:, i))
       end do
-      if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
+      if (associated(self%wide)) then
+        call multiply_one(size(given, 1), real(self%wide(:, b), wp), transformed(:, 1), given(:, 1))
+      else if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
       else
         call multiply(self%spectrum(:, b, :), self%first_odd, self%whole, kernel, transformed, given)

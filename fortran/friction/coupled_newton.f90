@@ -275,10 +275,15 @@ contains
                                 options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
+      iteration%rounded = .true.
       call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
       if (allocated(error)) return
       now%outcome = iteration%outcome
-      if (iteration%drift > options%displacement_rounding) call system%product(step%x, step%ax, error)
+      now%drift = iteration%drift
+      ! as long as the residual is far larger, the next sweep begins with a product anyway
+      if (now%drift <= max(options%displacement_rounding, options%drift_share*iteration%residual)) return
+      call system%product(step%x, step%ax, error)
+      now%drift = 0.0_wp
     end associate
   end subroutine solve
 

@@ -26,13 +26,10 @@ module hc_coupled_system
     real(wp), allocatable :: compliance(:)
     !> mu at slipping nodes, 0 elsewhere; traction across at rest over the pressure, not there if all are 0
     real(wp), allocatable :: slope(:), tilt(:)
-    !> Tractions that are multiplied, zero off the contact; kept between the products of a solution
-    real(wp), allocatable, private :: traction(:)
   contains
     procedure :: product => coupled_product
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
-    procedure :: release => release_coupled
   end type coupled_system_t
 
 contains
@@ -43,24 +40,22 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: traction(:)
     real(wp) :: t, e
     integer :: n, i
 
     n = size(x)/3
-    allocate (traction(3*n))
     associate (direction => self%shear%direction)
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(t, e)
       do i = 1, n
         t = x(n + i)
         e = x(2*n + i) + self%slope(i)*x(i)
-        traction(i) = x(i)
-        traction(n + i) = -direction(2, i)*t + direction(1, i)*e
-        traction(2*n + i) = direction(1, i)*t + direction(2, i)*e
+        y(i) = x(i)
+        y(n + i) = -direction(2, i)*t + direction(1, i)*e
+        y(2*n + i) = direction(1, i)*t + direction(2, i)*e
       end do
       !$omp end parallel do
     end associate
-    call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], y, error)
+    call self%operators%replace([normal, along_x, along_y], y, error)
     if (allocated(error)) return
     if (allocated(self%compliance)) y(:n) = y(:n) + self%compliance*x(:n)
     call self%shear%add_springs(x(n + 1:), y(n + 1:))
@@ -84,25 +79,22 @@ contains
     integer :: n, k, i, at
 
     n = size(y)/3
-    if (.not. allocated(self%traction)) then
-      allocate (self%traction(3*n))
-      call self%space%fill(self%traction, 0.0_wp)
-    end if
+    call self%space%fill(y, 0.0_wp)
     associate (contact => self%pressed, runs => self%sheared%pairs, n_p => self%pressed%n_active, &
                n_t => self%sheared%pairs%n_first, direction => self%shear%direction)
-      call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), self%traction(n + 1:))
+      call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), y(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, e)
       do k = 1, size(contact%first)
         do i = contact%first(k), contact%last(k)
           at = contact%place(k) + i - contact%first(k)
-          self%traction(i) = x(at)
+          y(i) = x(at)
           e = self%slope(i)*x(at)
-          self%traction(n + i) = self%traction(n + i) + direction(1, i)*e
-          self%traction(2*n + i) = self%traction(2*n + i) + direction(2, i)*e
+          y(n + i) = y(n + i) + direction(1, i)*e
+          y(2*n + i) = y(2*n + i) + direction(2, i)*e
         end do
       end do
       !$omp end parallel do
-      call self%operators%apply([normal, along_x, along_y], self%traction, [normal, along_x, along_y], y, error)
+      call self%operators%replace([normal, along_x, along_y], y, error)
       if (allocated(error)) return
       call self%shear%add_springs_packed(runs, x(n_p + 1:n_p + n_t), y(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at)
@@ -116,15 +108,6 @@ contains
       !$omp end parallel do
     end associate
   end subroutine coupled_product_packed
-
-  !> Free the tractions, and what the preconditioners keep.
-  subroutine release_coupled(self)
-    class(coupled_system_t), intent(inout) :: self
-
-    if (allocated(self%traction)) deallocate (self%traction)
-    call self%operators%normal%release()
-    call self%operators%tangential%release()
-  end subroutine release_coupled
 
   !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
   !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.

@@ -106,20 +106,20 @@ contains
   end subroutine set_gap
 
   !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
-  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, unlike)
+  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, unlike, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike
-    logical, intent(in) :: unlike
+    !> The materials are unlike; the window repeats
+    logical, intent(in) :: unlike, periodic
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: given
 
     ! initial gap, candidates
     given = 12*int(extent(1), long)*extent(2)
-    frictional_contact_memory = given + operators_memory(extent, threads, unlike, shared=.false.) &
-                                + (given + operators_memory(extent, threads, unlike, shared=.true.))/3
+    frictional_contact_memory = given + operators_memory(extent, threads, unlike, .false., periodic) &
+                                + (given + operators_memory(extent, threads, unlike, .true., periodic))/3
   end function frictional_contact_memory
 
   !> Count the additional bytes while a step is solved; the coarse lattices have done by then, and its record takes less.
@@ -144,19 +144,18 @@ contains
     directions = options%max_directions - 1
     ! iterate; traction estimates; shear system
     everywhere = 6*field + half + (1 + 2*n_shear)*half + 3*field
-    ! what the preconditioner of the shear traction gets and gives, what it averages and the mean; packed: its weights, what it
-    ! turns into the frames
-    everywhere = everywhere + 4*2*half
+    ! packed: weights of the preconditioner of the shear traction, what it turns into the frames; its fields are in the memory of
+    ! the transforms
     inside = 2*half + 2*field
     if (coupled) then
-      ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction, its tractions; the products
-      ! of all directions off the contact; without the displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 + 3 - 4)*field + 3*directions*field
+      ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction; the products of all
+      ! directions off the contact; without the displacements of the iterate
+      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 - 4)*field + 3*directions*half
       ! packed: both of all directions, residuals, constraints thrice; without the products there
-      inside = inside + 3*(2*directions + 2 + 3*n_force)*field - 3*directions*field
+      inside = inside + 3*(2*directions*half + (2 + 3*n_force)*field) - 3*directions*half
     else
-      ! product of a direction, its tractions
-      everywhere = everywhere + 2*2*field
+      ! product of a direction
+      everywhere = everywhere + 2*field
       ! packed: traction before, vectors of conjugate gradients, constraints twice
       inside = inside + 2*(1 + 4 + 2*n_shear)*field
     end if

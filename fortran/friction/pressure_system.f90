@@ -21,8 +21,8 @@ module hc_pressure_system
     !> Add to displacements what the springs give way, or take it off
     procedure :: stretch
     procedure :: product => pressure_product
+    procedure :: product_packed => pressure_product_packed
     procedure :: precondition_packed => pressure_precondition_packed
-    procedure :: release => release_pressure
   end type pressure_system_t
 
 contains
@@ -37,6 +37,28 @@ contains
     call self%operators%apply([normal], x, [normal], y, error)
     call self%stretch(1.0_wp, x, y)
   end subroutine pressure_product
+
+  !> Multiply values at the active nodes.
+  subroutine pressure_product_packed(self, nodes, x, y, error)
+    class(pressure_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k, i
+
+    call self%space%fill(y, 0.0_wp)
+    call nodes%unpack(x, y)
+    call self%operators%replace([normal], y, error)
+    if (allocated(error) .or. .not. allocated(self%compliance)) return
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
+    do k = 1, size(nodes%first)
+      do i = nodes%first(k), nodes%last(k)
+        y(i) = y(i) + self%compliance(i)*x(nodes%place(k) + i - nodes%first(k))
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine pressure_product_packed
 
   !> Add to y: y <- y + factor C x
   subroutine stretch(self, factor, x, y)
@@ -69,12 +91,5 @@ contains
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed
-
-  !> Free what the preconditioner keeps.
-  subroutine release_pressure(self)
-    class(pressure_system_t), intent(inout) :: self
-
-    call self%operators%normal%release()
-  end subroutine release_pressure
 
 end module hc_pressure_system

@@ -42,13 +42,10 @@ module hc_shear_system
     real(wp) :: elastic_compliance = 0.0_wp
     !> Nodes in contact
     type(active_set_t), private :: nodes
-    !> Components along x and y of what is multiplied, zero off the contact; kept between the products of a solution
-    real(wp), allocatable, private :: from(:)
   contains
     procedure :: product => shear_product
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
-    procedure :: release => release_shear
     !> Turn components along x and y into the frames, or back
     procedure :: turn
     !> Let every node stick; free frames and compliances until then
@@ -98,12 +95,11 @@ contains
     call new_active_set(self%nodes, spread(.true., 1, n), self%space)
   end subroutine reset_frames
 
-  !> Free frames and compliances, and what products keep.
+  !> Free frames and compliances.
   subroutine forget_frames(self)
     class(shear_system_t), intent(inout) :: self
 
     deallocate (self%direction, self%compliance)
-    call self%release()
   end subroutine forget_frames
 
   !> Set the nodes in contact; their directions and compliances are known.
@@ -112,10 +108,7 @@ contains
     !> Nodes in contact (n)
     logical, intent(in), contiguous :: contact(:)
 
-    if (.not. self%nodes%is_set(contact)) then
-      call new_active_set(self%nodes, contact, self%space)
-      call self%release()
-    end if
+    if (.not. self%nodes%is_set(contact)) call new_active_set(self%nodes, contact, self%space)
     call self%operators%tangential%set_active(contact, self%compliance, self%direction)
   end subroutine set_contact
 
@@ -246,38 +239,18 @@ contains
     integer :: n, k, from, to
 
     n = size(self%compliance)
-    call self%release()
-    call take_from(self)
+    call self%space%fill(y, 0.0_wp)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
-      call plane_row(to - from + 1, self%direction(:, from:to), x(from:to), x(n + from:n + to), self%from(from:to), &
-                     self%from(n + from:n + to))
+      call plane_row(to - from + 1, self%direction(:, from:to), x(from:to), x(n + from:n + to), y(from:to), y(n + from:n + to))
     end do
     !$omp end parallel do
-    call self%operators%apply(shear, self%from, shear, y, error)
+    call self%operators%replace(shear, y, error)
     if (allocated(error)) return
     call self%add_springs(x, y)
-    call self%release()
   end subroutine shear_product
-
-  !> Take memory for what is multiplied, zero.
-  subroutine take_from(self)
-    class(shear_system_t), intent(inout) :: self
-
-    if (allocated(self%from)) return
-    allocate (self%from(2*size(self%compliance)))
-    call self%space%fill(self%from, 0.0_wp)
-  end subroutine take_from
-
-  !> Free it, and what the preconditioner keeps.
-  subroutine release_shear(self)
-    class(shear_system_t), intent(inout) :: self
-
-    if (allocated(self%from)) deallocate (self%from)
-    call self%operators%tangential%release()
-  end subroutine release_shear
 
   !> Multiply values at the active nodes: the component along t of all nodes in contact, that along e of some.
   subroutine shear_product_packed(self, nodes, x, y, error)
@@ -287,10 +260,10 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    call take_from(self)
     associate (n_t => nodes%pairs%n_first)
-      call self%put_in_plane(nodes%pairs, x(:n_t), x(n_t + 1:), self%from)
-      call self%operators%apply(shear, self%from, shear, y, error)
+      call self%space%fill(y, 0.0_wp)
+      call self%put_in_plane(nodes%pairs, x(:n_t), x(n_t + 1:), y)
+      call self%operators%replace(shear, y, error)
       if (allocated(error)) return
       call self%add_springs_packed(nodes%pairs, x(:n_t), y)
     end associate

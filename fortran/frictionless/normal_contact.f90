@@ -6,16 +6,15 @@
 !> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
   use hc_elastic_medium, only: elastic_medium_t
-  use hc_fftw, only: good_size
-  use hc_fft_layout_single, only: convolution_memory
-  use hc_flexibility, only: check_operator
+  use hc_fft_layout_single, only: convolution_memory, transform_memory
+  use hc_flexibility, only: check_operator, padded_length
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -108,23 +107,31 @@ contains
   end subroutine new_normal_contact
 
   !> Count the bytes that a problem takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function normal_contact_memory(extent, threads)
+  pure integer(selected_int_kind(18)) function normal_contact_memory(extent, threads, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
+    !> The window repeats
+    logical, intent(in) :: periodic
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    integer(long) :: n, each
+    integer(long) :: n, exact, each
 
     n = int(extent(1), long)*extent(2)
-    ! on all lattices: spectra in single precision; gap, candidates
-    each = preconditioner_memory(extent, threads, .false., shared=.true.) - 2*half*n &
-           + convolution_memory(extent, good_size(2*extent - 1), 1, 0, threads) + n*(field + half)
-    ! on the finest: products in double precision, whose memory the others share; pressure, closing, four vectors, punch, zones
-    ! now and next, marks about the edge of the contact
-    normal_contact_memory = each + each/3 + fft_memory(extent, .true., threads) + n*(2*field + 5*half + 3*half)
+    ! the spectrum of the pressure: in double precision on the finest lattice, and on all of a window that repeats
+    exact = fft_memory(extent, .true., threads, shared=.true., periodic=periodic)
+    ! on all lattices: the inverse symbol, buffers; gap, candidates
+    each = preconditioner_memory(extent, threads, .false., shared=.true.) &
+           + convolution_memory(extent, padded_length(extent, periodic), 0, 0, threads) + n*(field + half)
+    normal_contact_memory = each + exact + (each + merge(exact, exact/2, periodic))/3
+    ! on the finest: row transforms in single precision, beside them those in double precision or two fields, and a third one
+    associate (rows => transform_memory(extent, padded_length(extent, periodic), 1))
+      normal_contact_memory = normal_contact_memory + rows + max(rows, 2*half*n) + half*n
+    end associate
+    ! pressure, closing; direction, punch, zones now and next, marks about the edge of the contact
+    normal_contact_memory = normal_contact_memory + n*(2*field + 6*half)
   end function normal_contact_memory
 
   !> Solve a load step, of which the normal load or the approach matters.
@@ -162,10 +169,15 @@ contains
     type(contact_state_t) :: coarse
     type(normal_iterate_t), allocatable :: passing
     real(wp) :: work, coarse_tolerance
-    integer :: l
+    integer :: l, stat
 
     call check_target([control], [target], tolerance, max_sweeps, error)
     if (allocated(error)) return
+    call self%scratch%take(stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+      return
+    end if
     goal = load_target_t([control], [target])
     work = 0.0_wp
     do l = size(self%level), 1, -1
@@ -205,6 +217,9 @@ contains
       end associate
     end do
     state%operator_applications = work
+    ! files are written before the next load
+    self%iterate = normal_iterate_t()
+    call self%scratch%free()
   end subroutine solve
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.

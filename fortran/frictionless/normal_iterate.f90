@@ -29,8 +29,9 @@ module hc_normal_iterate
     real(wp), allocatable :: p(:, :), w(:, :)
     !> Under a compliant law: compliance [m/Pa] and offset [m] of the spring of each node, 0 off the active nodes
     real(wp), allocatable :: compliance(:, :), offset(:, :)
-    !> Residual, preconditioned residual, direction and its product
-    real(sp), allocatable :: r(:, :, :), z(:, :, :), d(:, :, :), kd(:, :, :)
+    !> Direction; residual, preconditioned residual and product of the direction, in memory of the transforms
+    real(sp), allocatable :: d(:, :, :)
+    real(sp), pointer, contiguous :: r(:, :, :) => null(), z(:, :, :) => null(), kd(:, :, :) => null()
     !> Estimate of the pressure of a rigid punch over the active nodes: M times one; zero off them
     real(sp), allocatable :: punch(:, :)
     real(wp) :: punch_sum = 0.0_wp
@@ -429,16 +430,16 @@ contains
 
     n = level%lattice%extent
     if (allocated(now%active)) then
-      if (any(shape(now%active) /= n)) deallocate (now%r, now%z, now%d, now%kd, now%active, now%span)
+      if (any(shape(now%active) /= n)) deallocate (now%d, now%active, now%span)
     end if
     if (allocated(now%punch)) deallocate (now%punch)
     if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
     if (allocated(now%w)) deallocate (now%w)                                   ! of a solution that failed
     stat = 0
     if (.not. allocated(now%active)) then
-      allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
-                now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+      allocate (now%d(n(1), n(2), 1), now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
     end if
+    call level%take_fields(now%r, now%z, now%kd)
     if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
     if (stat == 0 .and. level%normal_law%is_compliant()) then
       allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)

@@ -5,6 +5,8 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N2) to (N5).
 module hc_normal_lattice
+  use, intrinsic :: iso_c_binding, only: c_f_pointer
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
@@ -15,6 +17,7 @@ module hc_normal_lattice
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
+  use hc_fft_layout_single, only: transform_memory
   use hc_contact_state, only: contact_state_t, load_target_t
   use hc_normal_problem, only: normal_problem_t
   use hc_inverse_symbol, only: single_cost
@@ -38,6 +41,8 @@ module hc_normal_lattice
   contains
     !> Operators
     procedure :: prepare
+    !> Memory for fields in single precision
+    procedure :: take_fields
     !> Gap, zones, load and residuals of a given pressure
     procedure :: complete_from_pressure
     !> Products in single precision, of the flexibility and of its approximate inverse, and in double precision
@@ -72,7 +77,6 @@ contains
     type(rounded_kernel_t) :: rounded
     type(kernel_key_t) :: key
     logical :: found
-    integer :: block
 
     self%space = space
     ! on a window that repeats, single precision is rounded from the spectrum of the other
@@ -87,17 +91,11 @@ contains
     call new_symbol_preconditioner(preconditioner, self%lattice, self%medium, space, self%options%preconditioner, error, cache)
     if (allocated(error)) return
     call move_alloc(preconditioner, self%preconditioner)
-    call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), 1, 1, space, error)
+    call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), 1, 1, space, error, &
+                         beside=before_last(self) + self%lattice%size()*(storage_size(1.0_sp)/8))
     if (allocated(error)) return
     if (self%exact) then
-      ! copied as fast as it would be found
-      call self%single%find_spectra(found, error)
-      if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(self%space%threads)
-      do block = 1, self%single%n_block
-        self%single%spectrum(:, block, 1) = real(self%flexibility%convolution%spectrum(:, block, 1), sp)
-      end do
-      !$omp end parallel do
+      self%single%wide => self%flexibility%convolution%spectrum(:, :, 1)
     else
       key = new_kernel_key(of_pressure_rounded, self%lattice, self%medium)
       call self%single%find_spectra(found, error, cache, key)
@@ -112,6 +110,33 @@ contains
     end if
     self%iterating = .true.
   end subroutine prepare
+
+  !> Count the bytes before the last of the fields of `take_fields`: its memory is beside that of products in double precision,
+  !> which take twice as much as those in single precision.
+  pure integer(int64) function before_last(self)
+    class(normal_lattice_t), intent(in) :: self
+
+    before_last = max(transform_memory(self%lattice%extent, transform_length(self%lattice), 1), &
+                      2*int(self%lattice%size(), int64)*(storage_size(1.0_sp)/8))
+  end function before_last
+
+  !> Take fields from the memory of the transforms: products in double precision destroy the first two.
+  subroutine take_fields(self, first, second, last)
+    class(normal_lattice_t), intent(in) :: self
+    !> Fields (n_col, n_row, 1)
+    real(sp), pointer, contiguous, intent(out) :: first(:, :, :), second(:, :, :), last(:, :, :)
+    real(sp), pointer, contiguous :: all(:)
+    integer(int64) :: n, from
+
+    n = self%lattice%size()
+    from = before_last(self)/(storage_size(1.0_sp)/8)
+    call c_f_pointer(self%single%beside(), all, [from + n])
+    associate (extent => self%lattice%extent)
+      first(1:extent(1), 1:extent(2), 1:1) => all(:n)
+      second(1:extent(1), 1:extent(2), 1:1) => all(n + 1:2*n)
+      last(1:extent(1), 1:extent(2), 1:1) => all(from + 1:)
+    end associate
+  end subroutine take_fields
 
   !> Compute gap, zones, load and residuals of a given pressure at a given approach.
   subroutine complete_from_pressure(self, target, tolerance, state, error)

@@ -21,7 +21,7 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N2) to (N8).
 module hc_normal_lattice_solver
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
@@ -353,8 +353,14 @@ contains
     type(normal_lattice_t), intent(inout) :: level
     type(normal_iterate_t), intent(inout) :: now
     type(error_t), allocatable, intent(out) :: error
+    integer :: row
 
     call level%multiply_exactly(now%p, now%w, error)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%r, 2)
+      now%r(:, row, 1) = 0.0_sp                                                ! which the transforms have overwritten
+    end do
+    !$omp end parallel do
     call add_springs(level, now, 1)
     now%closing_error = 0.0_wp
   end subroutine find_closing

@@ -62,7 +62,7 @@ contains
     integer(selected_int_kind(18)), parameter :: node = 5*8 + 2*4 + 12*8
 
     ! the transforms share no memory here: three more than there
-    energy_ahead_memory = normal_contact_memory(extent, threads) + 3*fft_memory(extent, .true., threads) &
+    energy_ahead_memory = normal_contact_memory(extent, threads, periodic=.false.) + 3*fft_memory(extent, .true., threads) &
                           + node*extent(1)*extent(2)
   end function energy_ahead_memory
 

@@ -38,8 +38,6 @@ module hc_linear_system
     procedure :: product_packed
     !> z = M r at the active nodes
     procedure :: precondition_packed
-    !> Free what products keep for the next one
-    procedure :: release
   end type linear_system_t
 
   !> Linear constraints on the unknowns; at the active nodes (n_active, number of constraints, may be 0).
@@ -67,6 +65,8 @@ module hc_linear_system
     integer :: most = 0, made = 0
     !> GMRES: directions that are stored; after as many the iteration begins anew with the residual that is left
     integer :: most_directions = 0
+    !> GMRES: directions are stored in single precision, whose rounding errors the drift contains
+    logical :: rounded = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)
     !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
@@ -129,12 +129,6 @@ contains
 
     call self%space%copy(r, z)
   end subroutine precondition_packed
-
-  !> Free what products keep: by default nothing is kept.
-  subroutine release(self)
-    class(linear_system_t), intent(inout) :: self
-
-  end subroutine release
 
   !> Compute M B, the constraint vectors after the preconditioner.
   subroutine precondition_constraints(system, nodes, n, constraint, mb, error)

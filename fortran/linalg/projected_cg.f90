@@ -109,7 +109,6 @@ contains
         iteration%made = iteration%made + 1
       end do
     end associate
-    call system%release()
     if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     ! the largest of several numbers hides one that is not a number
     if (.not. ieee_is_finite(space%dot(r, r))) iteration%outcome = solution_broke_off

@@ -13,7 +13,7 @@ module hc_state_measures
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, tangential_scale
   use hc_normal_law, only: normal_law_t
   use hc_friction_law, only: friction_law_t
-  use hc_zone_estimators, only: area_radius, pressure_center
+  use hc_zone_estimators, only: area_radius
   implicit none
   private
 
@@ -167,26 +167,63 @@ contains
   end function shear_energy
 
   !> Find the center of area of a zone, and smallest and largest coordinates of its nodes; NaN if there are none [m].
-  subroutine zone_extent(x, y, zone, center, lower, upper, space)
-    !> Coordinates of the nodes [m]
-    real(wp), intent(in), contiguous :: x(:, :), y(:, :)
-    !> Nodes of the zone
+  subroutine zone_extent(lattice, zone, center, lower, upper, space)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes of the zone (n_col, n_row)
     logical, intent(in), contiguous :: zone(:, :)
     !> Mean, smallest and largest x and y
     real(wp), intent(out) :: center(2), lower(2), upper(2)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    integer :: n
+    real(wp), dimension(2, size(zone, 2)) :: total, least, most
+    real(wp), dimension(size(zone, 1)) :: x, y
+    integer :: n, row
 
     center = ieee_value(1.0_wp, ieee_quiet_nan)
     lower = center
     upper = center
     n = space%count(zone)
     if (n == 0) return
-    center = [space%sum(x, zone), space%sum(y, zone)]/n
-    lower = [space%min(x, zone), space%min(y, zone)]
-    upper = [space%max(x, zone), space%max(y, zone)]
+    !$omp parallel do schedule(static) num_threads(space%threads) private(x, y)
+    do row = 1, size(zone, 2)
+      call lattice%row_coordinates(row, x, y)
+      total(:, row) = [sum(x, mask=zone(:, row)), sum(y, mask=zone(:, row))]
+      least(:, row) = [minval(x, mask=zone(:, row)), minval(y, mask=zone(:, row))]
+      most(:, row) = [maxval(x, mask=zone(:, row)), maxval(y, mask=zone(:, row))]
+    end do
+    !$omp end parallel do
+    center = sum(total, dim=2)/n
+    lower = minval(least, dim=2)
+    upper = maxval(most, dim=2)
   end subroutine zone_extent
+
+  !> Find the centroid of a pressure; NaN if there is none [m].
+  pure function center_of(lattice, pressure) result(center)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    real(wp) :: center(2), total
+    real(wp), dimension(size(pressure, 1)) :: x, y
+    integer :: col, row
+
+    center = 0.0_wp
+    total = 0.0_wp
+    do row = 1, size(pressure, 2)
+      call lattice%row_coordinates(row, x, y)
+      do col = 1, size(x)
+        total = total + pressure(col, row)
+        center(1) = center(1) + pressure(col, row)*x(col)
+        center(2) = center(2) + pressure(col, row)*y(col)
+      end do
+    end do
+    if (total > 0.0_wp) then
+      center = center/total
+    else
+      center = ieee_value(1.0_wp, ieee_quiet_nan)
+    end if
+  end function center_of
 
   !> Measure areas of contact and stick, largest tractions and energy of a state, with friction or without.
   type(state_measures_t) function measure_state(lattice, friction, initial_gap, candidate, state, space) result(found)
@@ -203,7 +240,7 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     type(contact_edges_t) :: edges
-    real(wp), allocatable :: x(:, :), y(:, :), reserve(:, :), length(:)
+    real(wp), allocatable :: reserve(:, :), length(:)
     logical, allocatable :: zone(:, :)
     integer :: row
 
@@ -230,10 +267,7 @@ contains
       return
     end if
     found%stick = size_of(lattice, space%count(zone), edges%stick_edge(zone, reserve))
-    deallocate (reserve)                                                       ! before the coordinates, which take more
-    allocate (x, y, mold=initial_gap)
-    call lattice%coordinates(x, y)
-    call zone_extent(x, y, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
+    call zone_extent(lattice, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
   end function measure_state
 
   !> Measure the area of contact, the pressure and its energy.
@@ -252,7 +286,6 @@ contains
     type(state_measures_t), intent(out) :: found
     !> Edges of the contact
     type(contact_edges_t), intent(out) :: edges
-    real(wp), allocatable :: x(:, :), y(:, :)
 
     found%max_pressure = space%max(state%pressure)
     associate (contact => state%zone /= separated)
@@ -264,10 +297,7 @@ contains
         found%contact%area_error = 0.2_wp*lattice%cell_area()*count(contact .and. .not. all_around(contact))
         return
       end if
-      allocate (x, y, mold=initial_gap)
-      call lattice%coordinates(x, y)
-      found%pressure_center = pressure_center(x, y, state%pressure)
-      deallocate (x, y)                                                        ! before the edges, which take as much
+      found%pressure_center = center_of(lattice, state%pressure)
       call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
       found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
     end associate

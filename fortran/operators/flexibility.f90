@@ -16,7 +16,7 @@ module hc_flexibility
   implicit none
   private
 
-  public :: flexibility_t, check_operator, transform_length, normal, along_x, along_y
+  public :: flexibility_t, check_operator, transform_length, padded_length, normal, along_x, along_y
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
@@ -32,6 +32,8 @@ module hc_flexibility
   contains
     !> Relative displacements of given tractions
     procedure(apply), deferred :: apply
+    !> Tractions replaced by the relative displacements that they cause
+    procedure :: replace
     !> Do the arrays fit the window and the components?
     procedure :: check
     !> Add one product to the count
@@ -84,9 +86,37 @@ contains
     type(lattice_t), intent(in) :: lattice
     integer :: length(2)
 
-    length = lattice%extent
-    if (.not. lattice%is_periodic()) length = good_size(2*lattice%extent - 1)
+    length = padded_length(lattice%extent, lattice%is_periodic())
   end function transform_length
+
+  !> Return the same of the size of a window.
+  pure function padded_length(extent, periodic) result(length)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> It repeats; absent: it does not
+    logical, intent(in), optional :: periodic
+    integer :: length(2)
+
+    length = good_size(2*extent - 1)
+    if (present(periodic)) then
+      if (periodic) length = extent
+    end if
+  end function padded_length
+
+  !> Replace tractions by the displacements along the same components that they cause together; by default with a copy.
+  subroutine replace(self, components, values, error)
+    class(flexibility_t), intent(inout) :: self
+    !> Components that act and are wanted: normal, along_x, along_y
+    integer, intent(in) :: components(:)
+    !> Their tractions [Pa], then the displacements [m] (n_col, n_row, size(components))
+    real(wp), intent(inout), contiguous :: values(:, :, :)
+    !> Allocated on failure: the shapes do not fit the window
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: traction(:, :, :)
+
+    allocate (traction, source=values)
+    call self%apply(components, traction, components, values, error)
+  end subroutine replace
 
   !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)

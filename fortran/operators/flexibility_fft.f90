@@ -7,8 +7,7 @@ module hc_flexibility_fft
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_block, block_index
-  use hc_flexibility, only: flexibility_t, check_operator, transform_length, normal
-  use hc_fftw, only: good_size
+  use hc_flexibility, only: flexibility_t, check_operator, transform_length, padded_length, normal
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
   use hc_fft_passes, only: complement
   use hc_fft_layout, only: convolution_memory, transform_memory
@@ -37,6 +36,7 @@ module hc_flexibility_fft
     integer, private :: n_component = 0, at_once = 1
   contains
     procedure :: apply => fft_apply
+    procedure :: replace => fft_replace
   end type fft_flexibility_t
 
   !> The blocks of the operator at lattice offsets, over the unit of the bodies.
@@ -160,7 +160,7 @@ contains
   end subroutine set_periodic_spectra
 
   !> Count the bytes that the operator takes, for a window of the given size; bodies without a trace have a spectrum more.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> The operator is applied to the pressure alone, for the gap alone
@@ -171,13 +171,15 @@ contains
     logical, intent(in), optional :: unlike
     !> Row transforms share the memory of others; absent: they have their own
     logical, intent(in), optional :: shared
+    !> The window repeats; absent: it does not
+    logical, intent(in), optional :: periodic
     integer :: n_kernel, n_component
 
     n_kernel = merge(1, n_spectrum, normal_only)
     if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, n_even - 1), unlike)
     n_component = components_at_once(n_kernel, n_even)
     if (present(shared)) n_component = merge(0, n_component, shared)
-    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, n_component, threads)
+    fft_memory = convolution_memory(extent, padded_length(extent, periodic), n_kernel, n_component, threads)
   end function fft_memory
 
   !> Return the components that are multiplied together: without odd blocks, pressure and shear traction are apart.
@@ -194,7 +196,7 @@ contains
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
 
-    fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_spectrum)
+    fft_setup_memory = transform_memory(extent, padded_length(extent), n_spectrum)
   end function fft_setup_memory
 
   !> Evaluate the blocks of the operator along a row of offsets.
@@ -248,6 +250,25 @@ contains
     end if
     call self%count(from, onto)
   end subroutine fft_apply
+
+  !> Multiply in the place of the tractions, unless these are needed to the end or are multiplied apart.
+  subroutine fft_replace(self, components, values, error)
+    class(fft_flexibility_t), intent(inout) :: self
+    integer, intent(in) :: components(:)
+    real(wp), intent(inout), contiguous :: values(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: traction(:, :, :)
+
+    if (size(components) > self%at_once .or. self%medium%spring_compliance() > 0.0_wp) then
+      allocate (traction, source=values)
+      call self%apply(components, traction, components, values, error)
+      return
+    end if
+    call self%check(components, values, components, values, error)
+    if (allocated(error)) return
+    call self%convolution%convolve_in_place(self%index(components, components), values)
+    call self%count(components, components)
+  end subroutine fft_replace
 
   !> Multiply pressure and shear traction one after the other, which do not move each other; the pressure is the first component.
   subroutine apply_apart(self, from, traction, onto, displacement)

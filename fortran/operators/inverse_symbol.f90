@@ -6,6 +6,8 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P1), (P4), (P7).
 module hc_inverse_symbol
+  use, intrinsic :: iso_c_binding, only: c_ptr
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
@@ -64,12 +66,14 @@ module hc_inverse_symbol
     procedure :: is_loose
     !> Traction that causes a given displacement, approximately, in any units of ratio `unit`
     procedure :: apply_single
+    !> The same in the place of the displacement, and memory for it
+    procedure :: apply_in_place, beside
   end type inverse_symbol_t
 
 contains
 
   !> Make plans and inverse symbol over a window.
-  subroutine new_inverse_symbol(self, lattice, medium, space, error, tangential, cache)
+  subroutine new_inverse_symbol(self, lattice, medium, space, error, tangential, cache, beside)
     !> Preconditioner to be set up
     type(inverse_symbol_t), intent(out) :: self
     !> Lattice and window
@@ -84,6 +88,8 @@ contains
     logical, intent(in), optional :: tangential
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> Bytes that `beside` gives; absent: none
+    integer(int64), intent(in), optional :: beside
 
     type(kernel_key_t) :: key
     integer, allocatable :: f(:, :)
@@ -101,7 +107,7 @@ contains
     if (lattice%is_periodic()) length = lattice%extent
     self%length = length
     call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
-                         space, error)
+                         space, error, beside=beside)
     if (allocated(error)) return
     self%unit = medium%unit(lattice%spacing())
     call medium%reduce(lattice%spacing(), reduced)
@@ -154,15 +160,12 @@ contains
     logical, intent(in) :: tangential
     !> Row transforms share the memory of others; absent: they have their own
     logical, intent(in), optional :: shared
-    integer, parameter :: long = selected_int_kind(18)
     integer :: n_component
 
     n_component = merge(2, 1, tangential)
     if (present(shared)) n_component = merge(0, n_component, shared)
     preconditioner_memory = convolution_memory(extent, good_size(extent), merge(n_tangential, 1, tangential), n_component, &
                                                threads)
-    ! fields in single precision; those of the tangential one belong to the shear system
-    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory
 
   !> Estimate the traction that causes a given displacement, in any units of ratio `unit`.
@@ -202,6 +205,45 @@ contains
       call edge%fold(field)
     end do
   end subroutine apply_single
+
+  !> Estimate it in the place of the displacement.
+  subroutine apply_in_place(self, values, edge)
+    class(inverse_symbol_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements; then pressure, or shear tractions (n_col, n_row, 1 or 2)
+    real(sp), intent(inout), target :: values(self%shape(1), self%shape(2), self%shape(3))
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in) :: edge
+    real(sp), allocatable :: traction(:, :, :)
+    real(sp), pointer, contiguous :: field(:)
+    integer :: m
+
+    if (allocated(self%sprung)) then
+      allocate (traction, mold=values)
+      call self%apply_single(values, traction, edge)
+      values = traction
+      return
+    end if
+    do m = 1, size(values, 3)
+      field(1:size(values, 1)*size(values, 2)) => values(:, :, m)
+      call edge%extend(field)
+    end do
+    if (self%tangential) then
+      call self%convolution%convolve_in_place(tangential_block, values)
+    else
+      call self%convolution%convolve_in_place(normal_block, values)
+    end if
+    do m = 1, size(values, 3)
+      field(1:size(values, 1)*size(values, 2)) => values(:, :, m)
+      call edge%fold(field)
+    end do
+  end subroutine apply_in_place
+
+  !> Return the address of memory that other convolutions of the same scratch use, too.
+  type(c_ptr) function beside(self)
+    class(inverse_symbol_t), intent(in) :: self
+
+    beside = self%convolution%beside()
+  end function beside
 
   !> Put the nodes on springs along the normal, of a compliant interface, (P7).
   subroutine set_springs(self, options, compliance, active)

@@ -34,6 +34,8 @@ module hc_operator_set
   contains
     !> Displacements that given components of the traction cause along others
     procedure :: apply => apply_operators
+    !> The same along components that act, in the place of the tractions
+    procedure :: replace => replace_by_displacement
     !> Count the work from here on; no nodes are active
     procedure :: reset
     !> Free what the preconditioners store for the active nodes
@@ -80,17 +82,17 @@ contains
   end subroutine new_operators
 
   !> Count the bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared)
+  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
     !> The materials are unlike
     logical, intent(in) :: unlike
-    !> Row transforms share the memory of those of a finer lattice
-    logical, intent(in) :: shared
+    !> Row transforms share the memory of those of a finer lattice; the window repeats
+    logical, intent(in) :: shared, periodic
 
-    operators_memory = fft_memory(extent, .false., threads, unlike, shared) &
+    operators_memory = fft_memory(extent, .false., threads, unlike, shared, periodic) &
                        + preconditioner_memory(extent, threads, .false., shared=.true.) &
                        + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory
@@ -116,6 +118,23 @@ contains
     end associate
     call self%flexibility%apply(from, acting, onto, wanted, error)
   end subroutine apply_operators
+
+  !> Replace tractions, given as vectors, by the displacements along the same components.
+  subroutine replace_by_displacement(self, components, values, error)
+    class(operators_t), intent(inout) :: self
+    !> Components: normal, along_x, along_y
+    integer, intent(in) :: components(:)
+    !> Their tractions [Pa], then the displacements [m], one component after the other
+    real(wp), intent(inout), contiguous, target :: values(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), pointer, contiguous :: fields(:, :, :)
+
+    associate (n => self%flexibility%lattice%extent)
+      fields(1:n(1), 1:n(2), 1:size(components)) => values
+    end associate
+    call self%flexibility%replace(components, fields, error)
+  end subroutine replace_by_displacement
 
   !> Return all work so far, in applications of the full operator.
   pure real(wp) function work(self)

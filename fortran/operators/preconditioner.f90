@@ -26,8 +26,6 @@ module hc_preconditioner
     procedure(apply_packed), deferred :: apply_packed
     !> The same over all nodes, in single precision
     procedure :: apply_single
-    !> Free what applications keep for the next one
-    procedure :: release
     !> Forget the active nodes, and free what was stored for them
     procedure :: clear
   end type preconditioner_t
@@ -81,12 +79,6 @@ contains
     call self%apply_packed(nodes, size(displacement), self%unit*displacement, wanted, work)
     traction = real(wanted, sp)
   end subroutine apply_single
-
-  !> Free what applications keep: by default nothing is kept.
-  subroutine release(self)
-    class(preconditioner_t), intent(inout) :: self
-
-  end subroutine release
 
   !> Forget the active nodes: by default nothing is stored for them.
   subroutine clear(self)

@@ -49,12 +49,11 @@ module hc_shear_preconditioner
     type(active_set_t) :: nodes, slipping, sticking, near, apart
     !> Continuation from stick into slip; none if no node slips
     type(edge_extension_t), allocatable :: front
-    !> Fields along x and y, zero off the nodes near slip: averaged, and the mean (n with a margin, 2)
-    real(sp), allocatable :: field(:, :), mean(:, :)
+    !> Fields along x and y, zero off the nodes near slip: averaged, and the mean (n with a margin, 2); beside the displacements
+    real(sp), pointer, contiguous :: field(:, :) => null(), mean(:, :) => null()
   contains
     procedure :: set_active => set_sheared
     procedure :: apply_packed => apply_to_shear_packed
-    procedure :: release => release_fields
     procedure :: clear => clear_sheared
   end type shear_preconditioner_t
 
@@ -77,7 +76,8 @@ contains
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential=.true.)
+    call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential=.true., &
+                                   more=4*(lattice%size() + 2*margin_of(options, lattice%extent)))
     self%elastic_compliance = node_compliance(lattice, medium)
   end subroutine new_shear_preconditioner
 
@@ -121,7 +121,6 @@ contains
     known = known .and. allocated(self%slipping%first)
     if (known) known = self%slipping%is_set(slips)
     if (known) return
-    call self%release()
     call new_active_set(self%slipping, slips, self%space)
     call find_near(self, self%extent, active, slips)
     if (.not. allocated(self%front)) allocate (self%front)
@@ -199,20 +198,23 @@ contains
     !> Along t: what the bodies take of the displacement, and the traction of the springs under the rest
     real(wp), allocatable :: across(:), rest(:)
 
-    call self%take_memory(n)
-    if (self%slips) call take_fields(self, n/2)
+    if (self%slips) then
+      call take_fields(self, n/2)
+    else
+      call self%take_memory(n)
+    end if
     associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active, threads => self%space%threads)
       allocate (across(n_t), rest(n_t))
       across = displacement(:n_t)/self%unit
       if (self%slips) call share_out(self, runs, displacement(n_t + 1:n_all), across, rest)
-      call to_plane(runs, threads, self%direction, self%given(:n/2), self%given(n/2 + 1:), across, displacement(n_t + 1:n_all), &
+      call to_plane(runs, threads, self%direction, self%values(:n/2), self%values(n/2 + 1:), across, displacement(n_t + 1:n_all), &
                     1.0_wp/self%unit)
       if (self%slips) call continue_into_slip(self)
-      call self%inverse%apply_single(self%given, self%wanted, self%edge)
+      call self%inverse%apply_in_place(self%values, self%edge)
       work = work + self%inverse%cost
       if (self%slips) call fold_into_stick(self)
       call self%space%fill(traction(:n_all), 0.0_wp)
-      call add_in_frames(runs, threads, self%direction, self%wanted(:n/2), self%wanted(n/2 + 1:), traction(:n_t), &
+      call add_in_frames(runs, threads, self%direction, self%values(:n/2), self%values(n/2 + 1:), traction(:n_t), &
                          traction(n_t + 1:n_all))
       if (self%slips) call collect(self, runs, rest, across, traction(:n_t), traction(n_t + 1:n_all))
     end associate
@@ -292,7 +294,7 @@ contains
     class(shear_preconditioner_t), intent(inout) :: self
     !> Steps of the lattice to the neighbors
     integer, intent(in) :: step
-    real(sp), allocatable :: swap(:, :)
+    real(sp), pointer, contiguous :: swap(:, :)
     integer :: k, m, shift(6)
 
     shift = step*neighbor_steps(self%extent(1))
@@ -303,9 +305,9 @@ contains
       end do
     end do
     !$omp end parallel do
-    call move_alloc(self%field, swap)
-    call move_alloc(self%mean, self%field)
-    call move_alloc(swap, self%mean)
+    swap => self%field
+    self%field => self%mean
+    self%mean => swap
   end subroutine average
 
   !> Average a row of nodes.
@@ -328,15 +330,15 @@ contains
     class(shear_preconditioner_t), intent(inout) :: self
     integer :: n, m
 
-    n = size(self%given)/2
+    n = size(self%values)/2
     do m = 1, 2
-      call copy_nodes(self%sticking, self%space%threads, self%given((m - 1)*n + 1:m*n), self%mean(1:n, m))
+      call copy_nodes(self%sticking, self%space%threads, self%values((m - 1)*n + 1:m*n), self%mean(1:n, m))
       call set_to_zero(self%slipping, self%space%threads, self%mean(1:n, m))
       call self%front%extend(self%mean(1:n, m))
     end do
     call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
     do m = 1, 2
-      call add_nodes(self%slipping, self%space%threads, self%mean(1:n, m), self%given((m - 1)*n + 1:m*n))
+      call add_nodes(self%slipping, self%space%threads, self%mean(1:n, m), self%values((m - 1)*n + 1:m*n))
     end do
   end subroutine continue_into_slip
 
@@ -345,42 +347,39 @@ contains
     class(shear_preconditioner_t), intent(inout) :: self
     integer :: n, m
 
-    n = size(self%wanted)/2
+    n = size(self%values)/2
     do m = 1, 2
-      call copy_nodes(self%near, self%space%threads, self%wanted((m - 1)*n + 1:m*n), self%mean(1:n, m))
+      call copy_nodes(self%near, self%space%threads, self%values((m - 1)*n + 1:m*n), self%mean(1:n, m))
     end do
     call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
     do m = 1, 2
       call self%front%fold(self%mean(1:n, m))
-      call copy_nodes(self%sticking, self%space%threads, self%mean(1:n, m), self%wanted((m - 1)*n + 1:m*n))
+      call copy_nodes(self%sticking, self%space%threads, self%mean(1:n, m), self%values((m - 1)*n + 1:m*n))
     end do
   end subroutine fold_into_stick
 
-  !> Take memory for the fields, zero, with a margin for the steps of the means.
+  !> Return the nodes beyond both ends of a field that steps of the means reach.
+  pure integer function margin_of(options, extent)
+    type(preconditioner_options_t), intent(in) :: options
+    !> Columns and rows of the window
+    integer, intent(in) :: extent(2)
+
+    margin_of = maxval(options%smoothing_steps)*(extent(1) + 1)
+  end function margin_of
+
+  !> Take memory for displacements and fields, zero, with a margin for the steps of the means.
   subroutine take_fields(self, n)
     class(shear_preconditioner_t), intent(inout) :: self
     !> Number of nodes of the window
     integer, intent(in) :: n
-    integer :: margin, i
+    real(sp), pointer, contiguous :: fields(:)
+    integer :: margin
 
-    if (allocated(self%field)) return
-    margin = maxval(self%options%smoothing_steps)*(self%extent(1) + 1)
-    allocate (self%field(1 - margin:n + margin, 2), self%mean(1 - margin:n + margin, 2))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1 - margin, n + margin
-      self%field(i, :) = 0.0_sp
-      self%mean(i, :) = 0.0_sp
-    end do
-    !$omp end parallel do
+    margin = margin_of(self%options, self%extent)
+    call self%take_memory(2*n, fields)
+    self%field(1 - margin:n + margin, 1:2) => fields(:2*(n + 2*margin))
+    self%mean(1 - margin:n + margin, 1:2) => fields(2*(n + 2*margin) + 1:)
   end subroutine take_fields
-
-  !> Free it, and what the inverse symbol takes.
-  subroutine release_fields(self)
-    class(shear_preconditioner_t), intent(inout) :: self
-
-    call self%free_memory()
-    if (allocated(self%field)) deallocate (self%field, self%mean)
-  end subroutine release_fields
 
   !> Forget the active nodes, and free what was stored for them.
   subroutine clear_sheared(self)
@@ -388,7 +387,6 @@ contains
     type(active_set_t) :: none
 
     self%direction => null()
-    call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
     if (allocated(self%front)) deallocate (self%front)
     if (allocated(self%own)) deallocate (self%own, self%far)

@@ -6,6 +6,8 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P1) to (P4), (P7).
 module hc_symbol_preconditioner
+  use, intrinsic :: iso_c_binding, only: c_f_pointer
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
@@ -32,17 +34,18 @@ module hc_symbol_preconditioner
     logical :: beside(6) = .true.
     !> Space of the fields
     type(field_space_t) :: space
+    !> Numbers that are taken beside the displacements
+    integer :: n_more = 0
     !> Continuation of displacements beyond the contact; none before there are active nodes
     type(edge_extension_t), allocatable :: edge
-    !> Displacements, zero off the contact but for the rings of `edge`, and tractions in single precision; kept between the
-    !> applications of a solution
-    real(sp), allocatable :: given(:), wanted(:)
+    !> Displacements, zero off the contact but for the rings of `edge`, then the tractions in their place, in memory that other
+    !> transforms use between the applications
+    real(sp), pointer, contiguous :: values(:) => null()
   contains
     !> Set up the continuation beyond the active nodes
     procedure :: continue_beyond
-    !> Take memory for displacements and tractions, and free it
-    procedure :: take_memory, free_memory
-    procedure :: release => free_memory
+    !> Take memory for displacements and tractions
+    procedure :: take_memory
   end type symbol_preconditioner_t
 
   !> Approximate inverse of the normal flexibility.
@@ -57,7 +60,7 @@ module hc_symbol_preconditioner
 contains
 
   !> Set up a preconditioner over a window.
-  subroutine new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential)
+  subroutine new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential, more)
     !> Preconditioner to be set up
     class(symbol_preconditioner_t), intent(out) :: self
     !> Lattice and window
@@ -74,8 +77,15 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Of the shear traction; absent: of the pressure
     logical, intent(in), optional :: tangential
+    !> Numbers of single precision that `take_memory` takes beside; absent: none
+    integer, intent(in), optional :: more
+    integer(int64) :: n
 
-    call new_inverse_symbol(self%inverse, lattice, medium, space, error, tangential, cache)
+    n = lattice%size()
+    if (present(tangential)) n = merge(2*n, n, tangential)
+    if (present(more)) n = n + more
+    call new_inverse_symbol(self%inverse, lattice, medium, space, error, tangential, cache, beside=n*(storage_size(1.0_sp)/8))
+    if (present(more)) self%n_more = more
     self%unit = self%inverse%unit
     self%extent = lattice%extent
     self%space = space
@@ -106,33 +116,31 @@ contains
     !> The nodes
     logical, intent(in) :: active(extent(1), extent(2))
 
-    call self%release()
     if (.not. allocated(self%edge)) allocate (self%edge)
     call new_edge_extension(self%edge, active, self%space, self%options, near=self%beside)
   end subroutine continue_beyond
 
-  !> Take memory for displacements, zero, and tractions.
-  subroutine take_memory(self, n)
+  !> Take memory for displacements, zero, and what else is needed beside them.
+  subroutine take_memory(self, n, more)
     class(symbol_preconditioner_t), intent(inout) :: self
     !> Number of values
     integer, intent(in) :: n
-    integer :: i
+    !> Further numbers, zero
+    real(sp), pointer, contiguous, intent(out), optional :: more(:)
+    real(sp), pointer, contiguous :: all(:)
+    integer :: n_all, i
 
-    if (allocated(self%given)) return
-    allocate (self%given(n), self%wanted(n))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      self%given(i) = 0.0_sp
+    n_all = n
+    if (present(more)) n_all = n + self%n_more
+    call c_f_pointer(self%inverse%beside(), all, [n_all])
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+    do i = 1, n_all
+      all(i) = 0.0_sp
     end do
-    !$omp end parallel do
+    !$omp end parallel do simd
+    self%values => all(:n)
+    if (present(more)) more => all(n + 1:)
   end subroutine take_memory
-
-  !> Free it.
-  subroutine free_memory(self)
-    class(symbol_preconditioner_t), intent(inout) :: self
-
-    if (allocated(self%given)) deallocate (self%given, self%wanted)
-  end subroutine free_memory
 
   !> Estimate the pressure at the nodes in contact that causes a closing of the gap.
   subroutine apply_to_pressure_packed(self, nodes, n, displacement, traction, work)
@@ -149,16 +157,17 @@ contains
     do k = 1, size(nodes%first)
       shift = nodes%place(k) - nodes%first(k)
       do i = nodes%first(k), nodes%last(k)
-        self%given(i) = real(displacement(i + shift)/self%unit, sp)
+        self%values(i) = real(displacement(i + shift)/self%unit, sp)
       end do
     end do
     !$omp end parallel do
-    call self%apply_single(self%given, self%wanted, work)
+    call self%inverse%apply_in_place(self%values, self%edge)
+    work = work + self%inverse%cost
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(nodes%first)
       shift = nodes%place(k) - nodes%first(k)
       do i = nodes%first(k), nodes%last(k)
-        traction(i + shift) = self%wanted(i)
+        traction(i + shift) = self%values(i)
       end do
     end do
     !$omp end parallel do
@@ -179,7 +188,6 @@ contains
   subroutine clear_contact(self)
     class(pressure_preconditioner_t), intent(inout) :: self
 
-    call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
   end subroutine clear_contact
 

@@ -71,7 +71,8 @@ contains
 
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
-    if (method == fft_based) bytes = fft_memory(lattice%extent, .false., space%threads) + fft_setup_memory(lattice%extent)
+    if (method == fft_based) bytes = fft_setup_memory(lattice%extent) &
+                                     + fft_memory(lattice%extent, .false., space%threads, periodic=lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call check_operator(lattice, pair, error, threads)
     if (.not. allocated(error)) then
@@ -109,7 +110,7 @@ contains
 
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
-    if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads)
+    if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) then
       if (method == fft_based) then
@@ -152,7 +153,7 @@ contains
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
-                                                              space%threads, pair%couples())
+                                                              space%threads, pair%couples(), lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, pair, gap, candidate, friction, goodman, &
                                                           error, law)

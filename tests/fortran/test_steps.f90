@@ -650,7 +650,6 @@ contains
     type(contact_state_t) :: virgin, pressed, twisted
     type(load_target_t) :: target
     real(wp) :: center(2), lower(2), upper(2), energy
-    real(wp), allocatable :: x(:, :), y(:, :)
 
     call new_sphere(contact, 12, 0.0_wp, 0.0_wp, coulomb_t(no_slip=.true.), error)
     if (allocated(error)) return
@@ -667,14 +666,12 @@ contains
     call check(error, elastic_energy(contact%problem%lattice, contact%problem%initial_gap, twisted) - energy, &
                0.5_wp*twisted%load(about_z)*0.01_wp, 1.0e-8_wp, 'energy of the twist')
     if (allocated(error)) return
-    allocate (x, y, mold=pressed%pressure)
-    call contact%problem%lattice%coordinates(x, y)
-    call zone_extent(x, y, pressed%zone == stick, center, lower, upper, field_space_t())
+    call zone_extent(contact%problem%lattice, pressed%zone == stick, center, lower, upper, field_space_t())
     call check(error, [center, lower + upper], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 1.0e-13_wp, 'a zone about the origin')
     if (allocated(error)) return
     call check(error, upper, [1.0_wp, 1.0_wp], 0.09_wp, 'as large as the contact')
     if (allocated(error)) return
-    call zone_extent(x, y, pressed%zone > 2, center, lower, upper, field_space_t())
+    call zone_extent(contact%problem%lattice, pressed%zone > 2, center, lower, upper, field_space_t())
     call check_true(error, all(ieee_is_nan([center, lower, upper])), 'no nodes')
   end subroutine test_energy
 

@@ -302,11 +302,12 @@ def memory_needed(
     contact: int | None = None,
     part: Literal["problem", "operator", "set-up of the operator"] = "problem",
     threads: int = 1,
+    periodic: bool = False,
 ) -> int:
-    """Return the memory (bytes) of a frictionless problem on a window."""
+    """Return the memory (bytes) of a frictionless problem on a window, which may repeat."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.normal_memory(*window, code, *checked(threads=threads)))
+    return int(flat.normal_memory(*window, code, *checked(threads=threads), periodic))
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:

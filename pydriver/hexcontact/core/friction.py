@@ -334,7 +334,8 @@ def memory_needed(
     coupled: bool = True,
     unlike: bool = True,
     threads: int = 1,
+    periodic: bool = False,
 ) -> int:
-    """Return the memory (bytes) of a problem with friction on a window."""
+    """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, unlike, *checked(threads=threads)))
+    return int(flat.friction_memory(*window, loads, coupled, unlike, *checked(threads=threads), periodic))

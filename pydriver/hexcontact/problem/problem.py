@@ -279,7 +279,8 @@ class Problem:
         method, shape = self.method_for(lattice), lattice.shape
         nodes = self.contact_nodes(lattice)
         if not self.frictional:
-            return contact.memory_needed(method, *shape, contact=nodes, threads=memory.threads())
+            known = {"contact": nodes, "threads": memory.threads(), "periodic": lattice.periodic}
+            return contact.memory_needed(method, *shape, **known)
         return friction.memory_needed(
             method,
             *shape,
@@ -288,6 +289,7 @@ class Problem:
             coupled=self.coupled,
             unlike=self.pair.beta != 0.0,
             threads=memory.threads(),
+            periodic=lattice.periodic,
         )
 
     def changed(self, changes: Mapping[str, Any]) -> Self:

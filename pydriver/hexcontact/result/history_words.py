@@ -96,7 +96,7 @@ def extent_of(step: Any) -> Extent | None:
     """
     if (zone := getattr(step, "zone", None)) is None or not (inside := np.asarray(zone) > 0).any():
         return None
-    along, across = (float(np.ptp(np.asarray(values)[inside])) for values in (step.x, step.y))
+    along, across = (float(np.ptp(np.asarray(getattr(step, axis))[inside])) for axis in "xy")
     return along, across
 
 

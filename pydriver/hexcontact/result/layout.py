@@ -123,15 +123,17 @@ class Layout:
             attributes["ancillary_variables"] = error
         return attributes
 
-    def coordinates(self) -> dict[str, NDArray[Any]]:
-        """Return the values of the coordinates."""
+    def axes(self) -> dict[str, NDArray[Any]]:
+        """Return the values of the coordinates along the dimensions."""
         return {
             "step": np.array([step.number for step in self.steps], dtype="i4"),
             "row": np.asarray(self.window.rows, dtype="i4"),
             "col": np.asarray(self.window.cols, dtype="i4"),
-            "x": np.asarray(self.window.x),
-            "y": np.asarray(self.window.y),
         }
+
+    def coordinates(self) -> dict[str, NDArray[Any]]:
+        """Return the values of the coordinates."""
+        return self.axes() | {"x": np.asarray(self.window.x), "y": np.asarray(self.window.y)}
 
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Return the global attributes; `complete`: the result has all planned steps."""

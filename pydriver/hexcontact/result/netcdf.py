@@ -8,6 +8,7 @@ chunks. A program that rewrites the file with HDF5 removes the seal.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import math
 import os
@@ -302,8 +303,8 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
     """Write the mesh of a window to an open file, unless it has one row or column only."""
     if min(lattice.shape) < 2:
         return
-    faces = triangles(lattice.n_row, lattice.n_col)
-    for name, size in ((NODE, lattice.size), (FACE, len(faces)), (CORNER, 3)):
+    count = 2 * (lattice.n_row - 1) * (lattice.n_col - 1)
+    for name, size in ((NODE, lattice.size), (FACE, count), (CORNER, 3)):
         file.createDimension(name, size)
     about: dict[str, Any] = {
         "cf_role": "mesh_topology",
@@ -315,18 +316,35 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
     }
     add_column(file, TOPOLOGY, "i4", (), about, np.int32(0))
     packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
-    for axis, values in (("x", lattice.x.ravel()), ("y", lattice.y.ravel())):
+    columns = []
+    for axis in "xy":
         standard = {"standard_name": f"projection_{axis}_coordinate"}
         about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
         chunks = [min(_TRIANGLES, lattice.size)]
-        add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, values, chunksizes=chunks, **packed)
+        columns.append(add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed))
     about = {
         "cf_role": "face_node_connectivity",
         "long_name": "nodes at the corners of each triangle, counterclockwise",
         "start_index": np.int32(0),
     }
-    chunks = [min(_TRIANGLES, len(faces)), 3]
-    add_column(file, FACE_NODES, "i4", (FACE, CORNER), about, faces, chunksizes=chunks, **packed)
+    chunks = [min(_TRIANGLES, count), 3]
+    columns.append(add_column(file, FACE_NODES, "i4", (FACE, CORNER), about, chunksizes=chunks, **packed))
+    for column in columns:  # the chunk that a band ends in, and the next
+        column.set_var_chunk_cache(size=2 * _TRIANGLES * 12)
+    x, y, corners = columns
+    for first, band in _bands(lattice, max(1, _TRIANGLES // lattice.n_col)):
+        node, face = first * lattice.n_col, 2 * first * (lattice.n_col - 1)
+        x[node : node + band.size], y[node : node + band.size] = band.x.ravel(), band.y.ravel()
+        faces = triangles(min(band.n_row + 1, lattice.n_row - first), lattice.n_col)
+        if len(faces):
+            corners[face : face + len(faces)] = node + faces
+
+
+def _bands(lattice: Lattice, rows: int) -> Iterator[tuple[int, Lattice]]:
+    """Yield the first row and the lattice of bands of so many rows, whose arrays are small."""
+    for first in range(0, lattice.n_row, rows):
+        n_row = min(rows, lattice.n_row - first)
+        yield first, dataclasses.replace(lattice, row_first=lattice.row_first + first, n_row=n_row)
 
 
 def add_column(
@@ -370,7 +388,9 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 _text(file, name, values, layout)
                 if VARIABLES[name].dtype == "str"
                 else (_column(file, name, layout), values)
-                for name, values in (layout.coordinates() | layout.histories() | layout.trials).items()
+                for name, values in (
+                    layout.axes() | dict.fromkeys("xy") | layout.histories() | layout.trials
+                ).items()
             ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
             file.setncatts(layout.attributes(complete))
@@ -379,7 +399,11 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
             for column, values in given:
-                column[...] = values
+                if values is not None:
+                    column[...] = values
+            for first, band in _bands(layout.window, _CHUNK):
+                for name in "xy":
+                    file[name][first : first + band.n_row] = getattr(band, name)
             write_mesh(file, layout.window)
         layout.fill(columns, steps, LOCK)
 

@@ -19,7 +19,6 @@ _ITEM = 8  # bytes of a float
 _WRITING = 24 * 2**20  # bytes of netCDF and HDF5, which an interim output loads beside the solver
 _LOADED = 5 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
-_HOLES = 32 * 2**20  # bytes at most of freed arrays in the heap, by FFTs without friction: larger go back
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
 
 
@@ -28,9 +27,8 @@ def fields_held(case: Problem) -> int:
     friction = case.frictional
     entry = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
     table = [
-        # initial gap, pressure, gap and zones, beside them those that the measures take in place of the
-        # iteration's; with friction the state before, which the core holds, and holes in the heap
-        (True, 14 if friction else 3),
+        # initial gap; with friction the state before, which the core holds, and holes in the heap
+        (True, 14 if friction else 1),
         (entry, 45),  # places of nodes when their gap closed
         (case.adaptive, 40),  # the path in whole steps, and edges
         (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts
@@ -95,18 +93,23 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     """
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
     operator, set_up = (
-        contact.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        contact.memory_needed(
+            "fft", *lattice.shape, part=part, threads=memory.threads(), periodic=lattice.periodic
+        )
         for part in ("operator", "set-up of the operator")
     )
-    needed = case.memory_needed(lattice) + fields_held(case) * _ITEM * lattice.size + kept
+    fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
+    needed = case.memory_needed(lattice) + kept
+    if case.frictional or method == "direct":
+        needed += fields + _WRITING
+    else:  # the output takes the place of transforms and iterations
+        needed += max(fields, _WRITING)
     if case.deck.wear:
         needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    if not case.frictional and case.method_for(lattice) == "fft":
-        needed += min(needed // 2, _HOLES)
-    return _LOADED + _WRITING + needed
+    return _LOADED + needed
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:

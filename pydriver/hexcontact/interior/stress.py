@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, integer
 from ..core import kernel_cache, memory
-from ..core.contact import ElasticPair
+from ..core.contact import pair_of
 from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
@@ -167,6 +167,10 @@ def material(bodies: Bodies, body: int) -> tuple[float, float]:
     if not bodies:
         raise NotInResult("the result does not say what the bodies are made of")
     one = bodies[body - 1]
+    if one.coating:
+        raise NotInResult(
+            f"body {body} has a coating: stresses are computed in half-spaces without layers only, as yet"
+        )
     if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
         raise NotInResult(f"body {body} is rigid: there is no stress to compute in it")
     return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
@@ -213,8 +217,7 @@ def tractions(
             f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
         )
     law = _law_of(friction)
-    constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
-    pair = ElasticPair.from_materials(*constants[0], *constants[1])
+    pair = pair_of(*bodies)
     corrected = [
         _edges(lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
         for one, step in zip(at_nodes, steps, strict=True)

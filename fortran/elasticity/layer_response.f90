@@ -4,11 +4,11 @@
 !>
 !>     u_z = C_zz p + i D q_L        u_L = -i D p + C_LL q_L        u_T = C_TT q_T
 !>
-!> with real C and D. One layer has closed forms (S.J. O'Sullivan, R.B. King, ASME J. Tribology 110, 1988, for C_zz). Several layers
+!> with real C and D. One layer has closed forms (T.C. O'Sullivan, R.B. King, J. Tribology 110, 1988, for C_zz). Several layers
 !> are added one by one from the bottom: a 2 x 2 compliance of what lies below becomes that of what lies below the next surface,
 !> with exponentials that only decay.
 !>
-!> Equations: docs/theory/coatings.md, (H1) to (H4).
+!> Equations: docs/theory/coatings.md, (K1) to (K4).
 module hc_layer_response
   use hc_precision, only: wp, pi
   implicit none
@@ -78,7 +78,7 @@ contains
     end associate
   end function half_space
 
-  !> Compute k times C_zz, C_LL, C_TT and -D of one layer on a half-space [1/Pa], (H2).
+  !> Compute k times C_zz, C_LL, C_TT and -D of one layer on a half-space [1/Pa], (K2).
   pure function one_layer(layer, base, x) result(f)
     type(layer_t), intent(in) :: layer, base
     !> Wave number times thickness
@@ -121,7 +121,7 @@ contains
     if (x < -30.0_wp) expm1 = -1.0_wp
   end function expm1
 
-  !> Replace the compliance of what lies below a layer by that of what lies below its surface, (H3) and (H4).
+  !> Replace the compliance of what lies below a layer by that of what lies below its surface, (K3) and (K4).
   pure subroutine add_layer(layer, x, c, s)
     type(layer_t), intent(in) :: layer
     !> Wave number times thickness

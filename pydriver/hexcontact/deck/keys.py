@@ -93,14 +93,6 @@ class Body(Table):
             return 0.0
         return (1.0 - of.poisson_ratio**2) / of.young_modulus
 
-    @field_validator("coating")
-    @classmethod
-    def _compressible(cls, coating: list[Coating]) -> list[Coating]:
-        """Refuse incompressible layers among several."""
-        if len(coating) > 1 and any(layer.poisson_ratio >= 0.5 for layer in coating):
-            refuse("of several coatings each needs a poisson_ratio below 0.5")
-        return coating
-
     @field_validator("surface")
     @classmethod
     def _curved(cls, surface: Surface | None) -> Surface | None:

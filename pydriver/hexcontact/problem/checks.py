@@ -121,8 +121,13 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
     bodies = tables["body"].body_1, tables["body"].body_2
     if not any(body.coating for body in bodies):
         return
+    for number, body in enumerate(bodies, 1):
+        for place, layer in enumerate(body.coating if len(body.coating) > 1 else ()):
+            if layer.poisson_ratio >= 0.5:
+                key = "body", str(number), "coating", place, "poisson_ratio"
+                yield key, "expected a number below 0.5 in one of several coatings"
     if tables.get("wear"):
-        yield ("wear",), "expected nothing beside a coating: wear would make the layer thinner, which is not followed"
+        yield ("wear",), "expected nothing beside a coating: wear makes a layer thinner, which is not followed"
     for kind in ("stress", "fatigue"):
         for place, table in enumerate(tables.get(kind) or ()):
             if bodies[table.body - 1].coating:
@@ -147,7 +152,7 @@ def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
     for key, sentence in found:
         value: Any = tables
         for part in key:
-            value = value[part] if isinstance(part, int) else dict(value or {}).get(part)
+            value = value and value[part] if isinstance(part, int) else dict(value or {}).get(part)
         plain = isinstance(value, str | bool | int | float | tuple)
         yield Mistake(key, value if plain else MISSING, sentence)
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from commands import inside
+
 from hexcontact import Case, DeckError, analytic, open_result
 
 A, RADIUS, E, NU = 0.01, 1.0, 1e9, 0.3
@@ -25,8 +25,13 @@ def layer(thickness: float, young_modulus: float = E, poisson_ratio: float = NU)
 
 def pressed(base: dict, coating: list, load: float, spacing: float = A / 40, **tables) -> Case:
     """A rigid sphere on a body with coatings."""
-    bodies = {"1": {**base, "coating": coating}, "2": {"rigid": True, "surface": {"shape": "sphere", "radius": RADIUS}}}
-    return Case.from_dict({"body": bodies, "grid": {"spacing": spacing}, "load": [{"normal_load": load}]} | tables)
+    bodies = {
+        "1": {**base, "coating": coating},
+        "2": {"rigid": True, "surface": {"shape": "sphere", "radius": RADIUS}},
+    }
+    return Case.from_dict(
+        {"body": bodies, "grid": {"spacing": spacing}, "load": [{"normal_load": load}]} | tables
+    )
 
 
 @pytest.mark.parametrize(("ratio", "t", "load", "approach", "pressure"), SPHERES)
@@ -45,7 +50,9 @@ def test_many_layers_are_one() -> None:
     """Three layers of one material, on a body of another."""
     base = {"young_modulus": E / 2, "poisson_ratio": 0.2}
     parts = [layer(0.2 * A), layer(0.3 * A), layer(0.5 * A)]
-    one, three = (pressed(base, coating, LOAD, A / 10).run().dataset.isel(step=-1) for coating in ([layer(A)], parts))
+    one, three = (
+        pressed(base, coating, LOAD, A / 10).run().dataset.isel(step=-1) for coating in ([layer(A)], parts)
+    )
     for name in ("approach", "max_pressure"):
         assert float(three[name]) == pytest.approx(float(one[name]), rel=1e-6)
 
@@ -63,7 +70,7 @@ def test_thin_and_thick_layers() -> None:
 
 @pytest.mark.parametrize(("t", "excess"), [(0.1, 1.050), (0.03, 1.0147)])
 def test_thin_layer_on_a_rigid_base(t: float, excess: float) -> None:
-    """Springs of the stiffness of compression without expansion; the excess is that of the Fredholm equation."""
+    """Springs of compression without expansion; the excess is that of the Fredholm equation."""
     shear = E / (2 * (1 + NU))
     springs = 2 * shear * (1 - NU) / (1 - 2 * NU) / (t * A)
     case = pressed({"rigid": True}, [layer(t * A)], excess * math.pi * springs * A**4 / (4 * RADIUS))
@@ -205,7 +212,8 @@ def test_check_prints_the_coating(tmp_path: Path) -> None:
     deck.write_text(
         '[body.1]\nyoung_modulus = "210 GPa"\npoisson_ratio = 0.3\n\n[[body.1.coating]]\nthickness = "3 um"\n'
         'young_modulus = "400 GPa"\npoisson_ratio = 0.2\n\n[body.2]\nrigid = true\n'
-        'surface = { shape = "sphere", radius = "10 mm" }\n\n[grid]\nspacing = "4 um"\n\n[[load]]\nnormal_load = "20 N"\n'
+        'surface = { shape = "sphere", radius = "10 mm" }\n\n[grid]\nspacing = "4 um"\n'
+        '\n[[load]]\nnormal_load = "20 N"\n'
     )
     printed = inside(tmp_path, "check", "deck.toml")
     assert "coating 3.000 µm, E = 400.0 GPa, nu = 0.2" in printed.stdout
@@ -216,13 +224,29 @@ def test_check_prints_the_coating(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"body.1.coating": [layer(-1e-6)]}, r"body.1.coating.1.thickness = -1e-06: expected a length above 0"),
+        (
+            {"body.1.coating": [layer(-1e-6)]},
+            r"body.1.coating.1.thickness = -1e-06: expected a length above 0",
+        ),
         ({"body.1.coating": [{"thickness": 1e-6}]}, r"body.1.coating.1.young_modulus: missing"),
-        ({"body.1.coating": [layer(1e-6), layer(1e-6, E, 0.5)]}, r"body.1.coating.2.poisson_ratio: expected a num"),
+        (
+            {"body.1.coating": [layer(1e-6), layer(1e-6, E, 0.5)]},
+            r"body.1.coating.2.poisson_ratio: expected a num",
+        ),
         ({"body.1.coating": [layer(1e-6, 1e17)]}, r"body.1.coating: .* ratios of moduli nearer to 1"),
-        ({"wear": {"coefficient_1": "1e-15 m^2/N", "cycle": "c", "cycles": 10}}, r"wear: expected nothing beside a coat"),
+        (
+            {"wear": {"coefficient_1": "1e-15 m^2/N", "cycle": "c", "cycles": 10}},
+            r"wear: expected nothing beside a coat",
+        ),
         ({"stress": [{"depths": [1e-5]}]}, r"stress.1.body = 1: body 1 has a coating"),
-        ({"fatigue": [{"depths": [0.0], "parameters": ["crossland"], "crossland_slope": 0.3, "steps": [1]}]}, r"fatigue.1.body = 1: body 1 has a coating"),
+        (
+            {
+                "fatigue": [
+                    {"depths": [0.0], "parameters": ["crossland"], "crossland_slope": 0.3, "steps": [1]}
+                ]
+            },
+            r"fatigue.1.body = 1: body 1 has a coating",
+        ),
     ],
 )
 def test_refused_decks(changes: dict, sentence: str) -> None:

@@ -125,7 +125,7 @@ _ALL = (
     Check(
         "coatings",
         "Sphere on a layer",
-        "Radius, approach and pressure at the center for layers softer and harder than the body below, and on a rigid base.",
+        "Radius, approach and pressure at the center, for layers on softer, harder and rigid bodies.",
         _of("coatings", "sphere"),
     ),
     Check(

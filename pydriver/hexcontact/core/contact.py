@@ -229,16 +229,24 @@ class CoatedPair(ElasticPair):
         return np.array(self.constants)
 
 
-def pair_of(*bodies: Any) -> ElasticPair:
+def pair_of(one: Any, two: Any) -> ElasticPair:
     """Return the constants of body 1 and body 2, with their materials and coatings; None: rigid."""
-    materials = [(one and one.young_modulus, one and one.poisson_ratio) for one in bodies]
+    below = (
+        one and one.young_modulus,
+        one and one.poisson_ratio,
+        two and two.young_modulus,
+        two and two.poisson_ratio,
+    )
+    if not ((one and one.coating) or (two and two.coating)):
+        return ElasticPair.from_materials(*below)
     coatings = [
-        [(layer.thickness, layer.young_modulus, layer.poisson_ratio) for layer in (one.coating if one else ())]
-        for one in bodies
+        [
+            (layer.thickness, layer.young_modulus, layer.poisson_ratio)
+            for layer in (body.coating if body else ())
+        ]
+        for body in (one, two)
     ]
-    if any(coatings):
-        return CoatedPair.of_layers(materials, coatings)
-    return ElasticPair.from_materials(*materials[0], *materials[1])
+    return CoatedPair.of_layers([below[:2], below[2:]], coatings)
 
 
 class FlexibilityOperator(Handle):

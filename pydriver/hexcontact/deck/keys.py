@@ -83,7 +83,11 @@ class Body(Table):
     surface: Annotated[Surface, SurfaceKind()] | None = meaning(
         None, "the shape of its surface; flat if absent"
     )
-    coating: list[Coating] = Field(default_factory=list)
+    coating: list[Coating] = Field(
+        default_factory=list,
+        description="layers, outermost first",
+        examples=['[{ thickness = "3 um", young_modulus = "450 GPa", poisson_ratio = 0.25 }]'],
+    )
 
     @property
     def compliance(self) -> float:
@@ -130,7 +134,9 @@ class Bodies(Table):
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Require at least one elastic body, or a coating."""
         bodies = [data.get(key) for key in ("1", "2")]
-        if all(isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies):
+        if all(
+            isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies
+        ):
             yield "2", "expected one elastic body or one coating at least; both are rigid"
 
 

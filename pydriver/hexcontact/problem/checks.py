@@ -119,7 +119,7 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
 def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) -> Found:
     """Yield tables that take bodies as half-spaces, and coatings that a periodic window refuses."""
     bodies = tables["body"].body_1, tables["body"].body_2
-    if not any(body.coating for body in bodies):
+    if not (bodies[0].coating or bodies[1].coating):
         return
     for number, body in enumerate(bodies, 1):
         for place, layer in enumerate(body.coating if len(body.coating) > 1 else ()):
@@ -127,7 +127,10 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
                 key = "body", str(number), "coating", place, "poisson_ratio"
                 yield key, "expected a number below 0.5 in one of several coatings"
     if tables.get("wear"):
-        yield ("wear",), "expected nothing beside a coating: wear makes a layer thinner, which is not followed"
+        yield (
+            ("wear",),
+            "expected nothing beside a coating: wear makes a layer thinner, which is not followed",
+        )
     for kind in ("stress", "fatigue"):
         for place, table in enumerate(tables.get(kind) or ()):
             if bodies[table.body - 1].coating:
@@ -143,7 +146,7 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
     if all(body.rigid for body in bodies) and tables["grid"].periodic:
         for place, load in enumerate(tables.get("load") or ()):
             if any(part.mean_gap is not None for part in (load, *(load.path or ()))):
-                sentence = "expected mean_pressure or approach: on rigid bases the mean pressure moves the mean planes"
+                sentence = "expected mean_pressure or approach: on rigid bases a mean pressure moves planes"
                 yield ("load", place, "mean_gap"), sentence
 
 

@@ -122,9 +122,9 @@ LIMITS = (
     ),
     Limit(
         "layer_spacings",
-        "the thinnest coating has {layer_spacings:.2g} spacings, expected at least 2: nodes do not resolve what "
-        "varies over its thickness",
-        "Kernels are exact for any thickness; tractions that are linear between nodes have no waves shorter than "
+        "the thinnest coating has {layer_spacings:.2g} spacings, expected at least 2: the lattice does not "
+        "resolve tractions that vary over its thickness",
+        "Kernels hold for any thickness; tractions that are linear between nodes have no waves shorter than "
         "two spacings",
         least=2.0,
     ),
@@ -169,11 +169,14 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(mu, TwoCoefficients):
         mu = max(mu.along, mu.across)
-    solids = [solid for body in (case.body_1, case.body_2) for solid in (body, *body.coating)]
-    if moduli := [solid.young_modulus for solid in solids if solid.young_modulus]:
-        found["young_modulus"] = min(moduli)
-    if layers := [layer.thickness for body in (case.body_1, case.body_2) for layer in body.coating]:
-        found["layer_spacings"] = min(layers) / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
+    bodies = case.body_1, case.body_2
+    layers = [layer for body in bodies for layer in body.coating]
+    moduli = [*(body.young_modulus for body in bodies), *(layer.young_modulus for layer in layers)]
+    if known_moduli := [modulus for modulus in moduli if modulus]:
+        found["young_modulus"] = min(known_moduli)
+    if layers:
+        thinnest = min(layer.thickness for layer in layers)
+        found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)

@@ -148,9 +148,13 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     lattice, pair, bulk, solver = case.lattice, case.pair, case.deck.bulk, case.solver
     # without the coordinates, for which the window may be too large
     width, height = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)
-    constants = f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
+    constants = (
+        f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
+    )
     if isinstance(pair, CoatedPair):
-        constants = f"coated, coupling up to {pair.beta:.4g}; {pair.images} images, error {pair.fit_error:.1g}"
+        constants = (
+            f"coated, coupling up to {pair.beta:.4g}; {pair.images} images, error {pair.fit_error:.1g}"
+        )
     size = f"{quantity(width, 'm')} x {quantity(height, 'm')}"
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
     accuracy = case.accuracy and (

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..core import contact, friction, memory
-from ..core.contact import CoatedPair, ElasticPair, Method, pair_of
+from ..core.contact import ElasticPair, Method, pair_of
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import bulk_strain

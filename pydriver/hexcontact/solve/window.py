@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..core.contact import FlexibilityOperator, pair_of, NormalContact, NormalSolution
+from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact
 from ..core.lattice import Lattice
 from ..core.measures import measures

@@ -19,6 +19,9 @@ module hc_layer_response
   !> Responses: k/(2 pi) times C_zz, C_LL, C_TT and -D [1/Pa]. On a half-space they do not depend on k.
   integer, parameter :: n_response = 4, of_normal = 1, of_along = 2, of_across = 3, of_coupling = 4
 
+  !> Wave number times thickness from which nothing below the layer is seen, in any digit.
+  real(wp), parameter :: shortest = 100.0_wp
+
   !> A layer.
   type :: layer_t
     !> Thickness [m]
@@ -42,7 +45,7 @@ module hc_layer_response
 
 contains
 
-  !> Compute the responses at a wave number; infinite k is that of the outermost material.
+  !> Compute the responses at a wave number.
   pure function response(self, k) result(f)
     class(layered_body_t), intent(in) :: self
     !> Wave number [1/m]
@@ -54,13 +57,13 @@ contains
     if (size(self%layer) == 0) then
       f = half_space(self%base)
     else if (size(self%layer) == 1) then
-      f = one_layer(self%layer(1), self%base, k*self%layer(1)%thickness)
+      f = one_layer(self%layer(1), self%base, min(k*self%layer(1)%thickness, shortest))
     else
       f = half_space(self%base)
       c = reshape([f(of_along), f(of_coupling), f(of_coupling), f(of_normal)], [2, 2])
       s = f(of_across)
       do i = size(self%layer), 1, -1
-        call add_layer(self%layer(i), k*self%layer(i)%thickness, c, s)
+        call add_layer(self%layer(i), min(k*self%layer(i)%thickness, shortest), c, s)
       end do
       f = [c(2, 2), c(1, 1), s, 0.5_wp*(c(1, 2) + c(2, 1))]
     end if
@@ -117,8 +120,8 @@ contains
   elemental real(wp) function expm1(x)
     real(wp), intent(in) :: x
 
-    expm1 = 2.0_wp*exp(0.5_wp*x)*sinh(0.5_wp*x)
-    if (x < -30.0_wp) expm1 = -1.0_wp
+    expm1 = exp(x) - 1.0_wp
+    if (x > -1.0_wp) expm1 = 2.0_wp*exp(0.5_wp*x)*sinh(0.5_wp*x)
   end function expm1
 
   !> Replace the compliance of what lies below a layer by that of what lies below its surface, (K3) and (K4).

@@ -138,7 +138,7 @@ def _below(view: StepView, points: Array, *names: str) -> xarray.Dataset:
     wanted = LOADED if is_compliant(view.data.attrs) else (*LOADED, *EDGES)
     fields = {name: view.data[name].values for name in wanted if view.has(name)}
     bodies = bodies_of(str(view.data.attrs.get("deck", "")))
-    body = 2 if bodies and bodies[0].rigid else 1
+    body = 2 if bodies and (bodies[0].rigid or bodies[0].coating) else 1
     given = view.lattice, [fields], bodies, body, view.friction
     of = Loaded(*given, surface=lambda _: nodal(view.data, view.lattice).traction_field("edges"))
     return below(of, {"points": points}, names)

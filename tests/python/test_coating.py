@@ -263,5 +263,5 @@ def test_refused_windows_that_repeat() -> None:
 
 
 def test_two_rigid_bodies_need_a_coating() -> None:
-    with pytest.raises(DeckError, match="expected one elastic body or one coating"):
+    with pytest.raises(DeckError, match="both are rigid, without a coating"):
         pressed({"rigid": True}, [], LOAD)

@@ -137,7 +137,7 @@ class Bodies(Table):
         if all(
             isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies
         ):
-            yield "2", "expected one elastic body or one coating at least; both are rigid"
+            yield "2", "expected one elastic body at least; both are rigid, without a coating"
 
 
 BULK_STATES = ("plane stress", "plane strain x", "plane strain y")

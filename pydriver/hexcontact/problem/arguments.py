@@ -82,6 +82,7 @@ class Body(Argument, deck_keys.Body):
         poisson_ratio: float | None = None,
         rigid: bool = False,
         surface: Surface | None = None,
+        *,
         coating: Sequence[Mapping[str, Any] | deck_keys.Coating] = (),
     ) -> None:
         keys = {name: value for name, value in locals().items() if name in deck_keys.Body.model_fields}

@@ -119,6 +119,19 @@ def test_energy_of_a_fretting_loop(young_modulus: float) -> None:
     assert (spent > float(np.diff(plain["dissipated_energy"].values[[16, -1]])[0])) == (young_modulus < 210e9)
 
 
+def test_a_coating_costs_no_more_iterations() -> None:
+    """The counted work is that of uncoated bodies, unlike or alike."""
+
+    def work(case: Case) -> float:
+        return float(case.run().dataset["operator_applications"].sum())
+
+    plain, coated = fretting([]), fretting([HARD])
+    assert work(coated) < 1.3 * work(plain.changed({"body.1.young_modulus": 420e9}))
+    both = coated.changed({"body.2.coating": [HARD]})
+    assert not both.coupled
+    assert work(both) < 1.3 * work(plain)
+
+
 def test_both_methods_and_displacements() -> None:
     """Matrices and transforms agree, and the bodies' displacements close the gap."""
     output = {"fields": ["pressure", "gap", "zone", "displacement_1_z", "displacement_2_z"]}

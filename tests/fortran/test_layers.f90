@@ -33,6 +33,7 @@ contains
       new_test('split_layer', test_split), &
       new_test('limits', test_limits), &
       new_test('images', test_images), &
+      new_test('far_field', test_far), &
       new_test('fits', test_fits), &
       new_test('symbols', test_symbols), &
       new_test('mean_on_rigid_bases', test_mean), &
@@ -182,6 +183,25 @@ contains
     close (unit)
     if (.not. allocated(error)) call check_true(error, n_row == 12, 'all rows were read')
   end subroutine test_images
+
+  !> Far away the layer is not there.
+  subroutine test_far(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(material_t), parameter :: base = material_t(1.0_wp, 0.3_wp), other = material_t(5.0_wp, 0.1_wp)
+    type(layered_pair_t) :: coated
+    type(elastic_pair_t) :: plain
+    class(influence_t), allocatable :: images, below
+    real(wp), dimension(n_block, 1) :: found, expected
+
+    call new_layered_pair(coated, [base, other], [coating_t(1.0_wp, material_t(4.0_wp, 0.2_wp))], [coating_t :: ], error)
+    if (.not. allocated(error)) call new_elastic_pair(plain, base, other, error)
+    if (allocated(error)) return
+    call coated%new_influence(equilateral_basis(1.0_wp), images)
+    call plain%new_influence(equilateral_basis(1.0_wp), below)
+    call images%blocks([8.0e10_wp], [6.0e10_wp], found)
+    call below%blocks([8.0e10_wp], [6.0e10_wp], expected)
+    call check(error, found(:, 1)/expected(1, 1), expected(:, 1)/expected(1, 1), 1.0e-10_wp, 'blocks')
+  end subroutine test_far
 
   !> The kernels of layers are images to 1e-6, for moduli apart by a factor of a hundred.
   subroutine test_fits(error)

@@ -27,6 +27,7 @@ DOCS = Path(__file__).parent
 TABLES: dict[str, type[Table]] = {  # by their headings in keys.md
     "Top level": deck_keys.Deck,
     "[body.1] and [body.2]": deck_keys.Body,
+    "[[body.1.coating]] and [[body.2.coating]]": deck_keys.Coating,
     "[interface]": deck_keys.Interface,
     "[friction]": deck_keys.Friction,
     "[bulk]": deck_keys.Bulk,

@@ -23,6 +23,7 @@ module hexcontact
   use hc_stress_invariants, only: stress_invariants, von_mises, principal_stresses
   use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
+  use hc_layered_pair, only: coating_t, layered_pair_t, new_layered_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_spectrum_cache, only: kernel_cache_t

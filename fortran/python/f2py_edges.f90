@@ -8,7 +8,7 @@ module hc_f2py_edges
   use hc_memory, only: require_memory
   use hc_f2py_handles, only: kernel_cache
   use hc_field_space, only: field_space_t, space_over
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_lattice, only: lattice_t
   use hc_friction_law, only: friction_law_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
@@ -116,9 +116,9 @@ contains
   end subroutine field_of
 
   !> Correct tractions at the edges of the contact and of the stick area.
-  subroutine correct_tractions(lattice, pair, fields, zones, friction, traction, corrected, error)
+  subroutine correct_tractions(lattice, bodies, fields, zones, friction, traction, corrected, error)
     type(lattice_t), intent(in) :: lattice
-    type(elastic_pair_t), intent(in) :: pair
+    class(elastic_medium_t), intent(in) :: bodies
     real(wp), intent(in) :: fields(:, :, :)
     logical, intent(in) :: zones(:, :, :)
     class(friction_law_t), intent(in) :: friction
@@ -131,10 +131,10 @@ contains
     corrected = traction
     space = space_over(lattice%extent)
     call require_memory(edge_tractions_memory(lattice%extent, count(zones(:, :, 1)), &
-                                              friction%resists() .and. friction%is_bounded(), space%threads, pair%couples()), &
+                                              friction%resists() .and. friction%is_bounded(), space%threads, bodies%couples()), &
                         error, space%threads)
     if (allocated(error)) return
-    call correct_at_edges(lattice, edges_of(lattice, fields, zones), pair, zones(:, :, 1), zones(:, :, 3), friction, corrected, &
+    call correct_at_edges(lattice, edges_of(lattice, fields, zones), bodies, zones(:, :, 1), zones(:, :, 3), friction, corrected, &
                           space, error, kernel_cache)
   end subroutine correct_tractions
 

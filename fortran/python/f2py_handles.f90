@@ -12,7 +12,9 @@ module hc_f2py_handles
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_flexibility, only: flexibility_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
+  use hc_elastic_pair, only: elastic_pair_t, material_t
+  use hc_layered_pair, only: coating_t, layered_pair_t, new_layered_pair
   use hc_friction_law, only: friction_law_t
   use hc_coulomb, only: coulomb_t
   use hc_nodal_coulomb, only: nodal_coulomb_t
@@ -27,7 +29,7 @@ module hc_f2py_handles
   private
 
   public :: slot_t, take_slot, enter, leave, free_object, hold, hold_wear, find_state, find_wear, kernel_cache, own_cache, report
-  public :: with_springs, friction_of, normal_law_of
+  public :: bodies_of, find_coated, coated_t, add_springs, friction_of, normal_law_of
 
   !> Object of a handle: one of these.
   type :: slot_t
@@ -44,6 +46,15 @@ module hc_f2py_handles
     type(contact_state_t), pointer :: state => null()
     type(wear_path_t), pointer :: wear => null()
   end type slot_t
+
+  !> Bodies with coatings.
+  type :: coated_t
+    !> Compliances of their surfaces [1/Pa]
+    real(c_double) :: lambda_1 = 0.0_c_double, lambda_2 = 0.0_c_double, lambda_5 = 0.0_c_double
+    !> Largest coupling of normal and tangential displacements, error and number of the images of the kernels
+    real(c_double) :: coupling = 0.0_c_double, fit_error = 0.0_c_double
+    integer :: images = 0
+  end type coated_t
 
   !> Entry of the table.
   type :: entry_t
@@ -295,18 +306,66 @@ contains
     if (.not. associated(path)) call raise(error, status%bad_handle, 'the handle is stale: its path has been freed')
   end subroutine find_wear
 
-  !> Return elastic constants with the tangential springs of an interface.
-  pure type(elastic_pair_t) function with_springs(pair, interface)
-    !> Elastic constants without springs
-    type(elastic_pair_t), intent(in) :: pair
+  !> Make two bodies from their numbers: three compliances; or Young's modulus, Poisson's ratio and 1 if it is rigid of each, the
+  !> numbers of their coatings, and thickness, Young's modulus and Poisson's ratio of each of these, outermost first.
+  subroutine bodies_of(constants, bodies, error)
+    real(c_double), intent(in) :: constants(:)
+    class(elastic_medium_t), allocatable, intent(out) :: bodies
+    !> Allocated on failure: constants of no body
+    type(error_t), allocatable, intent(out) :: error
+    type(layered_pair_t), allocatable :: layered
+
+    if (size(constants) == 3) then
+      allocate (bodies, source=elastic_pair_t(constants(1), constants(2), constants(3)))
+    else
+      allocate (layered)
+      call make_layered(constants, layered, error)
+      call move_alloc(layered, bodies)
+    end if
+  end subroutine bodies_of
+
+  !> Make bodies with coatings from their numbers.
+  subroutine make_layered(constants, pair, error)
+    real(c_double), intent(in) :: constants(:)
+    type(layered_pair_t), intent(out) :: pair
+    type(error_t), allocatable, intent(out) :: error
+    type(coating_t) :: coating((size(constants) - 8)/3)
+    integer :: i, first
+
+    first = nint(constants(7))
+    do i = 1, size(coating)
+      associate (of => constants(3*i + 6:3*i + 8))
+        coating(i) = coating_t(of(1), material_t(of(2), of(3)))
+      end associate
+    end do
+    call new_layered_pair(pair, [(material_t(constants(3*i - 2), constants(3*i - 1), constants(3*i) > 0.5_c_double), i=1, 2)], &
+                          coating(:first), coating(first + 1:), error)
+  end subroutine make_layered
+
+  !> Find the constants of bodies with coatings.
+  subroutine find_coated(constants, found, error)
+    real(c_double), intent(in) :: constants(:)
+    type(coated_t), intent(out) :: found
+    !> Allocated on failure: constants of no body, layers that images do not describe
+    type(error_t), allocatable, intent(out) :: error
+    type(layered_pair_t) :: pair
+
+    call make_layered(constants, pair, error)
+    if (allocated(error)) return
+    found = coated_t(pair%lambda_1, pair%lambda_2, pair%lambda_5, pair%coupling(), pair%fit_error, pair%n_image())
+  end subroutine find_coated
+
+  !> Add the tangential springs of an interface to two bodies.
+  subroutine add_springs(bodies, interface)
+    class(elastic_medium_t), intent(inout) :: bodies
     !> Coefficient [Pa/m^m] and exponent m of the normal compliance, tangential stiffness [Pa/m]; 0: no springs
     real(c_double), intent(in) :: interface(3)
 
-    with_springs = pair
-    if (abs(interface(3)) > 0.0_c_double .or. .not. ieee_is_finite(interface(3))) then
-      with_springs%tangential_layer = 1/interface(3)
-    end if
-  end function with_springs
+    select type (bodies)
+    class is (elastic_pair_t)
+      if (abs(interface(3)) > 0.0_c_double .or. .not. ieee_is_finite(interface(3))) bodies%tangential_layer = 1/interface(3)
+    end select
+  end subroutine add_springs
 
   !> Make a law of friction from its numbers.
   subroutine friction_of(coefficient, law, n_node, friction)

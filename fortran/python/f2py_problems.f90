@@ -7,7 +7,7 @@ module hc_f2py_problems
   use hc_f2py_handles, only: slot_t, take_slot, free_object, hold, kernel_cache
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over, most_threads
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: check_operator
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
@@ -56,10 +56,10 @@ contains
   end subroutine take_window
 
   !> Create a flexibility operator over a window.
-  subroutine new_operator(method, lattice, pair, threads, handle, error)
+  subroutine new_operator(method, lattice, bodies, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
-    type(elastic_pair_t), intent(in) :: pair
+    class(elastic_medium_t), intent(in) :: bodies
     !> Handle of the operator
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
@@ -74,26 +74,26 @@ contains
     if (method == fft_based) bytes = fft_setup_memory(lattice%extent) &
                                      + fft_memory(lattice%extent, .false., space%threads, periodic=lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
-    if (.not. allocated(error)) call check_operator(lattice, pair, error, threads)
+    if (.not. allocated(error)) call check_operator(lattice, bodies, error, threads)
     if (.not. allocated(error)) then
       if (method == fft_based) then
         allocate (fft)
         slot%operator => fft
-        call new_fft_flexibility(fft, slot%lattice, pair, error, space=slot%space, cache=kernel_cache)
+        call new_fft_flexibility(fft, slot%lattice, bodies, error, space=slot%space, cache=kernel_cache)
       else
         allocate (dense)
         slot%operator => dense
-        call new_dense_flexibility(dense, slot%lattice, pair, error)
+        call new_dense_flexibility(dense, slot%lattice, bodies, error)
       end if
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_operator
 
   !> Create a frictionless contact problem.
-  subroutine new_pressed(method, lattice, pair, gap, candidate, law, threads, handle, error)
+  subroutine new_pressed(method, lattice, bodies, gap, candidate, law, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
-    type(elastic_pair_t), intent(in) :: pair
+    class(elastic_medium_t), intent(in) :: bodies
     !> Gap before loading [m]
     real(wp), intent(in) :: gap(:, :)
     !> Nodes that may come into contact
@@ -116,21 +116,21 @@ contains
       if (method == fft_based) then
         allocate (fft)
         slot%pressed => fft
-        call new_normal_contact(fft, slot%lattice, pair, gap, candidate, error, threads, kernel_cache, law=law)
+        call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law)
       else
         allocate (dense)
         slot%pressed => dense
-        call new_direct_contact(dense, slot%lattice, pair, gap, candidate, error, law=law)
+        call new_direct_contact(dense, slot%lattice, bodies, gap, candidate, error, law=law)
       end if
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_pressed
 
   !> Create a contact problem with friction.
-  subroutine new_sheared(method, lattice, pair, gap, candidate, friction, law, goodman, threads, handle, error)
+  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, goodman, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
-    type(elastic_pair_t), intent(in) :: pair
+    class(elastic_medium_t), intent(in) :: bodies
     !> Gap before loading [m]
     real(wp), intent(in) :: gap(:, :)
     !> Nodes that may come into contact
@@ -153,9 +153,9 @@ contains
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
-                                                              space%threads, pair%couples(), lattice%is_periodic())
+                                                              space%threads, bodies%couples(), lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
-    if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, pair, gap, candidate, friction, goodman, &
+    if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, &
                                                           error, law)
     if (.not. allocated(error)) then
       if (method == fft_based) then

@@ -12,6 +12,7 @@ program tester
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
   use test_medium, only: collect_medium
+  use test_layers, only: collect_layers
   use test_spectrum_file, only: collect_spectrum_file
   use test_vectors, only: collect_vectors
   use test_arguments, only: collect_arguments
@@ -46,6 +47,7 @@ program tester
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
     new_suite('medium', collect_medium), &
+    new_suite('layers', collect_layers), &
     new_suite('spectrum_file', collect_spectrum_file), &
     new_suite('vectors', collect_vectors), &
     new_suite('arguments', collect_arguments), &

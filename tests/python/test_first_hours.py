@@ -357,8 +357,6 @@ def test_a_diameter_names_the_radius(folder: Path, size: str, words: str) -> Non
 @pytest.mark.parametrize(
     "key",
     [
-        "coating",
-        "layer_thickness",
         "Yield Stress",
         "temperature",
         "thermal_conductivity",

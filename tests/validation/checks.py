@@ -123,6 +123,12 @@ _ALL = (
         _of("superposition", "superposition"),
     ),
     Check(
+        "coatings",
+        "Sphere on a layer",
+        "Radius, approach and pressure at the center, for layers on softer, harder and rigid bodies.",
+        _of("coatings", "sphere"),
+    ),
+    Check(
         "interface",
         "Compliant interface (chapter 11)",
         "A sphere on layers p = c ψ^m, with E* = R = 1 and P = 4/3, extrapolated from two lattices; stiff "

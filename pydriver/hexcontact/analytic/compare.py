@@ -195,7 +195,7 @@ class ClosedForms:
             return Pressed("Hertz", self.gap.center, self.gap.contact, 0.4, self.gap.lowest)
         surface = self.surface
         known = _SHAPES.get(surface.shape) if surface is not None else None
-        return known(surface, self.modulus) if known else None
+        return known(surface, self.modulus) if known and not math.isnan(self.modulus) else None
 
     def sheared(self, number: int) -> Sheared | None:
         """Return the closed solution of a step with shear, None if there is none."""
@@ -338,6 +338,8 @@ def closed_solutions(dataset: Dataset, number: int) -> tuple[list[Exact], str]:
         return [], "nothing is pressed in this load step"
     if hertz_gap.is_compliant(so_far.attrs):
         return [], "no closed-form solution is known for a compliant interface"
+    if "coating" in so_far.attrs:
+        return [], "no closed-form solution is known for bodies with coatings"
     if hertz_gap.is_worn(so_far):
         return [], "no closed-form solution is known for worn surfaces"
     closed = ClosedForms(so_far)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import chain
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -128,6 +129,86 @@ class ElasticPair:
     def as_array(self) -> Array:
         """Return the three constants as an array [1/Pa]."""
         return np.array([self.lambda_1, self.lambda_2, self.lambda_5])
+
+
+@dataclass(frozen=True)
+class CoatedPair(ElasticPair):
+    """Compliance constants of two bodies of which at least one has a coating.
+
+    The three constants are those of the outermost materials, which short waves of traction see.
+
+    Attributes
+    ----------
+    constants
+        Young's modulus [Pa], Poisson's ratio, and 1 if it is rigid, of both bodies; the numbers of their
+        coatings; thickness [m], Young's modulus [Pa] and Poisson's ratio of each of these, outermost first.
+    coupling
+        Largest tangential displacement by a pressure over the normal one, over all wave lengths.
+    fit_error
+        Largest error of the kernels, which are sums of images, over their largest value.
+    images
+        Number of images.
+    """
+
+    constants: tuple[float, ...]
+    coupling: float
+    fit_error: float
+    images: int
+
+    @classmethod
+    def of_layers(
+        cls,
+        bodies: Sequence[tuple[float | None, float | None]],
+        coatings: Sequence[Sequence[tuple[float, float, float]]],
+    ) -> CoatedPair:
+        """Return the constants of two bodies, each with its coatings, outermost first.
+
+        Parameters
+        ----------
+        bodies
+            Young's modulus [Pa] and Poisson's ratio below the coatings; ``None`` for both: rigid.
+        coatings
+            Thickness [m], Young's modulus [Pa] and Poisson's ratio of each coating.
+
+        Raises
+        ------
+        DeckError
+            A number out of its range, a rigid surface on another, coatings that images do not describe.
+        """
+        below = [(young or 0.0, poisson or 0.0, float(young is None)) for young, poisson in bodies]
+        layers = [layer for coating in coatings for layer in coating]
+        constants = tuple(map(float, [*chain(*below), *map(len, coatings), *chain(*layers)]))
+        one, two, five, *found = flat.coated_constants(constants)
+        return cls(one, two, five, constants, *found)
+
+    @cached_property
+    def beta(self) -> float:
+        """Largest coupling of normal and tangential contact."""
+        return self.coupling
+
+    def as_array(self) -> Array:
+        """Return the constants of the bodies."""
+        return np.array(self.constants)
+
+
+def pair_of(one: Any, two: Any) -> ElasticPair:
+    """Return the constants of body 1 and body 2, with their materials and coatings; None: rigid."""
+    below = (
+        one and one.young_modulus,
+        one and one.poisson_ratio,
+        two and two.young_modulus,
+        two and two.poisson_ratio,
+    )
+    if not ((one and one.coating) or (two and two.coating)):
+        return ElasticPair.from_materials(*below)
+    coatings = [
+        [
+            (layer.thickness, layer.young_modulus, layer.poisson_ratio)
+            for layer in (body.coating if body else ())
+        ]
+        for body in (one, two)
+    ]
+    return CoatedPair.of_layers([below[:2], below[2:]], coatings)
 
 
 class FlexibilityOperator(Handle):

@@ -61,6 +61,14 @@ YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
 
 
+class Coating(Table):
+    """A layer on a body, bonded to what lies below it."""
+
+    thickness: Annotated[float, Quantity(LENGTH, above=0)] = meaning(..., "thickness t", '"3 um"')
+    young_modulus: YoungModulus = meaning(..., "Young's modulus E")
+    poisson_ratio: PoissonRatio = meaning(..., "Poisson's ratio ν; below 0.5 in one of several coatings")
+
+
 class Body(Table):
     """One of the two bodies: elastic, or rigid."""
 
@@ -76,13 +84,19 @@ class Body(Table):
     surface: Annotated[Surface, SurfaceKind()] | None = meaning(
         None, "the shape of its surface; flat if absent"
     )
+    coating: list[Coating] = Field(
+        default_factory=list,
+        description="layers, outermost first",
+        examples=['[{ thickness = "3 um", young_modulus = "450 GPa", poisson_ratio = 0.25 }]'],
+    )
 
     @property
     def compliance(self) -> float:
-        """(1 - ν²)/E (1/Pa), 0 of a rigid body."""
-        if self.young_modulus is None or self.poisson_ratio is None:
+        """(1 - ν²)/E (1/Pa) below the coatings, of a rigid body that of its outermost coating or 0."""
+        of = self if self.young_modulus is not None or not self.coating else self.coating[0]
+        if of.young_modulus is None or of.poisson_ratio is None:
             return 0.0
-        return (1.0 - self.poisson_ratio**2) / self.young_modulus
+        return (1.0 - of.poisson_ratio**2) / of.young_modulus
 
     @field_validator("surface")
     @classmethod
@@ -119,10 +133,12 @@ class Bodies(Table):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Require at least one elastic body."""
+        """Require at least one elastic body, or a coating."""
         bodies = [data.get(key) for key in ("1", "2")]
-        if all(isinstance(body, Mapping) and body.get("rigid") is True for body in bodies):
-            yield "2", "expected one elastic body at least; both are rigid"
+        if all(
+            isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies
+        ):
+            yield "2", "expected one elastic body at least; both are rigid, without a coating"
 
 
 BULK_STATES = ("plane stress", "plane strain x", "plane strain y")

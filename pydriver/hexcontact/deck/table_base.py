@@ -43,11 +43,11 @@ SYMBOLS = {
     **dict.fromkeys(("R", "r", "diameter"), "radius"),
     **{f"diameter_{axis}": f"radius_{axis}" for axis in "xy"},
     **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
+    **dict.fromkeys(("coatings", "layer", "layers", "film"), "coating"),
 }
 """Keys of decks by the symbols and words of engineers, with the table if several have such a key."""
 
 _NOT_INCLUDED = {
-    "layers and coatings": ("coating", "layer", "thickness", "substrate", "film"),
     "plasticity": ("plastic", "yield", "hardening", "hardness"),
     "heat": ("temperature", "thermal", "heat", "conductivity"),
     "lubrication": ("lubricat", "viscosity", "fluid"),

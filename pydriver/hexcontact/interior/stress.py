@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, DataArray, Dataset, integer
 from ..core import kernel_cache, memory
-from ..core.contact import ElasticPair
+from ..core.contact import pair_of
 from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
@@ -164,6 +164,11 @@ class Loaded:
         if not self.bodies:
             raise NotInResult("the result does not say what the bodies are made of")
         one = self.bodies[self.body - 1]
+        if one.coating:
+            raise NotInResult(
+                f"body {self.body} has a coating: stresses are computed in half-spaces without layers only, "
+                "as yet"
+            )
         if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
             raise NotInResult(f"body {self.body} is rigid: there is no stress to compute in it")
         return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
@@ -181,8 +186,7 @@ class Loaded:
                 "kept"
             )
         law = _law_of(self.friction)
-        constants = [(body.young_modulus, body.poisson_ratio) for body in self.bodies]
-        pair = ElasticPair.from_materials(*constants[0], *constants[1])
+        pair = pair_of(*self.bodies)
         corrected = [
             _edges(self.lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
             for one, step in zip(at_nodes, self.steps, strict=True)

@@ -116,7 +116,8 @@ def _below(result: Result | Dataset, step: int, points: Array, *names: str) -> D
     """Return stresses of a load step at points of body 1, or of body 2 if body 1 is rigid."""
     result = as_result(result)
     bodies = bodies_of(result.deck)
-    return result.stress(*names, step=step, body=2 if bodies and bodies[0].rigid else 1, points=points)
+    body = 2 if bodies and (bodies[0].rigid or bodies[0].coating) else 1
+    return result.stress(*names, step=step, body=body, points=points)
 
 
 _MARGIN = 1.5  # width of the map over that of the contact

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 from ..core.lattice import Lattice
@@ -62,7 +62,9 @@ class Body(Argument, deck_keys.Body):
     """One of the two bodies, an argument of `hexcontact.Case`.
 
     Young's modulus (Pa) and Poisson's ratio are None for a rigid body; the surface is None for a flat one, or
-    if the case has a gap.
+    if the case has a gap. A coating is a
+    sequence of mappings, outermost first, each with ``thickness`` (m), ``young_modulus`` (Pa) and
+    ``poisson_ratio``.
     """
 
     @known_keywords
@@ -72,8 +74,11 @@ class Body(Argument, deck_keys.Body):
         poisson_ratio: float | None = None,
         rigid: bool = False,
         surface: Surface | None = None,
+        *,
+        coating: Sequence[Mapping[str, Any] | deck_keys.Coating] = (),
     ) -> None:
         keys = {name: value for name, value in locals().items() if name in deck_keys.Body.model_fields}
+        keys["coating"] = list(coating)
         super().__init__(**plain(keys))
 
 

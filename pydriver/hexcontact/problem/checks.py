@@ -20,6 +20,7 @@ from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
 
+_THINNEST = 0.1  # layer over spacing, from which the sums of a periodic window end
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
 
@@ -65,6 +66,7 @@ def checked(
         found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
         found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
+        found += _mistakes(tables, _coating_problems(tables, repeating))
     if found:
         raise deck_error(found, given.source)
     return Deck.model_construct(**tables), solver, steps, repeating
@@ -123,12 +125,46 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
             yield (name,), f"is not available yet {whole}"
 
 
+def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) -> Found:
+    """Yield tables that take bodies as half-spaces, and coatings that a periodic window refuses."""
+    bodies = tables["body"].body_1, tables["body"].body_2
+    if not (bodies[0].coating or bodies[1].coating):
+        return
+    for number, body in enumerate(bodies, 1):
+        for place, layer in enumerate(body.coating if len(body.coating) > 1 else ()):
+            if layer.poisson_ratio >= 0.5:
+                key = "body", str(number), "coating", place, "poisson_ratio"
+                yield key, "expected a number below 0.5 in one of several coatings"
+    if tables.get("wear"):
+        yield (
+            ("wear",),
+            "expected nothing beside a coating: wear makes a layer thinner, which is not followed",
+        )
+    for kind in ("stress", "fatigue"):
+        for place, table in enumerate(tables.get(kind) or ()):
+            if bodies[table.body - 1].coating:
+                sentence = f"body {table.body} has a coating, below which no stress is computed yet"
+                yield (kind, place, "body"), sentence
+    if repeating is None:
+        return
+    spacing = repeating.lattice.spacing * min(1.0, repeating.lattice.cell_ratio)
+    for number, body in enumerate(bodies, 1):
+        if any(layer.thickness < _THINNEST * spacing for layer in body.coating):
+            sentence = f"expected layers of at least {_THINNEST:g} spacings in a window that repeats"
+            yield ("body", str(number), "coating"), sentence
+    if all(body.rigid for body in bodies) and tables["grid"].periodic:
+        for place, load in enumerate(tables.get("load") or ()):
+            if any(part.mean_gap is not None for part in (load, *(load.path or ()))):
+                sentence = "expected mean_pressure or approach: on rigid bases a mean pressure moves planes"
+                yield ("load", place, "mean_gap"), sentence
+
+
 def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
     """Yield mistakes with the values of their keys, unless these are absent or tables."""
     for key, sentence in found:
         value: Any = tables
         for part in key:
-            value = value[part] if isinstance(part, int) else dict(value or {}).get(part)
+            value = value and value[part] if isinstance(part, int) else dict(value or {}).get(part)
         plain = isinstance(value, str | bool | int | float | tuple)
         yield Mistake(key, value if plain else MISSING, sentence)
 
@@ -344,3 +380,6 @@ def _full_contact_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...
     for name in ("bulk", "stress", "accuracy"):
         if tables.get(name):
             yield (name,), f"{whole}: expected no table of this name with it"
+    for number, body in (("1", tables["body"].body_1), ("2", tables["body"].body_2)):
+        if body.coating:
+            yield ("body", number, "coating"), f"{whole}, that of the interface: expected no coating"

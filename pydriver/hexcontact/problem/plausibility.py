@@ -121,6 +121,14 @@ LIMITS = (
         most=5.0,
     ),
     Limit(
+        "layer_spacings",
+        "the thinnest coating has {layer_spacings:.2g} spacings, expected at least 2: the lattice does not "
+        "resolve tractions that vary over its thickness",
+        "Kernels hold for any thickness; tractions that are linear between nodes have no waves shorter than "
+        "two spacings",
+        least=2.0,
+    ),
+    Limit(
         "holes_near_contact",
         "{holes_near_contact} holes of the height map lie near the estimated contact: a contact that comes "
         "within two points of one ends the run; fill them, as by gap.interpolate_na",
@@ -161,8 +169,14 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(mu, TwoCoefficients):
         mu = max(mu.along, mu.across)
-    if moduli := [body.young_modulus for body in (case.body_1, case.body_2) if body.young_modulus]:
-        found["young_modulus"] = min(moduli)
+    bodies = case.body_1, case.body_2
+    layers = [layer for body in bodies for layer in body.coating]
+    moduli = [*(body.young_modulus for body in bodies), *(layer.young_modulus for layer in layers)]
+    if known_moduli := [modulus for modulus in moduli if modulus]:
+        found["young_modulus"] = min(known_moduli)
+    if layers:
+        thinnest = min(layer.thickness for layer in layers)
+        found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)

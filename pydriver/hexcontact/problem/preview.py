@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+from ..core.contact import CoatedPair
 from ..core.lattice import Lattice
-from ..deck.keys import Body, Bulk
+from ..deck.keys import Body, Bulk, Coating
 from ..deck.kinds import Quantity
 from ..deck.surfaces import Surface, SurfaceSum
 from ..text import Row, percent, quantity
@@ -84,9 +85,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
     """Return the parameters of a case, its solver and the machine."""
     deck, solver, wear = case.deck, case.solver, case.deck.wear
     found = {
-        "effective_modulus": case.pair.effective_modulus,
-        "dundurs_beta": case.pair.beta,
-        "tangential_compliance_ratio": case.pair.gamma,
+        **_pair_parameters(case),
         "friction_coefficient": case.friction_coefficient,
         "friction_law": law_in_words(case) if math.isnan(case.friction_coefficient) else None,
         SHEAR_LIMIT: (deck.friction and deck.friction.shear_limit) or None,
@@ -106,6 +105,24 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "machine": machine(),
     }
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _pair_parameters(case: Problem) -> dict[str, Any]:
+    """Return the constants of two half-spaces, or the coatings and the fit of their kernels."""
+    pair = case.pair
+    if not isinstance(pair, CoatedPair):
+        return {
+            "effective_modulus": pair.effective_modulus,
+            "dundurs_beta": pair.beta,
+            "tangential_compliance_ratio": pair.gamma,
+        }
+    layers = [
+        f"body {number}: {_layer(layer)}"
+        for number, body in enumerate((case.body_1, case.body_2), 1)
+        for layer in body.coating
+    ]
+    fit = {"coating_images": pair.images, "coating_fit_error": pair.fit_error}
+    return {"coating": "; ".join(layers), **fit}
 
 
 @functools.cache
@@ -131,7 +148,13 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     lattice, pair, bulk, solver = case.lattice, case.pair, case.deck.bulk, case.solver
     # without the coordinates, for which the window may be too large
     width, height = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)
-    modulus = quantity(pair.effective_modulus, "Pa")
+    constants = (
+        f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
+    )
+    if isinstance(pair, CoatedPair):
+        constants = (
+            f"coated, coupling up to {pair.beta:.4g}; {pair.images} images, error {pair.fit_error:.1g}"
+        )
     size = f"{quantity(width, 'm')} x {quantity(height, 'm')}"
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
     accuracy = case.accuracy and (
@@ -150,7 +173,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("body 2", _body(case.body_2)),
         ("gap", str(case.height_map or "")),
         *_maps(case),
-        ("pair", f"E* = {modulus}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"),
+        ("pair", constants),
         ("interface", interface),
         ("friction", _friction(case)),
         ("contact", plausibility.row(case)),
@@ -241,10 +264,17 @@ def largest_loads(case: Problem) -> dict[str, float]:
 
 
 def _body(body: Body) -> str:
-    stiffness = "rigid"
-    if not body.rigid:
-        stiffness = f"E = {quantity(body.young_modulus or math.nan, 'Pa')}, nu = {body.poisson_ratio:g}"
-    return f"{stiffness}; {_surface(body.surface)}"
+    stiffness = "rigid" if body.rigid else _elastic(body)
+    coatings = "".join(f"; coating {_layer(layer)}" for layer in body.coating)
+    return f"{stiffness}{coatings}; {_surface(body.surface)}"
+
+
+def _elastic(of: Body | Coating) -> str:
+    return f"E = {quantity(of.young_modulus or math.nan, 'Pa')}, nu = {of.poisson_ratio:g}"
+
+
+def _layer(layer: Coating) -> str:
+    return f"{quantity(layer.thickness, 'm')}, {_elastic(layer)}"
 
 
 def _maps(case: Problem) -> Iterator[Row]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..core import contact, friction, memory
-from ..core.contact import ElasticPair, Method
+from ..core.contact import ElasticPair, Method, pair_of
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import bulk_strain
@@ -131,9 +131,12 @@ class Problem:
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
-        self.pair = ElasticPair.from_materials(
-            one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
-        )
+        try:
+            self.pair = pair_of(one, two)
+        except DeckError as error:  # coatings that images do not describe
+            number = "1" if one.coating else "2"
+            fault = Mistake(("body", number, "coating"), MISSING, str(error))
+            raise deck_error([fault], given.source) from error
         # whether pressure and shear are coupled
         self.coupled = self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
         self.full_contact = (

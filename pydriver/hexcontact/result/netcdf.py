@@ -82,10 +82,13 @@ def _numbers(count: int) -> Fits:
     return lambda value: np.shape(value) == (count,) and bool(np.isfinite(value).all())
 
 
-_PARAMETERS: dict[str, Fits] = {  # of the case: all of them or, in tests, none
+_HALF_SPACES: dict[str, Fits] = {  # that bodies with coatings do not have
     "effective_modulus": _is_positive,
     "dundurs_beta": _is_number,
     "tangential_compliance_ratio": _is_number,
+}
+_PARAMETERS: dict[str, Fits] = {  # of the case: all of them or, in tests, none
+    **_HALF_SPACES,
     "friction_coefficient": lambda value: np.ndim(value) == 0 and not float(value) < 0,  # NaN: another law
     "algorithm": _one_of("frictionless", "static", "incremental"),
     "coupling": _one_of("full", "goodman"),
@@ -112,6 +115,9 @@ _LATER = {
     **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance", "wear_tolerance"), _is_positive),
     "entry": _one_of("implicit", "interpolated"),
     "bulk_state": _one_of(*BULK_STATES),
+    "coating": _is_text,
+    "coating_images": _is_positive,
+    "coating_fit_error": lambda value: _is_number(value) and 0 <= value < 1,
     **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
 }
 
@@ -155,6 +161,8 @@ def fault_of_dimensions(columns: Mapping[str, netCDF4.Variable]) -> str:
 
 def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
     needed = _ATTRIBUTES | (_PARAMETERS if _PARAMETERS.keys() & attributes.keys() else {})
+    if "coating" in attributes:
+        needed = {name: fits for name, fits in needed.items() if name not in _HALF_SPACES}
     for name, fits in (needed | {name: fits for name, fits in _LATER.items() if name in attributes}).items():
         if name not in attributes:
             return f"it has no attribute {name}"
@@ -321,7 +329,9 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
         standard = {"standard_name": f"projection_{axis}_coordinate"}
         about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
         chunks = [min(_TRIANGLES, lattice.size)]
-        columns.append(add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed))
+        columns.append(
+            add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed)
+        )
     about = {
         "cf_role": "face_node_connectivity",
         "long_name": "nodes at the corners of each triangle, counterclockwise",

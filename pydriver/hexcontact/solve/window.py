@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
+from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact
 from ..core.lattice import Lattice
 from ..core.measures import measures
@@ -166,11 +166,10 @@ class Window:
         Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
         """
         body = self.case.body_1 if number == 1 else self.case.body_2
-        if body.rigid:
+        if body.rigid and not body.coating:
             return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
         if number not in self._bodies:
-            material, rigid = (body.young_modulus, body.poisson_ratio), (None, None)
-            pair = ElasticPair.from_materials(*(material + rigid if number == 1 else rigid + material))
+            pair = pair_of(*((body, None) if number == 1 else (None, body)))
             self._bodies[number] = FlexibilityOperator(self.lattice, pair)
         operator, pressure = self._bodies[number], fields["pressure"]
         z, x, y = operator.apply(pressure, fields.get("traction_x"), fields.get("traction_y"))

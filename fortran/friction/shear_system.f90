@@ -78,6 +78,7 @@ contains
 
     self%operators => operators
     self%space = operators%space
+    self%symmetric = .not. operators%rolling%steady
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%medium)
     call self%reset_frames()
   end subroutine new_shear_system
@@ -360,7 +361,49 @@ contains
 
     associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
+      if (operators%rolling%steady) call sum_behind(self, nodes%pairs, z)
     end associate
   end subroutine shear_precondition_packed
+
+  !> Sum the differences between the tractions of nodes and of those ahead along the rows.
+  !>
+  !> With the shift Z to the node ahead B = T (1 - Z) = (1 - Z) T but for the rear of the contact, and (1 - Z)^-1 sums from its
+  !> front on. Slipping nodes, whose traction is known but for the component across, begin a new sum.
+  subroutine sum_behind(self, runs, z)
+    class(shear_system_t), intent(in) :: self
+    !> Nodes in contact, and which of them have a component along e
+    type(paired_runs_t), intent(in) :: runs
+    !> Traction along t and e at these nodes
+    real(wp), intent(inout), contiguous :: z(:)
+    real(wp), allocatable :: plane(:)
+    real(wp) :: own
+    integer :: n, m, i, first, last, step, to_ahead, k
+
+    n = size(self%compliance)
+    allocate (plane(2*n), source=0.0_wp)
+    associate (n_t => runs%n_first, rolling => self%operators%rolling)
+      call self%put_in_plane(runs, z(:n_t), z(n_t + 1:), plane)
+      to_ahead = rolling%stride(self%operators%flexibility%lattice%extent(1))
+      step = merge(-1, 1, to_ahead > 0)
+      first = merge(n - to_ahead, 1 - to_ahead, to_ahead > 0)
+      last = merge(1, n, to_ahead > 0)
+      do m = 0, 1
+        do i = first, last, step
+          own = self%elastic_compliance/(self%elastic_compliance + self%compliance(i))
+          plane(m*n + i) = plane(m*n + i)/rolling%share + own*plane(m*n + i + to_ahead)
+        end do
+      end do
+      do k = 1, size(runs%first)
+        do i = runs%first(k), runs%last(k)
+          associate (at => runs%place(k) + i - runs%first(k), e => self%direction(:, i))
+            z(at) = -e(2)*plane(i) + e(1)*plane(n + i)
+            if (runs%second(k) > 0) then
+              z(n_t + runs%second(k) + i - runs%first(k)) = e(1)*plane(i) + e(2)*plane(n + i)
+            end if
+          end associate
+        end do
+      end do
+    end associate
+  end subroutine sum_behind
 
 end module hc_shear_system

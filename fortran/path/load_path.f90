@@ -14,9 +14,10 @@ module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, &
-                              separated, slip, stick
+                              separated, slip, stick, along_x, about_z
   use hc_contact_residuals, only: tangential_residual
   use hc_friction_law, only: friction_law_t
+  use hc_rolling, only: rolling_t
   use hc_step_error, only: turned_part
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
@@ -74,26 +75,31 @@ contains
 
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
-    real(wp), allocatable :: slipped(:, :, :)
+    type(load_target_t) :: goal
+    real(wp), allocatable :: slipped(:, :, :), ahead(:, :, :)
     logical :: at_once
     type(way_t) :: way
 
     call check_step(solver, state, target, settings, error)
     if (allocated(error)) return
-    at_once = settings%static
+    goal = target
+    if (target%rolling%rolls()) call begin_rolling(solver%problem, state, goal, ahead)
+    at_once = settings%static .or. target%rolling%rolls()
     if (.not. (at_once .or. settings%interpolated)) at_once = .not. solver%problem%space%max(state%pressure) > 0.0_wp
     allocate (slipped(0, 0, 0))
     if (settings%interpolated) slipped = 0.0_wp*state%relative_displacement
     from => state
     do
-      call solve_part(solver, state, from, between(state, target, way%done + way%part), settings, at_once, next, error)
+      call solve_part(solver, state, from, between(state, goal, way%done + way%part), settings, at_once, next, error, ahead)
       ! it is one of the whole step, and no second attempt begins with it
       if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
       way%work = way%work + next%operator_applications
       way%sweeps = way%sweeps + next%sweeps
       if (next%converged) then
-        if (at_once) then
+        if (target%rolling%rolls()) then
+          call add_rolled_slip(solver%problem, state, target%rolling, next)
+        else if (at_once) then
           call add_slip(solver%problem, state, settings%static, next)
         else
           call add_slip(solver%problem, from, settings%static, next)
@@ -110,7 +116,7 @@ contains
         if (next%sliding .and. way%done + way%part >= 1.0_wp) exit
         if (way%cuts >= settings%max_cuts) then
           ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
-          if (settings%static .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
+          if (settings%static .or. target%rolling%rolls() .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
           at_once = .false.
           from => state
           way%done = 0.0_wp
@@ -134,7 +140,7 @@ contains
     if (way%done >= 1.0_wp) return
     next%converged = .false.
     next%stopped = rim_reached
-    call solver%problem%find_load_residuals(target, next)
+    call solver%problem%find_load_residuals(goal, next)
   end subroutine advance
 
   !> Refuse a load step whose target, settings or state are of no use.
@@ -160,7 +166,7 @@ contains
   end subroutine check_step
 
   !> Solve a part of a load step.
-  subroutine solve_part(solver, state, from, goal, settings, at_once, next, error)
+  subroutine solve_part(solver, state, from, goal, settings, at_once, next, error, ahead)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
     !> State at the beginning of the step, and at that of the part
@@ -175,9 +181,13 @@ contains
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> Rolling bodies: displacement that slip counts from (n_col, n_row, 2) [m]
+    real(wp), allocatable, intent(in) :: ahead(:, :, :)
     real(wp), allocatable :: undeformed(:, :, :)
 
-    if (settings%static) then
+    if (goal%rolling%rolls()) then
+      call solve_step(solver, from, ahead, goal, settings%tolerance, settings%max_sweeps, next, error)
+    else if (settings%static) then
       allocate (undeformed, source=0.0_wp*state%relative_displacement)
       call solve_step(solver, from, undeformed, goal, settings%tolerance, settings%max_sweeps, next, error)
     else if (at_once) then
@@ -188,6 +198,66 @@ contains
       call solve_step(solver, from, from%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
     end if
   end subroutine solve_part
+
+  !> Set shifts and twist over a spacing from creepages, and the displacement that slip counts from: that of the step before at
+  !> the node ahead, (RO3); nothing in the steady state, (RO4).
+  subroutine begin_rolling(problem, state, target, ahead)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: state
+    !> Loads or creepages; then loads or motions
+    type(load_target_t), intent(inout) :: target
+    !> The displacement (n_col, n_row, 2) [m]
+    real(wp), allocatable, intent(out) :: ahead(:, :, :)
+    real(wp) :: creepage(3)
+    integer :: m
+
+    creepage = merge(0.0_wp, target%value(along_x:about_z), target%control(along_x:about_z) == force_control)
+    associate (value => target%value(along_x:about_z), free => target%control(along_x:about_z) == force_control)
+      value = merge(value, target%rolling%motions(problem%lattice, creepage), free)
+    end associate
+    ahead = state%relative_displacement
+    if (target%rolling%steady) then
+      ahead = 0.0_wp
+      return
+    end if
+    ahead = ahead + problem%rigid_displacement(state%motion)
+    do m = 1, 2
+      ahead(:, :, m) = target%rolling%shifted(ahead(:, :, m))
+    end do
+  end subroutine begin_rolling
+
+  !> Add slip path and dissipated energy of the way over a spacing, which move on with the surfaces; in the steady state those of a
+  !> point are what it gathers on its way through the contact.
+  subroutine add_rolled_slip(problem, before, rolling, state)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: before
+    type(rolling_t), intent(in) :: rolling
+    !> State at its end
+    type(contact_state_t), intent(inout), target :: state
+    real(wp), pointer, contiguous :: gathered(:)
+    real(wp) :: spent
+
+    state%accumulated_slip = norm2(state%slip_increment, dim=3)
+    state%dissipation_density = merge(0.0_wp, -sum(state%traction*state%slip_increment, dim=3), state%zone == stick)
+    spent = problem%lattice%cell_area()*sum(state%dissipation_density)
+    state%dissipated_energy = before%dissipated_energy
+    state%path_error = before%path_error
+    if (rolling%steady) then
+      gathered(1:size(state%accumulated_slip)) => state%accumulated_slip
+      call rolling%sum_behind(size(state%pressure, 1), gathered)
+      gathered(1:size(state%dissipation_density)) => state%dissipation_density
+      call rolling%sum_behind(size(state%pressure, 1), gathered)
+    else
+      state%accumulated_slip = rolling%shifted(before%accumulated_slip) + state%accumulated_slip
+      state%dissipation_density = rolling%shifted(before%dissipation_density) + state%dissipation_density
+      state%dissipated_energy = before%dissipated_energy + spent
+    end if
+    state%creepage = rolling%creepages(problem%lattice, state%motion(along_x:about_z))
+    state%creep_power = -dot_product(state%load(along_x:about_z), state%creepage)
+    state%slip_power = spent/norm2(rolling%spacing(problem%lattice))
+  end subroutine add_rolled_slip
 
   !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.
   subroutine join_steps(problem, first, last)

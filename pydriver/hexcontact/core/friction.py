@@ -84,6 +84,32 @@ class FrictionLaw:
         return np.where(bounds < np.finfo(float).max, bounds, math.inf)
 
 
+@dataclass(frozen=True)
+class Rolling:
+    """The contact travels over both bodies along a row of the lattice.
+
+    Parameters
+    ----------
+    direction
+        Angle of rolling from x [rad].
+    steady
+        Whether the steady state is solved at once; else the contact moves on by one spacing.
+    """
+
+    direction: float = 0.0
+    steady: bool = True
+
+    def ahead(self, lattice: Lattice) -> list[int]:
+        """Return columns and rows from a node to the one ahead."""
+        found = [int(count) for count in flat.row_ahead(lattice, self.direction)]
+        if not any(found):
+            raise DeckError(
+                f"rolling_direction = {math.degrees(self.direction):g} deg: expected the direction of a row "
+                "of the lattice"
+            )
+        return found
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ContactState(NormalSolution):
     """The end of a load step, from which the next one starts.
@@ -127,6 +153,11 @@ class ContactState(NormalSolution):
         Number of active sets, and of halvings of the step.
     operator_applications : float
         All work of the step, in applications of the full operator.
+    creepage_x, creepage_y, spin : float
+        Of rolling bodies: velocity of body 1 less that of body 2 over the rolling velocity, and its
+        rotation [1/m].
+    creep_power, slip_power : float
+        Of rolling bodies, by distance: creep forces times creepages, and the energy that friction takes [J/m].
     """
 
     traction_x: Array
@@ -153,6 +184,11 @@ class ContactState(NormalSolution):
     residual_torque: float = 0.0
     sliding: bool = False
     cuts: int = 0
+    creepage_x: float = 0.0
+    creepage_y: float = 0.0
+    spin: float = 0.0
+    creep_power: float = 0.0
+    slip_power: float = 0.0
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
@@ -230,6 +266,7 @@ class FrictionalContact(Contact):
         *,
         bulk_strain: ArrayLike | None = None,
         guess: tuple[ArrayLike, Sequence[float]] | None = None,
+        rolling: Rolling | None = None,
         static: bool = False,
         entry: Entry = "implicit",
         tolerance: float = 1e-8,
@@ -251,6 +288,8 @@ class FrictionalContact(Contact):
         guess
             Tractions on body 1, ``(3, n_row, n_col)`` [Pa], and motions (as `MOTION`) that the step is
             likely to end with: it is tried from there first.
+        rolling
+            The bodies roll: displacements along x and y and about z are creepages and the spin [1/m].
         static
             The load is applied to the undeformed bodies at once; `state` is the first guess.
         entry
@@ -282,12 +321,14 @@ class FrictionalContact(Contact):
         strain = reals(kept if bulk_strain is None else bulk_strain, "bulk_strain", (3,))
         word(entry, "entry", ("implicit", "interpolated"))
         checked_tolerance(tolerance)
+        ahead = [0, 0] if rolling is None else rolling.ahead(self.lattice)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
         handle = self.called(
             *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
             *(entry == "interpolated", tolerance),
-            *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts"), self._held(state)),
+            *(integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
+            *(ahead, rolling is not None and rolling.steady, self._held(state)),
         )
         found = self.solution(handle)
         self._warn_of_rim(found)

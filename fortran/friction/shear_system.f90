@@ -377,30 +377,27 @@ contains
     real(wp), intent(inout), contiguous :: z(:)
     real(wp), allocatable :: plane(:)
     real(wp) :: own
-    integer :: n, m, i, first, last, step, to_ahead, k
+    integer :: n, k, i, m, at, to_ahead
+    logical :: forward
 
     n = size(self%compliance)
     allocate (plane(2*n), source=0.0_wp)
     associate (n_t => runs%n_first, rolling => self%operators%rolling)
       call self%put_in_plane(runs, z(:n_t), z(n_t + 1:), plane)
       to_ahead = rolling%stride(self%operators%flexibility%lattice%extent(1))
-      step = merge(-1, 1, to_ahead > 0)
-      first = merge(n - to_ahead, 1 - to_ahead, to_ahead > 0)
-      last = merge(1, n, to_ahead > 0)
-      do m = 0, 1
-        do i = first, last, step
+      forward = to_ahead > 0
+      do k = merge(size(runs%first), 1, forward), merge(1, size(runs%first), forward), merge(-1, 1, forward)
+        do i = merge(runs%last(k), runs%first(k), forward), merge(runs%first(k), runs%last(k), forward), merge(-1, 1, forward)
           own = self%elastic_compliance/(self%elastic_compliance + self%compliance(i))
-          plane(m*n + i) = plane(m*n + i)/rolling%share + own*plane(m*n + i + to_ahead)
-        end do
-      end do
-      do k = 1, size(runs%first)
-        do i = runs%first(k), runs%last(k)
-          associate (at => runs%place(k) + i - runs%first(k), e => self%direction(:, i))
-            z(at) = -e(2)*plane(i) + e(1)*plane(n + i)
-            if (runs%second(k) > 0) then
-              z(n_t + runs%second(k) + i - runs%first(k)) = e(1)*plane(i) + e(2)*plane(n + i)
-            end if
-          end associate
+          do m = 0, n, n
+            plane(m + i) = plane(m + i)/rolling%share
+            if (i + to_ahead >= 1 .and. i + to_ahead <= n) plane(m + i) = plane(m + i) + own*plane(m + i + to_ahead)
+          end do
+          at = runs%place(k) + i - runs%first(k)
+          z(at) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
+          if (runs%second(k) == 0) cycle
+          at = n_t + runs%second(k) + i - runs%first(k)
+          z(at) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
         end do
       end do
     end associate

@@ -35,7 +35,7 @@ module hc_rolling
     procedure :: subtract_ahead
     !> Values of the node ahead
     procedure :: shifted
-    !> Sums along the rows, from the first node of the contact on
+    !> Sums along the rows, from the front of the window on
     procedure :: sum_behind
     !> Motions over a spacing from creepages, and back
     procedure :: motions, creepages
@@ -125,24 +125,20 @@ contains
   end function shifted
 
   !> Add to each value those of all nodes ahead: what a point of the surface gathers on its way through the contact.
-  pure subroutine sum_behind(self, n_col, field)
+  pure subroutine sum_behind(self, field)
     class(rolling_t), intent(in) :: self
-    !> Columns of the window
-    integer, intent(in) :: n_col
-    !> The field, row after row; zero at the rim of the window
-    real(wp), intent(inout), contiguous :: field(:)
-    integer :: i, to_ahead
+    !> A field of the window (n_col, n_row)
+    real(wp), intent(inout) :: field(:, :)
+    integer :: row, col, step(2)
 
-    to_ahead = self%stride(n_col)
-    if (to_ahead > 0) then
-      do i = size(field) - to_ahead, 1, -1
-        field(i) = field(i) + field(i + to_ahead)
+    step = merge(-1, 1, self%ahead > 0)
+    associate (by => self%ahead, low => max(1, 1 - self%ahead), high => min(shape(field), shape(field) - self%ahead))
+      do row = merge(high(2), low(2), by(2) > 0), merge(low(2), high(2), by(2) > 0), step(2)
+        do col = merge(high(1), low(1), by(1) > 0), merge(low(1), high(1), by(1) > 0), step(1)
+          field(col, row) = field(col, row) + field(col + by(1), row + by(2))
+        end do
       end do
-    else
-      do i = 1 - to_ahead, size(field)
-        field(i) = field(i) + field(i + to_ahead)
-      end do
-    end if
+    end associate
   end subroutine sum_behind
 
   !> Return shifts and twist of body 2 relative to body 1 over a spacing, (RO2): creepages are the velocity of body 1 less that of

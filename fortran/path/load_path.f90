@@ -235,8 +235,7 @@ contains
     type(contact_state_t), intent(in) :: before
     type(rolling_t), intent(in) :: rolling
     !> State at its end
-    type(contact_state_t), intent(inout), target :: state
-    real(wp), pointer, contiguous :: gathered(:)
+    type(contact_state_t), intent(inout) :: state
     real(wp) :: spent
 
     state%accumulated_slip = norm2(state%slip_increment, dim=3)
@@ -245,10 +244,8 @@ contains
     state%dissipated_energy = before%dissipated_energy
     state%path_error = before%path_error
     if (rolling%steady) then
-      gathered(1:size(state%accumulated_slip)) => state%accumulated_slip
-      call rolling%sum_behind(size(state%pressure, 1), gathered)
-      gathered(1:size(state%dissipation_density)) => state%dissipation_density
-      call rolling%sum_behind(size(state%pressure, 1), gathered)
+      call rolling%sum_behind(state%accumulated_slip)
+      call rolling%sum_behind(state%dissipation_density)
     else
       state%accumulated_slip = rolling%shifted(before%accumulated_slip) + state%accumulated_slip
       state%dissipation_density = rolling%shifted(before%dissipation_density) + state%dissipation_density

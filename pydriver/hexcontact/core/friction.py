@@ -84,6 +84,11 @@ class FrictionLaw:
         return np.where(bounds < np.finfo(float).max, bounds, math.inf)
 
 
+def row_ahead(lattice: Lattice, direction: float) -> list[int]:
+    """Return columns and rows from a node to the next one along a direction (rad), zero if there is none."""
+    return [int(count) for count in flat.row_ahead(lattice, direction)]
+
+
 @dataclass(frozen=True)
 class Rolling:
     """The contact travels over both bodies along a row of the lattice.
@@ -101,7 +106,7 @@ class Rolling:
 
     def ahead(self, lattice: Lattice) -> list[int]:
         """Return columns and rows from a node to the one ahead."""
-        found = [int(count) for count in flat.row_ahead(lattice, self.direction)]
+        found = row_ahead(lattice, self.direction)
         if not any(found):
             raise DeckError(
                 f"rolling_direction = {math.degrees(self.direction):g} deg: expected the direction of a row "

@@ -18,7 +18,7 @@ from ..problem.preview import machine
 from ..problem.problem import Problem
 from ..result.history_words import unasked_path
 from ..result.step import Step
-from ..variables import LOADS
+from ..variables import LOADS, ROLLED
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .log import Log
@@ -132,4 +132,5 @@ def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) ->
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:
     """Return the loads and motions at the end of a step by the keys of the deck; 0 without an entry."""
-    return {name: float(history.get(name, 0.0)) for pair in LOADS.values() for name in pair}
+    drives = (*LOADS.values(), *ROLLED.values())
+    return {name: float(history.get(name, 0.0)) for pair in drives for name in pair}

@@ -183,18 +183,19 @@ VARIABLES: dict[str, Variable] = {
     ),
     **_along(
         "creepage_{}", _work, "1", "velocity of body 1 less that of body 2 along {} over the rolling velocity",
-        title="Creepage", core="rolling",
+        title="Creepage", scale=("approach", -1), core="rolling",
     ),
     "spin": _work(
-        "1/m", "angular velocity of body 1 less that of body 2 about z over the rolling velocity",
-        title="Spin", core="rolling",
+        "rad/m", "angular velocity of body 1 less that of body 2 about z over the rolling velocity",
+        title="Spin", scale=("approach", -2), core="rolling",
     ),
     "creep_power": _work(
         "J/m", "creep forces times creepages, and torque times spin, with the sign of a loss, by distance",
-        title="Frictional power", core="rolling",
+        title="Frictional power", scale=("normal_load", 0), summary=9, core="rolling",
     ),
     "slip_power": _work(
-        "J/m", "energy that friction takes by rolled distance", title="Frictional power", core="rolling",
+        "J/m", "energy that friction takes by rolled distance",
+        title="Frictional power", summary=10, core="rolling",
     ),
     "rolled_distance": _work("m", "distance that the bodies have rolled, step by step", **_FROM_0),
     **{
@@ -406,6 +407,9 @@ ROLLED = {
     "twist": ("torque", "spin"),
 }
 """The load and the motion of rolling bodies, for each rigid motion."""
+
+CREEPAGES = tuple(ROLLED[motion][1] for motion in ("x", "y", "twist"))
+"""Creepages and spin, which take the place of shifts and twist where bodies roll."""
 
 SUMMARY = tuple(sorted(names_where(lambda v: v.summary), key=lambda name: VARIABLES[name].summary))
 RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.core == "residuals")}

@@ -21,7 +21,7 @@ from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import Results, as_list, dataset_of, title_of
 from ..text import scaled, worded
-from ..variables import PANELS, VARIABLES, names_where, spelled
+from ..variables import CREEPAGES, PANELS, VARIABLES, label_of, names_where, spelled
 from .registry import SEVERAL_RUNS, figure
 from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, handles_of, new_figure, set_title, shades, titled
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
+_UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
@@ -218,6 +219,8 @@ def loop(
     dataset = _before_wear(dataset_of(result))
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
         raise NotInResult("a contact without friction has no tangential load")
+    if CREEPAGES[0] in dataset:
+        raise NotInResult("rolling bodies have creepages in place of shifts; expected creep")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
     if direction is None:
@@ -242,6 +245,39 @@ def loop(
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
     axes.legend(handles=handles_of(axes))
+    set_title(canvas, title_of(dataset), ax)
+    return canvas
+
+
+@figure("creep", "creep forces against creepage", needs="rolling")
+def creep(result: Result | xarray.Dataset, ax: Axes | None = None) -> Figure:
+    """Draw creep forces and torque of rolling bodies against the creepage, or spin, that changes most.
+
+    Forces are relative to friction times normal load, the torque to that times the contact radius.
+    """
+    dataset = dataset_of(result)
+    if CREEPAGES[0] not in dataset:
+        raise NotInResult("the bodies do not roll in this result")
+    dataset = dataset.isel(step=np.flatnonzero(np.isfinite(values_of(dataset, "rolled_distance"))))
+    length = {"spin": values_of(dataset, "contact_radius").max()}
+    spans = {name: float(np.ptp(values_of(dataset, name))) * length.get(name, 1.0) for name in CREEPAGES}
+    over = max(spans, key=lambda name: spans[name])
+    mu = float(dataset.attrs.get("friction_coefficient", np.nan))
+    scale = (mu if np.isfinite(mu) and mu > 0.0 else 1.0) * values_of(dataset, "normal_load")
+    canvas, axes = drawing(ax, 4.6, 3.6)
+    factor, unit = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
+    looks = ((COMPUTED, "o", "tangential_load_x"), (EXACT, "s", "tangential_load_y"), (THIRD, "^", "torque"))
+    for color, mark, name in looks:
+        arm = values_of(dataset, "contact_radius") if name == "torque" else 1.0
+        values = values_of(dataset, name) / (scale * arm)
+        if np.abs(values).max() > _UNSEEN:
+            label = label_of(name) + (" / radius" if name == "torque" else "")
+            axes.plot(values_of(dataset, over) * factor, values, color=color, marker=mark, ms=3, label=label)
+    for line in (axes.axhline, axes.axvline):
+        line(0.0, color=GUIDE, lw=0.5, zorder=0)
+    axes.set(xlabel=titled(spelled(over), unit), ylabel=r"load / $\mu P$")
+    axes.legend(handles=handles_of(axes))
+    axes.grid(color="0.9", lw=0.5)
     set_title(canvas, title_of(dataset), ax)
     return canvas
 

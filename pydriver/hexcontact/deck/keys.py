@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
-from ..variables import BULK_STRESS, FIELDS, LOADS, ROLLED
+from ..variables import BULK_STRESS, CREEPAGES, FIELDS, LOADS, ROLLED
 from .below import Fatigue, Stress
 from .faults import Mistake
 from .interface import Friction, Interface
@@ -338,14 +338,15 @@ _Driven: Any = extended(
 )
 
 
+_ROLLING = ("rolling", *CREEPAGES)
 _UNROLLED = ("shift_x", "shift_y", "twist", "ramp", "bulk_stress_xx", "bulk_stress_yy", "bulk_stress_xy", *MEANS)
 
 
 def _rolling_conflicts(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Refuse creepages beside their loads and without rolling, and keys that mean nothing beside rolling."""
-    pairs = [ROLLED[motion] for motion in ("x", "y", "twist")]
+    pairs = [(load, motion) for load, motion in ROLLED.values() if motion in CREEPAGES]
     if "rolling" not in data:
-        for key in ("rolling_direction", *(creepage for _, creepage in pairs)):
+        for key in ("rolling_direction", *CREEPAGES):
             if key in data:
                 yield key, 'needs rolling beside it: "steady", or a distance'
         return
@@ -422,7 +423,7 @@ class Segment(_Driven):
         known = cls.known_keys()
         # an unknown key may be that of the load
         if not whole and not any(
-            key in DRIVEN or key in MEANS or key == "rolling" or (key not in known and not cls.meant(key)) for key in data
+            key in DRIVEN or key in MEANS or key in _ROLLING or (key not in known and not cls.meant(key)) for key in data
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():

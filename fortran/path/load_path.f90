@@ -14,7 +14,7 @@ module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, &
-                              separated, slip, stick, along_x, about_z
+                              separated, slip, stick, along_x, along_y, about_z
   use hc_contact_residuals, only: tangential_residual
   use hc_friction_law, only: friction_law_t
   use hc_rolling, only: rolling_t
@@ -158,12 +158,32 @@ contains
 
     call check_target(target%control, target%value, settings%tolerance, settings%max_sweeps, error)
     if (allocated(error)) return
+    if (target%rolling%rolls()) then
+      ! spin turns about a point half a spacing behind: a creepage across is known once the spin is
+      if (target%control(about_z) == force_control .and. any(target%control(along_x:along_y) /= force_control &
+                                                             .and. is_across(solver%problem, target%rolling))) then
+        call raise(error, status%invalid_input, 'the torque of rolling bodies: a tangential load across the direction of '// &
+                   'rolling expected, and no creepage')
+        return
+      end if
+    end if
     if (settings%max_cuts < 0) then
       call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
       return
     end if
     call check_state(state, solver%problem%lattice, error)
   end subroutine check_step
+
+  !> Return whether x and y have a part across the direction of rolling.
+  pure function is_across(problem, rolling)
+    type(friction_problem_t), intent(in) :: problem
+    type(rolling_t), intent(in) :: rolling
+    logical :: is_across(2)
+    real(wp) :: by(2)
+
+    by = rolling%spacing(problem%lattice)
+    is_across = abs([by(2), by(1)]) > sqrt(epsilon(1.0_wp))*norm2(by)
+  end function is_across
 
   !> Solve a part of a load step.
   subroutine solve_part(solver, state, from, goal, settings, at_once, next, error, ahead)

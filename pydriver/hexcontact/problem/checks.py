@@ -20,6 +20,7 @@ from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
 
+_ALONG = 1e-8  # sine of an angle between directions that are one
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
 
@@ -159,11 +160,11 @@ def _rolling_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
             yield (name,), f"is not available {beside}" + (f": {reason}" if reason else " yet")
     for key, segment in rolling:
         if segment.torque is not None:
-            for force, creepage in (("tangential_load_x", "creepage_x"), ("tangential_load_y", "creepage_y")):
-                if getattr(segment, force) is None:
-                    sentence = f"expected {force} instead of {creepage} with it, which is not available yet"
-                    yield (*key, "torque"), sentence
-                    break
+            angle = segment.rolling_direction or 0.0
+            for axis, part in (("x", math.sin(angle)), ("y", math.cos(angle))):
+                force = f"tangential_load_{axis}"
+                if abs(part) > _ALONG and getattr(segment, force) is None:
+                    yield (*key, "torque"), f"expected {force} beside it, and no creepage across"
 
 
 def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> Mistake | None:

@@ -4,7 +4,7 @@
 !> displacements of the step before are shifted by an index, without interpolation. In the steady state they are those of this
 !> step, and the slip over one spacing is u less u at the node ahead.
 !>
-!> Equations: docs/theory/rolling.md, (RO1) to (RO4).
+!> Equations: docs/theory/rolling.md, (K1) to (K5).
 module hc_rolling
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
@@ -141,7 +141,7 @@ contains
     end associate
   end subroutine sum_behind
 
-  !> Return shifts and twist of body 2 relative to body 1 over a spacing, (RO2): creepages are the velocity of body 1 less that of
+  !> Return shifts and twist of body 2 relative to body 1 over a spacing, (K2): creepages are the velocity of body 1 less that of
   !> body 2, taken in the middle between a node and the one ahead.
   pure function motions(self, lattice, creepage) result(motion)
     class(rolling_t), intent(in) :: self

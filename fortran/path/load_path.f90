@@ -220,7 +220,7 @@ contains
   end subroutine solve_part
 
   !> Set shifts and twist over a spacing from creepages, and the displacement that slip counts from: that of the step before at
-  !> the node ahead, (RO3); nothing in the steady state, (RO4).
+  !> the node ahead, (K3); nothing in the steady state, (K4).
   subroutine begin_rolling(problem, state, target, ahead)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step

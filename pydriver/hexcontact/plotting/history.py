@@ -266,13 +266,15 @@ def creep(result: Result | xarray.Dataset, ax: Axes | None = None) -> Figure:
     scale = (mu if np.isfinite(mu) and mu > 0.0 else 1.0) * values_of(dataset, "normal_load")
     canvas, axes = drawing(ax, 4.6, 3.6)
     factor, unit = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
+    ends = np.flatnonzero(np.diff(dataset["segment"].values)) + 1  # a line for each segment
     looks = ((COMPUTED, "o", "tangential_load_x"), (EXACT, "s", "tangential_load_y"), (THIRD, "^", "torque"))
     for color, mark, name in looks:
         arm = values_of(dataset, "contact_radius") if name == "torque" else 1.0
         values = values_of(dataset, name) / (scale * arm)
-        if np.abs(values).max() > _UNSEEN:
+        if np.abs(values).max(initial=0.0) > _UNSEEN:
             label = label_of(name) + (" / radius" if name == "torque" else "")
-            axes.plot(values_of(dataset, over) * factor, values, color=color, marker=mark, ms=3, label=label)
+            place = np.insert(values_of(dataset, over) * factor, ends, np.nan)
+            axes.plot(place, np.insert(values, ends, np.nan), color=color, marker=mark, ms=3, label=label)
     for line in (axes.axhline, axes.axvline):
         line(0.0, color=GUIDE, lw=0.5, zorder=0)
     axes.set(xlabel=titled(spelled(over), unit), ylabel=r"load / $\mu P$")

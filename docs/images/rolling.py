@@ -12,7 +12,7 @@ from hexcontact.plotting.style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 
 @styled
 def rolling_signs() -> Figure:
-    """Draw the velocities of both bodies, creepages and creep forces from the side, and from body 2 onto body 1."""
+    """Draw velocities and the creep force from the side, and creepages in the plane of the contact."""
     canvas = new_figure(7.0, 2.9)
     side, plane = canvas.subplots(1, 2)
     for axes in (side, plane):
@@ -23,7 +23,9 @@ def rolling_signs() -> Figure:
     return canvas
 
 
-def _arrow(axes: Axes, start: tuple[float, float], by: tuple[float, float], text: str, color: str, **look: float) -> None:
+def _arrow(
+    axes: Axes, start: tuple[float, float], by: tuple[float, float], text: str, color: str, **look: float
+) -> None:
     """Draw an arrow with a text at its end."""
     end = start[0] + by[0], start[1] + by[1]
     axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.4})

@@ -182,7 +182,7 @@ VARIABLES: dict[str, Variable] = {
         title="Twist", motion="twist", scale=("approach", -1), core="numbers", **_FRICTION,
     ),
     **_along(
-        "creepage_{}", _work, "1", "velocity of body 1 less that of body 2 along {} over the rolling velocity",
+        "creepage_{}", _work, "1", "velocity of body 1 less that of body 2 along {}, over that of rolling",
         title="Creepage", scale=("approach", -1), core="rolling",
     ),
     "spin": _work(

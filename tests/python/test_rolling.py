@@ -164,7 +164,12 @@ def test_a_run_in_the_middle_of_a_distance_resumes_to_the_same_bits(tmp_path: Pa
 def test_no_slip_is_the_linear_theory() -> None:
     creepages = scaled(-0.1, 0.0, 0.0)
     small, large = (
-        last(ball({"rolling": "steady", "creepage_x": k * creepages["creepage_x"]}, friction={"coefficient": math.inf}))
+        last(
+            ball(
+                {"rolling": "steady", "creepage_x": k * creepages["creepage_x"]},
+                friction={"coefficient": math.inf},
+            )
+        )
         for k in (1.0, 10.0)
     )
     assert large["tangential_load_x"] == pytest.approx(10 * small["tangential_load_x"], rel=1e-6)
@@ -177,7 +182,9 @@ def test_no_slip_is_the_linear_theory() -> None:
 # --- plane references ---------------------------------------------------------------------------------------
 
 
-def strip(spacings: int, length: float, friction: float, beta: float = 0.0) -> tuple[FrictionalContact, Lattice, float]:
+def strip(
+    spacings: int, length: float, friction: float, beta: float = 0.0
+) -> tuple[FrictionalContact, Lattice, float]:
     """Return a roller with p0 = a = E* = 1, nodes at the edges, cells 1:32; and its normal load."""
     ratio, h = 32, 1.0 / spacings
     rows, cols = round(length / 2 / (h * ratio)), round(1.15 * spacings)

@@ -162,7 +162,7 @@ class ContactState(NormalSolution):
         Of rolling bodies: velocity of body 1 less that of body 2 over the rolling velocity, and its
         rotation [1/m].
     creep_power, slip_power : float
-        Of rolling bodies, by distance: creep forces times creepages, and the energy that friction takes [J/m].
+        Of rolling bodies, by distance: creep forces times creepages, and the work of friction [J/m].
     """
 
     traction_x: Array

@@ -339,7 +339,16 @@ _Driven: Any = extended(
 
 
 _ROLLING = ("rolling", *CREEPAGES)
-_UNROLLED = ("shift_x", "shift_y", "twist", "ramp", "bulk_stress_xx", "bulk_stress_yy", "bulk_stress_xy", *MEANS)
+_UNROLLED = (
+    "shift_x",
+    "shift_y",
+    "twist",
+    "ramp",
+    "bulk_stress_xx",
+    "bulk_stress_yy",
+    "bulk_stress_xy",
+    *MEANS,
+)
 
 
 def _rolling_conflicts(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -401,7 +410,9 @@ class Segment(_Driven):
     ) = meaning(None, "fraction of the segment done at the end of each step, instead of `ramp`")
     label: Annotated[str, Text()] = meaning("", "name of the segment in the result", '"press"')
     rolling: Annotated[float | str, WordOr("steady", Quantity(LENGTH, above=0))] | None = meaning(
-        None, "the bodies roll: steady state, or the distance that they roll from the state before", '"steady"'
+        None,
+        "the bodies roll: steady state, or the distance that they roll from the state before",
+        '"steady"',
     )
     rolling_direction: Annotated[float, Quantity(ANGLE, at_least=-math.pi, at_most=math.pi)] | None = meaning(
         None, "angle from x of the direction that the contact travels in, a row of the lattice; 0 if absent"
@@ -423,7 +434,8 @@ class Segment(_Driven):
         known = cls.known_keys()
         # an unknown key may be that of the load
         if not whole and not any(
-            key in DRIVEN or key in MEANS or key in _ROLLING or (key not in known and not cls.meant(key)) for key in data
+            key in DRIVEN or key in MEANS or key in _ROLLING or (key not in known and not cls.meant(key))
+            for key in data
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():

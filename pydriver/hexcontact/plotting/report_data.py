@@ -214,7 +214,7 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return []
 
     def curves_of(names: Mapping[str, str], rolled: bool = False) -> dict[str, Any]:
-        """Return unit and values of quantities by the labels of their curves, of rolling steps alone or all."""
+        """Return unit and values of quantities by the labels of their curves, or of rolling steps alone."""
         chosen = rolled_steps(histories) if rolled else histories
         largest = max(peak(name, histories) for name in names)
         factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)

@@ -335,9 +335,7 @@ def rolled_out(steps: Sequence[LoadStep], spacing: Callable[[float], float]) -> 
         for number in range(1, count + 1):
             done += 1
             part = number / count
-            found.append(
-                replace(step, index=len(found), fraction=part, roll=step.roll._replace(done=done))
-            )
+            found.append(replace(step, index=len(found), fraction=part, roll=step.roll._replace(done=done)))
     return tuple(found)
 
 

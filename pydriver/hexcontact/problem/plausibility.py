@@ -365,7 +365,9 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
     largest = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
     slipping = max(largest, _NOTICED) if largest else 0.8 * (abs(case.pair.beta) > _ALIKE)
     targets = [(step.x, step.y, step.twist) for step in case.load_steps]
-    if case.rolls or any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
+    if case.rolls or any(
+        len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)
+    ):
         return slipping, None, None
     values = np.array([[target.value for target in motions] for motions in targets])
     scale = np.abs(values).max(axis=0)
@@ -380,7 +382,13 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
     """Yield the error by steps with nodes that enter the contact, these steps, and the needed number."""
     solver, mu, beta = case.solver, case.friction_coefficient, abs(case.pair.beta)
-    if solver.algorithm != "incremental" or solver.entry != "implicit" or not mu or case.adaptive or case.rolls:
+    if (
+        solver.algorithm != "incremental"
+        or solver.entry != "implicit"
+        or not mu
+        or case.adaptive
+        or case.rolls
+    ):
         return
     coupled = beta > _ALIKE and not math.isnan(mu)
     growing = list(_growing(case))

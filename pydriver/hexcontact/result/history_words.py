@@ -34,8 +34,7 @@ History = Mapping[str, Any]
 Extent = tuple[float, float]
 
 LOADS_AND_MOTIONS = {
-    name: (label_of(name), VARIABLES[name].units)
-    for name in (*names_where(lambda v: v.motion), *CREEPAGES)
+    name: (label_of(name), VARIABLES[name].units) for name in (*names_where(lambda v: v.motion), *CREEPAGES)
 }
 """Short name and unit of each load and motion, and of creepages and spin."""
 
@@ -73,7 +72,7 @@ def rolled_steps(histories: Iterable[History]) -> list[History]:
 
 
 def worth_showing(histories: Iterable[History]) -> list[str]:
-    """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise; of rolling bodies no shifts."""
+    """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise; no shifts while rolling."""
     histories = list(histories)
 
     hidden = _UNROLLED if rolls(histories[-1]) else ()

@@ -30,7 +30,7 @@ module hc_rolling
     !> Step from a node to the one ahead in a field that is a vector
     procedure :: stride
     !> Vector from a node to the one ahead
-    procedure :: spacing
+    procedure :: spacing => spacing_vector
     !> Slip over a spacing, before rigid motions, in place
     procedure :: subtract_ahead
     !> Values of the node ahead
@@ -79,14 +79,14 @@ contains
   end function stride
 
   !> Return the vector from a node to the one ahead [m].
-  pure function spacing(self, lattice)
+  pure function spacing_vector(self, lattice) result(vector)
     class(rolling_t), intent(in) :: self
     !> Lattice
     type(lattice_t), intent(in) :: lattice
-    real(wp) :: spacing(2)
+    real(wp) :: vector(2)
 
-    spacing = matmul(lattice%basis, real(self%ahead, wp))
-  end function spacing
+    vector = matmul(lattice%basis, real(self%ahead, wp))
+  end function spacing_vector
 
   !> Subtract the value of the node ahead, times the share. At the rim of the window, which no contact reaches, a value is one
   !> of another row, or stays.

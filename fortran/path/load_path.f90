@@ -14,7 +14,7 @@ module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, &
-                              separated, slip, stick, along_x, along_y, about_z
+                              separated, slip, stick
   use hc_contact_residuals, only: tangential_residual
   use hc_friction_law, only: friction_law_t
   use hc_rolling, only: rolling_t
@@ -23,6 +23,7 @@ module hc_load_path
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
   use hc_few_nodes, only: solve_step
+  use hc_rolled_step, only: check_rolling, begin_rolling, add_rolled_slip
   implicit none
   private
 
@@ -76,33 +77,37 @@ contains
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
     type(load_target_t) :: goal
-    real(wp), allocatable :: slipped(:, :, :), ahead(:, :, :)
+    real(wp), allocatable :: slipped(:, :, :)
+    real(wp), allocatable, target :: ahead(:, :, :)
+    real(wp), pointer, contiguous :: origin(:, :, :)
     logical :: at_once
     type(way_t) :: way
 
     call check_step(solver, state, target, settings, error)
     if (allocated(error)) return
     goal = target
-    if (target%rolling%rolls()) call begin_rolling(solver%problem, state, goal, ahead)
+    origin => state%relative_displacement
+    if (target%rolling%rolls()) then
+      call begin_rolling(solver%problem, state, goal, ahead)
+      origin => ahead
+    end if
     at_once = settings%static .or. target%rolling%rolls()
     if (.not. (at_once .or. settings%interpolated)) at_once = .not. solver%problem%space%max(state%pressure) > 0.0_wp
     allocate (slipped(0, 0, 0))
     if (settings%interpolated) slipped = 0.0_wp*state%relative_displacement
     from => state
     do
-      call solve_part(solver, state, from, between(state, goal, way%done + way%part), settings, at_once, next, error, ahead)
+      call solve_part(solver, origin, from, between(state, goal, way%done + way%part), settings, at_once, next, error)
       ! it is one of the whole step, and no second attempt begins with it
       if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
       way%work = way%work + next%operator_applications
       way%sweeps = way%sweeps + next%sweeps
       if (next%converged) then
-        if (target%rolling%rolls()) then
-          call add_rolled_slip(solver%problem, state, target%rolling, next)
-        else if (at_once) then
-          call add_slip(solver%problem, state, settings%static, next)
+        if (at_once) then
+          call add_slip(solver%problem, state, settings%static, target%rolling, next)
         else
-          call add_slip(solver%problem, from, settings%static, next)
+          call add_slip(solver%problem, from, settings%static, target%rolling, next)
         end if
         if (settings%interpolated) slipped = slipped + next%slip_increment
         way%done = way%done + way%part
@@ -127,6 +132,24 @@ contains
         way%part = 0.5_wp*way%part
       end if
     end do
+    call record_way(solver%problem, state, goal, way, at_once, slipped, next)
+  end subroutine advance
+
+  !> Record work, slip of all parts, and a way that ended at the rim of the window.
+  subroutine record_way(problem, state, goal, way, at_once, slipped, next)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: state
+    !> Loads or motions of the whole step
+    type(load_target_t), intent(in) :: goal
+    !> The way, and whether its parts only served as starts
+    type(way_t), intent(in) :: way
+    logical, intent(in) :: at_once
+    !> Slip of all parts, if it does not count from where nodes stood at the beginning [m]
+    real(wp), intent(in) :: slipped(:, :, :)
+    !> State at the end of the last part
+    type(contact_state_t), intent(inout) :: next
+
     next%cuts = way%cuts
     next%sweeps = way%sweeps
     next%operator_applications = way%work
@@ -134,14 +157,14 @@ contains
     if (.not. at_once .and. way%cuts > 0) then
       ! the slip of the step is that of all its parts
       next%slip_increment = next%relative_displacement - state%relative_displacement
-      if (settings%interpolated) next%slip_increment = slipped
-      call find_slip_residual(solver%problem, next)
+      if (size(slipped) > 0) next%slip_increment = slipped
+      call find_slip_residual(problem, next)
     end if
     if (way%done >= 1.0_wp) return
     next%converged = .false.
     next%stopped = rim_reached
-    call solver%problem%find_load_residuals(goal, next)
-  end subroutine advance
+    call problem%find_load_residuals(goal, next)
+  end subroutine record_way
 
   !> Refuse a load step whose target, settings or state are of no use.
   subroutine check_step(solver, state, target, settings, error)
@@ -158,15 +181,8 @@ contains
 
     call check_target(target%control, target%value, settings%tolerance, settings%max_sweeps, error)
     if (allocated(error)) return
-    if (target%rolling%rolls()) then
-      ! spin turns about a point half a spacing behind: a creepage across is known once the spin is
-      if (target%control(about_z) == force_control .and. any(target%control(along_x:along_y) /= force_control &
-                                                             .and. is_across(solver%problem, target%rolling))) then
-        call raise(error, status%invalid_input, 'the torque of rolling bodies: a tangential load across the direction of '// &
-                   'rolling expected, and no creepage')
-        return
-      end if
-    end if
+    call check_rolling(solver%problem, target, error)
+    if (allocated(error)) return
     if (settings%max_cuts < 0) then
       call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
       return
@@ -174,23 +190,14 @@ contains
     call check_state(state, solver%problem%lattice, error)
   end subroutine check_step
 
-  !> Return whether x and y have a part across the direction of rolling.
-  pure function is_across(problem, rolling)
-    type(friction_problem_t), intent(in) :: problem
-    type(rolling_t), intent(in) :: rolling
-    logical :: is_across(2)
-    real(wp) :: by(2)
-
-    by = rolling%spacing(problem%lattice)
-    is_across = abs([by(2), by(1)]) > sqrt(epsilon(1.0_wp))*norm2(by)
-  end function is_across
-
   !> Solve a part of a load step.
-  subroutine solve_part(solver, state, from, goal, settings, at_once, next, error, ahead)
+  subroutine solve_part(solver, origin, from, goal, settings, at_once, next, error)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
-    !> State at the beginning of the step, and at that of the part
-    type(contact_state_t), intent(in) :: state, from
+    !> Displacement that slip counts from where parts before only serve as starts (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous, target :: origin(:, :, :)
+    !> State at the beginning of the part
+    type(contact_state_t), intent(in) :: from
     !> Loads or motions at its end
     type(load_target_t), intent(in) :: goal
     !> How the step is solved
@@ -201,80 +208,19 @@ contains
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Rolling bodies: displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), allocatable, intent(in) :: ahead(:, :, :)
     real(wp), allocatable :: undeformed(:, :, :)
 
-    if (goal%rolling%rolls()) then
-      call solve_step(solver, from, ahead, goal, settings%tolerance, settings%max_sweeps, next, error)
-    else if (settings%static) then
-      allocate (undeformed, source=0.0_wp*state%relative_displacement)
+    if (settings%static) then
+      allocate (undeformed, source=0.0_wp*origin)
       call solve_step(solver, from, undeformed, goal, settings%tolerance, settings%max_sweeps, next, error)
     else if (at_once) then
-      call solve_step(solver, from, state%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
+      call solve_step(solver, from, origin, goal, settings%tolerance, settings%max_sweeps, next, error)
     else if (settings%interpolated) then
       call solve_with_entry(solver, from, goal, settings%tolerance, settings%max_sweeps, next, error)
     else
       call solve_step(solver, from, from%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
     end if
   end subroutine solve_part
-
-  !> Set shifts and twist over a spacing from creepages, and the displacement that slip counts from: that of the step before at
-  !> the node ahead, (K3); nothing in the steady state, (K4).
-  subroutine begin_rolling(problem, state, target, ahead)
-    type(friction_problem_t), intent(in) :: problem
-    !> State at the beginning of the step
-    type(contact_state_t), intent(in) :: state
-    !> Loads or creepages; then loads or motions
-    type(load_target_t), intent(inout) :: target
-    !> The displacement (n_col, n_row, 2) [m]
-    real(wp), allocatable, intent(out) :: ahead(:, :, :)
-    real(wp) :: creepage(3)
-    integer :: m
-
-    creepage = merge(0.0_wp, target%value(along_x:about_z), target%control(along_x:about_z) == force_control)
-    associate (value => target%value(along_x:about_z), free => target%control(along_x:about_z) == force_control)
-      value = merge(value, target%rolling%motions(problem%lattice, creepage), free)
-    end associate
-    ahead = state%relative_displacement
-    if (target%rolling%steady) then
-      ahead = 0.0_wp
-      return
-    end if
-    ahead = ahead + problem%rigid_displacement(state%motion)
-    do m = 1, 2
-      ahead(:, :, m) = target%rolling%shifted(ahead(:, :, m))
-    end do
-  end subroutine begin_rolling
-
-  !> Add slip path and dissipated energy of the way over a spacing, which move on with the surfaces; in the steady state those of a
-  !> point are what it gathers on its way through the contact.
-  subroutine add_rolled_slip(problem, before, rolling, state)
-    type(friction_problem_t), intent(in) :: problem
-    !> State at the beginning of the step
-    type(contact_state_t), intent(in) :: before
-    type(rolling_t), intent(in) :: rolling
-    !> State at its end
-    type(contact_state_t), intent(inout) :: state
-    real(wp) :: spent
-
-    state%accumulated_slip = norm2(state%slip_increment, dim=3)
-    state%dissipation_density = merge(0.0_wp, -sum(state%traction*state%slip_increment, dim=3), state%zone == stick)
-    spent = problem%lattice%cell_area()*sum(state%dissipation_density)
-    state%dissipated_energy = before%dissipated_energy
-    state%path_error = before%path_error
-    if (rolling%steady) then
-      call rolling%sum_behind(state%accumulated_slip)
-      call rolling%sum_behind(state%dissipation_density)
-    else
-      state%accumulated_slip = rolling%shifted(before%accumulated_slip) + state%accumulated_slip
-      state%dissipation_density = rolling%shifted(before%dissipation_density) + state%dissipation_density
-      state%dissipated_energy = before%dissipated_energy + spent
-    end if
-    state%creepage = rolling%creepages(problem%lattice, state%motion(along_x:about_z))
-    state%creep_power = -dot_product(state%load(along_x:about_z), state%creepage)
-    state%slip_power = spent/norm2(rolling%spacing(problem%lattice))
-  end subroutine add_rolled_slip
 
   !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.
   subroutine join_steps(problem, first, last)
@@ -303,17 +249,23 @@ contains
 
   !> Add slip path, dissipated energy of a step, sum of A (-q . ds) [J], and the bound on its error to those before; where a node
   !> sticks ds is nothing but rounding errors.
-  subroutine add_slip(problem, before, static, state)
+  subroutine add_slip(problem, before, static, rolling, state)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: before
     !> Nothing was before
     logical, intent(in) :: static
+    !> Rolling, if the bodies roll
+    type(rolling_t), intent(in) :: rolling
     !> State at its end
     type(contact_state_t), intent(inout) :: state
     real(wp) :: part(size(state%pressure, 2)), error(size(part)), spent(size(state%pressure, 1))
     integer :: row
 
+    if (rolling%rolls()) then
+      call add_rolled_slip(problem, before, rolling, state)
+      return
+    end if
     !$omp parallel do schedule(static) num_threads(problem%space%threads) private(spent)
     do row = 1, size(part)
       error(row) = row_error(problem%friction, row, before, state)

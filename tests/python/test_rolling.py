@@ -59,9 +59,9 @@ def scaled(xi: float, eta: float, phi: float) -> dict[str, float]:
     return {"creepage_x": xi * unit, "creepage_y": eta * unit, "spin": phi * unit / radius}
 
 
-def reference_rows() -> list[dict[str, str]]:
+def reference_rows(case: str = "nonlinear") -> list[dict[str, str]]:
     lines = [line for line in (REFERENCE / "rolling.csv").read_text().splitlines() if line[0] != "#"]
-    return [row for row in csv.DictReader(lines) if row["case"] == "nonlinear"]
+    return [row for row in csv.DictReader(lines) if row["case"] == case]
 
 
 @pytest.mark.parametrize(
@@ -177,6 +177,51 @@ def test_no_slip_is_the_linear_theory() -> None:
     radius = (0.75 * 100.0 * 0.01 / pair.effective_modulus) ** (1 / 3)
     c_11 = small["tangential_load_x"] / (-(radius**2) * 210e9 / 2.5 * creepages["creepage_x"])
     assert c_11 == pytest.approx(4.24, abs=0.06)  # at 8 spacings in the radius; 4.115 in the limit
+
+
+def coefficients(ratio: float, spacings: int) -> dict[str, float]:
+    """Return the coefficients of Kalker of an ellipse with nu = 0.25, by spacings in its smaller half-axis."""
+    along, across = math.sqrt(ratio), math.sqrt(1.0 / ratio)
+    h, rows = (
+        min(along, across) / spacings,
+        math.ceil(1.8 * max(along, across) / min(along, across) * spacings),
+    )
+    lattice = Lattice(h, -rows, -2 * rows, 2 * rows + 1, 4 * rows + 1, (0.3 * h, 0.2 * h))
+    square = (lattice.x / along) ** 2 + (lattice.y / across) ** 2
+    pressure = np.sqrt(np.maximum(1.0 - square, 0.0))
+    pair = ElasticPair(0.75 / math.pi, 0.0, 0.25 / math.pi)
+    closing = FlexibilityOperator(lattice, pair).apply(pressure)[0]
+    contact = FrictionalContact(
+        *(lattice, pair, 2.0 * closing.max() - closing, pressure > 0.0),
+        friction_coefficient=math.inf,
+        rim_warning=False,
+    )
+    load, c = (
+        pressure.sum() * lattice.cell_area,
+        math.sqrt((pressure > 0).sum() * lattice.cell_area / math.pi),
+    )
+    state, found = contact.virgin(), []
+    for creepage in ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)):
+        state = contact.advance(state, [F, D, D, D], [load, *creepage], rolling=STEADY)
+        assert state.converged
+        found.append((state.tangential_load_x, state.tangential_load_y, state.torque))
+    across_by_spin = 0.5 * (found[2][1] - found[1][2])  # C23 = -C32, but for the lattice
+    return {
+        "C11": found[0][0] / c**2,
+        "C22": found[1][1] / c**2,
+        "C23": across_by_spin / c**3,
+        "C33": found[2][2] / c**4,
+    }
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_coefficients_of_the_linear_theory(ratio: float) -> None:
+    coarse, fine = coefficients(ratio, 8), coefficients(ratio, 16)
+    rows = [row for row in reference_rows("linear") if (row["nu"], float(row["a/b"])) == ("0.25", ratio)]
+    assert len(rows) == 4
+    for row in rows:
+        limit = 2.0 * fine[row["quantity"]] - coarse[row["quantity"]]
+        assert limit == pytest.approx(float(row["own"]), abs=2 * float(row["uncertainty"])), row["quantity"]
 
 
 # --- plane references ---------------------------------------------------------------------------------------

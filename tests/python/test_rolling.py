@@ -180,7 +180,7 @@ def test_no_slip_is_the_linear_theory() -> None:
 
 
 def coefficients(ratio: float, spacings: int) -> dict[str, float]:
-    """Return the coefficients of Kalker of an ellipse with nu = 0.25, by spacings in its smaller half-axis."""
+    """Return the coefficients of Kalker of an ellipse, nu = 0.25, by spacings in its smaller half-axis."""
     along, across = math.sqrt(ratio), math.sqrt(1.0 / ratio)
     h, rows = (
         min(along, across) / spacings,

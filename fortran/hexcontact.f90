@@ -46,6 +46,7 @@ module hexcontact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_rolling, only: rolling_t, row_along
   use hc_load_path, only: advance, step_settings_t
   use hc_window_growth, only: grown_window, extend_state
   use hc_adaptive_path, only: adaptive_path_t, adaptive_steps_t, two_paths_t

@@ -155,6 +155,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "path_dependence": path_dependence,
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
     **runpy.run_path(str(HERE / "influence.py"))["FIGURES"],
+    **runpy.run_path(str(HERE / "rolling.py"))["FIGURES"],
 }
 
 

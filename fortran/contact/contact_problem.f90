@@ -13,6 +13,7 @@ module hc_contact_problem
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_rolling, only: rolling_t
   use hc_hierarchy, only: level_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t
@@ -301,6 +302,7 @@ contains
     !> State to be completed: its gap and relative displacement are w, u_x and u_y of its tractions (`displace`)
     type(contact_state_t), intent(inout) :: state
 
+    real(wp), allocatable :: over_spacing(:, :, :)
     real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2)
     integer :: row, m, n_contact
     logical :: finite
@@ -314,6 +316,7 @@ contains
       if (self%friction%is_bounded()) least = tolerance*self%tangential_compliance*self%friction%largest_bound(unit)
       unit = 1.0_wp/unit
     end if
+    if (target%rolling%steady) call slip_over_spacing(target%rolling, state%relative_displacement, over_spacing)
     finite = .true.
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m, remote) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
@@ -321,8 +324,9 @@ contains
       call self%rigid_displacement_row(state%motion, row, remote(:, 1), remote(:, 2))
       do m = 1, 2
         state%relative_displacement(:, row, m) = state%relative_displacement(:, row, m) - remote(:, m)
-        state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
-                                                state%pressure(:, row) > 0.0_wp)
+        state%slip_increment(:, row, m) = state%relative_displacement(:, row, m) - reference(:, row, m)
+        if (target%rolling%steady) state%slip_increment(:, row, m) = over_spacing(:, row, m) - remote(:, m)
+        state%slip_increment(:, row, m) = merge(state%slip_increment(:, row, m), 0.0_wp, state%pressure(:, row) > 0.0_wp)
       end do
       if (self%friction%resists()) then
         call self%friction%find_zones((row - 1)*size(state%zone, 1) + 1, unit, r, state%pressure(:, row), &
@@ -353,6 +357,23 @@ contains
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
   end subroutine complete_state
+
+  !> Compute the slip of steadily rolling bodies over a spacing, before rigid motions, from their displacement.
+  subroutine slip_over_spacing(rolling, displacement, slip)
+    type(rolling_t), intent(in) :: rolling
+    !> u (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: displacement(:, :, :)
+    !> u less u at the node ahead [m]
+    real(wp), allocatable, intent(out), target :: slip(:, :, :)
+    real(wp), pointer, contiguous :: along(:)
+    integer :: m
+
+    allocate (slip, source=displacement)
+    do m = 1, 2
+      along(1:size(slip(:, :, m))) => slip(:, :, m)
+      call rolling%subtract_ahead(size(slip, 1), along)
+    end do
+  end subroutine slip_over_spacing
 
   !> Compute the residuals of the loads that were prescribed.
   subroutine find_load_residuals(self, target, state)

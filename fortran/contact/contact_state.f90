@@ -4,6 +4,7 @@ module hc_contact_state
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
+  use hc_rolling, only: rolling_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: check_operator, normal, along_x, along_y
@@ -47,6 +48,8 @@ module hc_contact_state
                                     displacement_control, displacement_control]
     !> Load [N], torque [N m]; or approach, shift [m], twist [rad]; bulk strain
     real(wp) :: value(n_motion) = 0.0_wp
+    !> The bodies roll: shifts and twist are those over a spacing
+    type(rolling_t) :: rolling
   end type load_target_t
 
   !> A load step that is to be solved.
@@ -86,6 +89,9 @@ module hc_contact_state
     real(wp) :: load(n_motion) = 0.0_wp
     !> Approach, shifts [m] and twist [rad] of the remote parts; bulk strain of body 1 less that of body 2
     real(wp) :: motion(n_motion) = 0.0_wp
+    !> Rolling bodies: creepages along x and y, and spin [1/m]; creep forces times creepages, with the sign of a loss, and energy
+    !> that friction takes, by distance [J/m]
+    real(wp) :: creepage(3) = 0.0_wp, creep_power = 0.0_wp, slip_power = 0.0_wp
     !> Energy dissipated by friction so far, and bound on its error by the size of the load steps, (W4) [J]
     real(wp) :: dissipated_energy = 0.0_wp, path_error = 0.0_wp
     !> Residual of the contact conditions along the normal

@@ -180,6 +180,7 @@ contains
     self%operators => operators
     self%target = step%target
     self%tolerance = step%tolerance
+    operators%rolling = step%target%rolling
     self%pressure%operators => operators
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)

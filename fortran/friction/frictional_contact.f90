@@ -210,7 +210,9 @@ contains
     call copy_tractions(start, guess, self%problem%space)
     guessed = .false.
     if (size(self%operators) > 1) then
-      if (touching) then
+      if (touching .and. target%rolling%steady) then
+        ! the change of a coarser lattice is no start: slip is that over a spacing
+      else if (touching) then
         call predict(self%problem, self%coarse, self%operators(2:), start, step, guess, error, estimate)
         guessed = guess%converged
       else
@@ -270,11 +272,13 @@ contains
     end type field_t
     type(contact_state_t) :: state, coarser
     type(field_t), target :: origin(size(self%operators))
+    type(load_target_t) :: target
     real(wp), allocatable :: known(:, :, :)
     real(wp) :: work
     integer :: l
 
     work = 0.0_wp
+    target = step%target
     origin(2)%value = restrict_vector(self%problem%lattice, step%reference, self%coarse(2)%lattice)
     do l = 3, size(self%operators)
       origin(l)%value = restrict_vector(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
@@ -286,8 +290,9 @@ contains
         call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
         if (allocated(coarser%pressure)) call continue_from(self%coarse(l + 1), coarser, problem, state)
+        target%rolling%share = 0.5_wp**(l - 1)
         call solve_on_lattice(problem, self%operators(l), state, &
-                              load_step_t(step%target, origin(l)%value, problem%options%multilevel%nested_tolerance, &
+                              load_step_t(target, origin(l)%value, problem%options%multilevel%nested_tolerance, &
                                           step%max_sweeps), coarser, error, known, as_start=.true.)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()

@@ -46,6 +46,8 @@ contains
 
     options = now%problem%options%newton
     if (now%residual_tangential < options%front_residual) return
+    ! steadily rolling nodes move those behind them, too
+    if (now%target%rolling%steady) return
     ! nodes of slender cells are coupled beyond the reach of a relaxation node by node
     if (.not. all(now%problem%lattice%near_neighbors())) return
     ! a pressure that moves with the shear traction moves the fronts again

@@ -125,6 +125,8 @@ contains
 
     associate (problem => now%problem, options => now%problem%options%newton)
       known = .not. judged .or. step%tolerance >= options%carried_tolerance
+      ! steady rolling carries the slip of a spacing along, and not u
+      if (step%target%rolling%steady) known = .false.
       ! without friction no sweep finds u, which follows the pressure
       if (judged .and. .not. problem%friction%resists()) known = .false.
       if (.not. known) call now%forget()

@@ -75,6 +75,7 @@ contains
 
     self%operators => operators
     self%space = operators%space
+    self%symmetric = .not. operators%rolling%steady
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%medium)
     call self%reset_frames()
   end subroutine new_shear_system
@@ -333,7 +334,46 @@ contains
 
     associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
+      if (operators%rolling%steady) call sum_behind(self, nodes%pairs, z)
     end associate
   end subroutine shear_precondition_packed
+
+  !> Sum the differences between the tractions of nodes and of those ahead along the rows.
+  !>
+  !> With the shift Z to the node ahead B = T (1 - Z) = (1 - Z) T but for the rear of the contact, and (1 - Z)^-1 sums from its
+  !> front on. Slipping nodes, whose traction is known but for the component across, begin a new sum.
+  subroutine sum_behind(self, runs, z)
+    class(shear_system_t), intent(in) :: self
+    !> Nodes in contact, and which of them have a component along e
+    type(paired_runs_t), intent(in) :: runs
+    !> Traction along t and e at these nodes
+    real(wp), intent(inout), contiguous :: z(:)
+    real(wp), allocatable :: plane(:)
+    real(wp) :: own
+    integer :: n, k, i, m, at, to_ahead
+    logical :: forward
+
+    n = size(self%compliance)
+    allocate (plane(2*n), source=0.0_wp)
+    associate (n_t => runs%n_first, rolling => self%operators%rolling)
+      call self%put_in_plane(runs, z(:n_t), z(n_t + 1:), plane)
+      to_ahead = rolling%stride(self%operators%flexibility%lattice%extent(1))
+      forward = to_ahead > 0
+      do k = merge(size(runs%first), 1, forward), merge(1, size(runs%first), forward), merge(-1, 1, forward)
+        do i = merge(runs%last(k), runs%first(k), forward), merge(runs%first(k), runs%last(k), forward), merge(-1, 1, forward)
+          own = self%elastic_compliance/(self%elastic_compliance + self%compliance(i))
+          do m = 0, n, n
+            plane(m + i) = plane(m + i)/rolling%share
+            if (i + to_ahead >= 1 .and. i + to_ahead <= n) plane(m + i) = plane(m + i) + own*plane(m + i + to_ahead)
+          end do
+          at = runs%place(k) + i - runs%first(k)
+          z(at) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
+          if (runs%second(k) == 0) cycle
+          at = n_t + runs%second(k) + i - runs%first(k)
+          z(at) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
+        end do
+      end do
+    end associate
+  end subroutine sum_behind
 
 end module hc_shear_system

@@ -8,9 +8,10 @@ module hc_operator_set
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
+  use hc_rolling, only: rolling_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
-  use hc_flexibility, only: flexibility_t
+  use hc_flexibility, only: flexibility_t, normal
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_preconditioner, only: preconditioner_t
@@ -31,6 +32,8 @@ module hc_operator_set
     type(field_space_t) :: space
     !> Work of the preconditioners, in applications of the full operator
     real(wp) :: preconditioning = 0.0_wp
+    !> Steady rolling: tangential displacements are those over a spacing, u less u at the node ahead
+    type(rolling_t) :: rolling
   contains
     !> Displacements that given components of the traction cause along others
     procedure :: apply => apply_operators
@@ -111,12 +114,19 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
+    integer :: m, n_node
 
     associate (n => self%flexibility%lattice%extent)
       acting(1:n(1), 1:n(2), 1:size(from)) => traction
       wanted(1:n(1), 1:n(2), 1:size(onto)) => displacement
     end associate
     call self%flexibility%apply(from, acting, onto, wanted, error)
+    if (allocated(error) .or. .not. self%rolling%steady) return
+    n_node = self%flexibility%lattice%size()
+    do m = 1, size(onto)
+      if (onto(m) == normal) cycle
+      call self%rolling%subtract_ahead(self%flexibility%lattice%extent(1), displacement((m - 1)*n_node + 1:m*n_node))
+    end do
   end subroutine apply_operators
 
   !> Replace tractions, given as vectors, by the displacements along the same components.

@@ -46,7 +46,7 @@ contains
     integer :: low(2), high(2), try
 
     call solver%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
-    if (allocated(error) .or. state%converged .or. state%sliding) return
+    if (allocated(error) .or. state%converged .or. state%sliding .or. target%rolling%steady) return
     select type (solver)
     type is (direct_friction_t)
       return

@@ -17,11 +17,13 @@ module hc_load_path
                               separated, slip, stick
   use hc_contact_residuals, only: tangential_residual
   use hc_friction_law, only: friction_law_t
+  use hc_rolling, only: rolling_t
   use hc_step_error, only: turned_part
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
   use hc_few_nodes, only: solve_step
+  use hc_rolled_step, only: check_rolling, begin_rolling, add_rolled_slip
   implicit none
   private
 
@@ -74,19 +76,28 @@ contains
 
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
+    type(load_target_t) :: goal
     real(wp), allocatable :: slipped(:, :, :)
+    real(wp), allocatable, target :: ahead(:, :, :)
+    real(wp), pointer, contiguous :: origin(:, :, :)
     logical :: at_once
     type(way_t) :: way
 
     call check_step(solver, state, target, settings, error)
     if (allocated(error)) return
-    at_once = settings%static
+    goal = target
+    origin => state%relative_displacement
+    if (target%rolling%rolls()) then
+      call begin_rolling(solver%problem, state, goal, ahead)
+      origin => ahead
+    end if
+    at_once = settings%static .or. target%rolling%rolls()
     if (.not. (at_once .or. settings%interpolated)) at_once = .not. solver%problem%space%max(state%pressure) > 0.0_wp
     allocate (slipped(0, 0, 0))
     if (settings%interpolated) slipped = 0.0_wp*state%relative_displacement
     from => state
     do
-      call solve_part(solver, state, from, between(state, target, way%done + way%part), settings, at_once, next, error)
+      call solve_part(solver, origin, from, between(state, goal, way%done + way%part), settings, at_once, next, error)
       ! it is one of the whole step, and no second attempt begins with it
       if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
@@ -94,9 +105,9 @@ contains
       way%sweeps = way%sweeps + next%sweeps
       if (next%converged) then
         if (at_once) then
-          call add_slip(solver%problem, state, settings%static, next)
+          call add_slip(solver%problem, state, settings%static, target%rolling, next)
         else
-          call add_slip(solver%problem, from, settings%static, next)
+          call add_slip(solver%problem, from, settings%static, target%rolling, next)
         end if
         if (settings%interpolated) slipped = slipped + next%slip_increment
         way%done = way%done + way%part
@@ -110,7 +121,7 @@ contains
         if (next%sliding .and. way%done + way%part >= 1.0_wp) exit
         if (way%cuts >= settings%max_cuts) then
           ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
-          if (settings%static .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
+          if (settings%static .or. target%rolling%rolls() .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
           at_once = .false.
           from => state
           way%done = 0.0_wp
@@ -121,6 +132,24 @@ contains
         way%part = 0.5_wp*way%part
       end if
     end do
+    call record_way(solver%problem, state, goal, way, at_once, slipped, next)
+  end subroutine advance
+
+  !> Record work, slip of all parts, and a way that ended at the rim of the window.
+  subroutine record_way(problem, state, goal, way, at_once, slipped, next)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: state
+    !> Loads or motions of the whole step
+    type(load_target_t), intent(in) :: goal
+    !> The way, and whether its parts only served as starts
+    type(way_t), intent(in) :: way
+    logical, intent(in) :: at_once
+    !> Slip of all parts, if it does not count from where nodes stood at the beginning [m]
+    real(wp), intent(in) :: slipped(:, :, :)
+    !> State at the end of the last part
+    type(contact_state_t), intent(inout) :: next
+
     next%cuts = way%cuts
     next%sweeps = way%sweeps
     next%operator_applications = way%work
@@ -128,14 +157,14 @@ contains
     if (.not. at_once .and. way%cuts > 0) then
       ! the slip of the step is that of all its parts
       next%slip_increment = next%relative_displacement - state%relative_displacement
-      if (settings%interpolated) next%slip_increment = slipped
-      call find_slip_residual(solver%problem, next)
+      if (size(slipped) > 0) next%slip_increment = slipped
+      call find_slip_residual(problem, next)
     end if
     if (way%done >= 1.0_wp) return
     next%converged = .false.
     next%stopped = rim_reached
-    call solver%problem%find_load_residuals(target, next)
-  end subroutine advance
+    call problem%find_load_residuals(goal, next)
+  end subroutine record_way
 
   !> Refuse a load step whose target, settings or state are of no use.
   subroutine check_step(solver, state, target, settings, error)
@@ -152,6 +181,8 @@ contains
 
     call check_target(target%control, target%value, settings%tolerance, settings%max_sweeps, error)
     if (allocated(error)) return
+    call check_rolling(solver%problem, target, error)
+    if (allocated(error)) return
     if (settings%max_cuts < 0) then
       call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
       return
@@ -160,11 +191,13 @@ contains
   end subroutine check_step
 
   !> Solve a part of a load step.
-  subroutine solve_part(solver, state, from, goal, settings, at_once, next, error)
+  subroutine solve_part(solver, origin, from, goal, settings, at_once, next, error)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
-    !> State at the beginning of the step, and at that of the part
-    type(contact_state_t), intent(in) :: state, from
+    !> Displacement that slip counts from where parts before only serve as starts (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous, target :: origin(:, :, :)
+    !> State at the beginning of the part
+    type(contact_state_t), intent(in) :: from
     !> Loads or motions at its end
     type(load_target_t), intent(in) :: goal
     !> How the step is solved
@@ -178,10 +211,10 @@ contains
     real(wp), allocatable :: undeformed(:, :, :)
 
     if (settings%static) then
-      allocate (undeformed, source=0.0_wp*state%relative_displacement)
+      allocate (undeformed, source=0.0_wp*origin)
       call solve_step(solver, from, undeformed, goal, settings%tolerance, settings%max_sweeps, next, error)
     else if (at_once) then
-      call solve_step(solver, from, state%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
+      call solve_step(solver, from, origin, goal, settings%tolerance, settings%max_sweeps, next, error)
     else if (settings%interpolated) then
       call solve_with_entry(solver, from, goal, settings%tolerance, settings%max_sweeps, next, error)
     else
@@ -216,17 +249,23 @@ contains
 
   !> Add slip path, dissipated energy of a step, sum of A (-q . ds) [J], and the bound on its error to those before; where a node
   !> sticks ds is nothing but rounding errors.
-  subroutine add_slip(problem, before, static, state)
+  subroutine add_slip(problem, before, static, rolling, state)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: before
     !> Nothing was before
     logical, intent(in) :: static
+    !> Rolling, if the bodies roll
+    type(rolling_t), intent(in) :: rolling
     !> State at its end
     type(contact_state_t), intent(inout) :: state
     real(wp) :: part(size(state%pressure, 2)), error(size(part)), spent(size(state%pressure, 1))
     integer :: row
 
+    if (rolling%rolls()) then
+      call add_rolled_slip(problem, before, rolling, state)
+      return
+    end if
     !$omp parallel do schedule(static) num_threads(problem%space%threads) private(spent)
     do row = 1, size(part)
       error(row) = row_error(problem%friction, row, before, state)

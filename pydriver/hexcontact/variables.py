@@ -182,6 +182,23 @@ VARIABLES: dict[str, Variable] = {
         "rad", "rotation of body 2 relative to body 1 far away about z",
         title="Twist", motion="twist", scale=("approach", -1), core="numbers", **_FRICTION,
     ),
+    **_along(
+        "creepage_{}", _work, "1", "velocity of body 1 less that of body 2 along {}, over that of rolling",
+        title="Creepage", scale=("approach", -1), core="rolling",
+    ),
+    "spin": _work(
+        "rad/m", "angular velocity of body 1 less that of body 2 about z over the rolling velocity",
+        title="Spin", scale=("approach", -2), core="rolling",
+    ),
+    "creep_power": _work(
+        "J/m", "creep forces times creepages, and torque times spin, with the sign of a loss, by distance",
+        title="Frictional power", scale=("normal_load", 0), summary=9, core="rolling",
+    ),
+    "slip_power": _work(
+        "J/m", "energy that friction takes by rolled distance",
+        title="Frictional power", summary=10, core="rolling",
+    ),
+    "rolled_distance": _work("m", "distance that the bodies have rolled, step by step", **_FROM_0),
     **{
         f"bulk_strain_{axes}": _work(
             "1", f"bulk strain {axes} of body 1 less that of body 2", core="numbers", frictional=True
@@ -384,6 +401,17 @@ BULK_STRESS = names_where(lambda v: v.long_name.startswith("bulk stress "))
 
 LOADS = grouped(lambda name, v: v.motion)
 """The load and the displacement that drive each rigid motion. Decks have keys of the same names."""
+
+ROLLED = {
+    "z": LOADS["z"],
+    "x": ("tangential_load_x", "creepage_x"),
+    "y": ("tangential_load_y", "creepage_y"),
+    "twist": ("torque", "spin"),
+}
+"""The load and the motion of rolling bodies, for each rigid motion."""
+
+CREEPAGES = tuple(ROLLED[motion][1] for motion in ("x", "y", "twist"))
+"""Creepages and spin, which take the place of shifts and twist where bodies roll."""
 
 SUMMARY = tuple(sorted(names_where(lambda v: v.summary), key=lambda name: VARIABLES[name].summary))
 RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.core == "residuals")}

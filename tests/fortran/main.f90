@@ -31,6 +31,7 @@ program tester
   use test_edges, only: collect_edges
   use test_steps, only: collect_steps
   use test_periodic, only: collect_periodic
+  use test_rolling, only: collect_rolling
   use test_analytic, only: collect_analytic
   use test_fatigue, only: collect_fatigue
   implicit none
@@ -66,6 +67,7 @@ program tester
     new_suite('edges', collect_edges), &
     new_suite('steps', collect_steps), &
     new_suite('periodic', collect_periodic), &
+    new_suite('rolling', collect_rolling), &
     new_suite('analytic', collect_analytic), &
     new_suite('fatigue', collect_fatigue) &
   ]

@@ -201,7 +201,7 @@ def test_all_draws_what_there_is(folder: Path, tmp_path: Path, monkeypatch: pyte
     code, out, _ = plot(folder / "sheared.nc", "-w", "all", "--step", "3", "-o", tmp_path / "s.png")
     assert code == 0
     left_out = re.findall(r"left out: (\w+)", out)
-    assert sorted(left_out) == ["fatigue", "lines", "torsion", "wear", "worn_depth"]
+    assert sorted(left_out) == ["creep", "fatigue", "lines", "torsion", "wear", "worn_depth"]
     written = {path.stem[2:] for path in tmp_path.glob("s_*")}
     assert written == set(plotting.FIGURES) - {*left_out, "compliance"}
     result = open_result(folder / "sheared.nc")

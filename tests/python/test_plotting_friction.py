@@ -186,6 +186,35 @@ def torsion() -> xarray.Dataset:
     return made([PRESSED, *steps])
 
 
+def rolling() -> xarray.Dataset:
+    """Return a pressed contact that then creeps, along x and with a spin in the last step."""
+    still = dict.fromkeys(("creepage_x", "creepage_y", "spin", "creep_power", "slip_power"), 0.0)
+    steps = [
+        Made(
+            history={
+                **still,
+                "tangential_load_x": load * SLIDING,
+                "creepage_x": -creepage,
+                "rolled_distance": 0.0,
+                "torque": torque,
+                "segment": 2 + (torque != 0.0),
+            }
+        )
+        for load, creepage, torque in ((0.3, 0.1, 0.0), (0.5, 0.2, 0.0), (0.45, 0.2, -0.02))
+    ]
+    pressed = Made(history={**still, "rolled_distance": np.nan})
+    return made([pressed, *steps])
+
+
+def test_creep_forces_are_drawn_over_the_creepage_segment_by_segment() -> None:
+    [force, torque] = [line for line in plotting.creep(rolling()).axes[0].lines if len(line.get_xdata()) > 2]
+    np.testing.assert_allclose(force.get_xdata(), [-0.1, -0.2, np.nan, -0.2])
+    np.testing.assert_allclose(force.get_ydata(), [0.3, 0.5, np.nan, 0.45])
+    assert [line.get_label() for line in (force, torque)] == ["Qx", "Mz / radius"]
+    with pytest.raises(ValueError, match="in place of shifts"):
+        plotting.loop(rolling())
+
+
 def frictionless() -> xarray.Dataset:
     result = made([PRESSED], algorithm="frictionless", friction_coefficient=0.0)
     return result.drop_vars(
@@ -921,7 +950,9 @@ def worn() -> xarray.Dataset:
 
 
 SUITABLE = {
-    name: {"torque": torsion, "wear": worn}.get("wear" if name == "worn_depth" else entry.needs, dissimilar)
+    name: {"torque": torsion, "wear": worn, "rolling": rolling}.get(
+        "wear" if name == "worn_depth" else entry.needs, dissimilar
+    )
     for name, entry in entries().items()
     if entry.shows == "result"
 }
@@ -986,6 +1017,7 @@ NEEDS_FRICTION = {
     "zones": "a contact without friction has no stick and slip zones",
     "outlines": "a contact without friction has no stick and slip zones",
     "loop": "a contact without friction has no tangential load",
+    "creep": "the bodies do not roll",
     "torsion": "there is no torque in this result",
     "fatigue": "the deck has no table",
     "lines": "the deck has no table",

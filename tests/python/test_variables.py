@@ -33,7 +33,7 @@ def test_quantities_of_a_group_are_drawn_and_stored_alike(groups: dict[str, tupl
 
 
 def test_the_arrays_of_the_core_hold_a_contact_state_and_its_measures() -> None:
-    names = [name for part in ("fields", "zone", "numbers", "residuals") for name in CORE[part]]
+    names = [name for part in ("fields", "zone", "numbers", "rolling", "residuals") for name in CORE[part]]
     known = [entry.name for entry in fields(ContactState)]
     assert set(names) <= set(known)
     assert not set(CORE["measures"]) & set(known)
@@ -59,8 +59,9 @@ def test_each_rigid_motion_has_a_load_and_a_displacement() -> None:
 
 
 def test_noise_is_judged_beside_quantities_of_the_same_unit() -> None:
-    powers = {"m": 1, "rad": 0, "N": 0, "N m": 1, "J": 1}
-    forces = {"N": True, "N m": True, "J": True, "m": False, "rad": False}
+    powers = {"m": 1, "rad": 0, "N": 0, "N m": 1, "J": 1, "1": 0, "rad/m": -1, "J/m": 0}
+    forces = {"N": True, "N m": True, "J": True, "J/m": True}
+    forces |= dict.fromkeys(("m", "rad", "1", "rad/m"), False)
     for name, variable in VARIABLES.items():
         beside, power = variable.scale
         if beside:

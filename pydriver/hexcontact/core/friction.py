@@ -81,6 +81,37 @@ class FrictionLaw:
         return np.where(bounds < np.finfo(float).max, bounds, math.inf)
 
 
+def row_ahead(lattice: Lattice, direction: float) -> list[int]:
+    """Return columns and rows from a node to the next one along a direction (rad), zero if there is none."""
+    return [int(count) for count in flat.row_ahead(lattice, direction)]
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """The contact travels over both bodies along a row of the lattice.
+
+    Parameters
+    ----------
+    direction
+        Angle of rolling from x [rad].
+    steady
+        Whether the steady state is solved at once; else the contact moves on by one spacing.
+    """
+
+    direction: float = 0.0
+    steady: bool = True
+
+    def ahead(self, lattice: Lattice) -> list[int]:
+        """Return columns and rows from a node to the one ahead."""
+        found = row_ahead(lattice, self.direction)
+        if not any(found):
+            raise DeckError(
+                f"rolling_direction = {math.degrees(self.direction):g} deg: expected the direction of a row "
+                "of the lattice"
+            )
+        return found
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ContactState(NormalSolution):
     """The end of a load step, from which the next one starts.
@@ -127,6 +158,11 @@ class ContactState(NormalSolution):
     residual_torque: float = 0.0
     sliding: bool = False
     cuts: int = 0
+    creepage_x: float = 0.0
+    creepage_y: float = 0.0
+    spin: float = 0.0
+    creep_power: float = 0.0
+    slip_power: float = 0.0
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
@@ -187,6 +223,7 @@ class FrictionalContact(Contact):
         *,
         bulk_strain: ArrayLike | None = None,
         guess: tuple[ArrayLike, Sequence[float]] | None = None,
+        rolling: Rolling | None = None,
         static: bool = False,
         entry: Entry = "implicit",
         tolerance: float = 1e-8,
@@ -208,6 +245,8 @@ class FrictionalContact(Contact):
         guess
             Tractions on body 1, ``(3, n_row, n_col)`` [Pa], and motions (as `MOTION`) that the step is
             likely to end with: it is tried from there first.
+        rolling
+            The bodies roll: displacements along x and y and about z are creepages and the spin [1/m].
         static
             The load is applied to the undeformed bodies at once; `state` is the first guess.
         entry
@@ -237,11 +276,13 @@ class FrictionalContact(Contact):
             raise DeckError(f"normal_load = {targets[0]:g}: expected a number not below zero")
         kept = [getattr(state, name) for name in BULK_STRAIN]
         strain = reals(kept if bulk_strain is None else bulk_strain, "bulk_strain", (3,))
+        ahead = [0, 0] if rolling is None else rolling.ahead(self.lattice)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
         handle = self.called(
             *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
-            *(entry == "interpolated", *limits, self._held(state)),
+            *(entry == "interpolated", *limits),
+            *(ahead, rolling is not None and rolling.steady, self._held(state)),
         )
         found = self.solution(handle)
         self._warn_of_rim(found)

@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
-from ..variables import BULK_STRESS, FIELDS, LOADS
+from ..variables import BULK_STRESS, CREEPAGES, FIELDS, LOADS, ROLLED
 from . import measured, rough  # noqa: F401 (their shapes)
 from .below import Fatigue, Stress
 from .faults import Mistake
@@ -40,7 +40,7 @@ from .kinds import (
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, Separation, Surface, SurfaceKind
 from .table_base import Table, extended, meaning, problems_of
-from .units import ANGLE, LENGTH, NUMBER, PRESSURE, Dimension
+from .units import ANGLE, LENGTH, NUMBER, PRESSURE, SPIN, Dimension
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
@@ -355,11 +355,48 @@ _Driven: Any = extended(
 )
 
 
+_ROLLING = ("rolling", *CREEPAGES)
+_UNROLLED = (
+    "shift_x",
+    "shift_y",
+    "twist",
+    "ramp",
+    "bulk_stress_xx",
+    "bulk_stress_yy",
+    "bulk_stress_xy",
+    *MEANS,
+)
+
+
+def _rolling_conflicts(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Refuse creepages beside their loads and without rolling, and keys that mean nothing beside rolling."""
+    pairs = [(load, motion) for load, motion in ROLLED.values() if motion in CREEPAGES]
+    if "rolling" not in data:
+        for key in ("rolling_direction", *CREEPAGES):
+            if key in data:
+                yield key, 'needs rolling beside it: "steady", or a distance'
+        return
+    for force, creepage in pairs:
+        if force in data and creepage in data:
+            yield creepage, f"expected {force} or {creepage}, not both"
+    for key in _UNROLLED:
+        if key in data and not (key == "ramp" and data[key] == "linear"):
+            yield key, "expected nothing beside rolling, which takes creepages, spin or loads"
+    if data["rolling"] != "steady":
+        for key in ("steps", "values"):
+            if key in data:
+                yield key, "expected nothing beside a rolled distance, which takes a step for each spacing"
+    elif data.get("steps") == "auto":
+        yield "steps", "expected a number beside rolling"
+
+
 class Segment(_Driven):
     """A segment of the load history: every load ramps from its current value to the one given here."""
 
     schema_of_all: ClassVar[Schema] = {
-        "allOf": [{"not": {"required": list(pair)}} for pair in LOADS.values()]
+        "allOf": [
+            {"not": {"required": list(pair)}} for pair in dict.fromkeys((*LOADS.values(), *ROLLED.values()))
+        ]
     }
 
     mean_pressure: Annotated[float, Quantity(PRESSURE, at_least=0)] | None = meaning(
@@ -389,6 +426,23 @@ class Segment(_Driven):
         Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "[0.1, 0.4, 1]")] | None
     ) = meaning(None, "fraction of the segment done at the end of each step, instead of `ramp`")
     label: Annotated[str, Text()] = meaning("", "name of the segment in the result", '"press"')
+    rolling: Annotated[float | str, WordOr("steady", Quantity(LENGTH, above=0))] | None = meaning(
+        None,
+        "the bodies roll: steady state, or the distance that they roll from the state before",
+        '"steady"',
+    )
+    rolling_direction: Annotated[float, Quantity(ANGLE, at_least=-math.pi, at_most=math.pi)] | None = meaning(
+        None, "angle from x of the direction that the contact travels in, a row of the lattice; 0 if absent"
+    )
+    creepage_x: Annotated[float, Quantity(NUMBER)] | None = meaning(
+        None, "velocity of body 1 less that of body 2 along x over the rolling velocity", "-0.001"
+    )
+    creepage_y: Annotated[float, Quantity(NUMBER)] | None = meaning(
+        None, "the same along y; creepages and spin that are not named are 0, or those before", "0.001"
+    )
+    spin: Annotated[float, Quantity(SPIN)] | None = meaning(
+        None, "angular velocity of body 1 less that of body 2 about z over the rolling velocity"
+    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -397,7 +451,8 @@ class Segment(_Driven):
         known = cls.known_keys()
         # an unknown key may be that of the load
         if not whole and not any(
-            key in DRIVEN or key in MEANS or (key not in known and not cls.meant(key)) for key in data
+            key in DRIVEN or key in MEANS or key in _ROLLING or (key not in known and not cls.meant(key))
+            for key in data
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():
@@ -405,6 +460,7 @@ class Segment(_Driven):
             found = [key for key in (force, displacement, *meant) if key in data]
             if found[1:]:
                 yield found[1], f"expected {found[0]} or {found[1]}, not both"
+        yield from _rolling_conflicts(data)
         if data.get("ramp") == "cubic" and not {"normal_load", "mean_pressure"} & data.keys():
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
         if "values" in data and data.get("ramp", "linear") != "linear":

@@ -488,6 +488,9 @@ class WordOr(Kind):
         return value if value == self.word else self.kind.written(value)
 
     def _parse(self, value: object) -> Any:
-        if isinstance(value, str):
-            return value if value == self.word else refuse(f"expected {self.expected}")
+        if value == self.word:
+            return value
+        measured = isinstance(self.kind, Quantity) and isinstance(value, str) and any(map(str.isdigit, value))
+        if isinstance(value, str) and not measured:
+            refuse(f"expected {self.expected}")
         return self.kind.parse(value)

@@ -2,8 +2,8 @@
 
 Power spectral density over the wave vector k: constant for 2π/longest <= k < 2π/rolloff, then falling like
 k^(-2(1 + H)) up to 2π/shortest, zero elsewhere (B. N. J. Persson et al., J. Phys.: Condens. Matter 17, 2005,
-R1). Amplitudes are Gaussian. Longer waves come first from the random numbers, so that a shorter `shortest` adds
-waves and changes none.
+R1). Amplitudes are Gaussian. Longer waves come first from the random numbers, so that a smaller `shortest`
+adds waves and changes none.
 """
 
 from __future__ import annotations

@@ -33,6 +33,7 @@ FORCE = Dimension("a force", "N", '"10 N"')
 TORQUE = Dimension("a torque", "N m", '"2 N mm"')
 ANGLE = Dimension("an angle with its unit", "rad", '"30 deg"', bare=False)
 NUMBER = Dimension("a number", "", "0.3")
+SPIN = Dimension("a spin", "rad/m", '"2 rad/m"')
 
 # Decimal exponents of common units, by the SI unit of their dimension.
 _METRIC = {

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from .maps import field_map, pressure_field
 from .sections import section, tractions, wear
 from .zones import contact_boundary, outlines, zones
-from .history import compliance, history, loop, torsion
+from .history import compliance, creep, history, loop, torsion
 from .below import fatigue, lines, stress, trailing_edge
 from .overview import overview
 from .surface import surface
@@ -27,6 +27,7 @@ __all__ = [
     "FIGURES",
     "compliance",
     "contact_boundary",
+    "creep",
     "fatigue",
     "field_map",
     "history",

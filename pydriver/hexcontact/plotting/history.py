@@ -21,11 +21,12 @@ from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
 from ..text import quantity, scaled, worded
-from ..variables import PANELS, SUMMARY, VARIABLES, names_where, spelled
+from ..variables import CREEPAGES, PANELS, SUMMARY, VARIABLES, label_of, names_where, spelled
 from . import style
 from .registry import SEVERAL_RUNS, figure
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
+_UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
@@ -216,6 +217,8 @@ def loop(
     dataset = _before_wear(dataset_of(result))
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
         raise NotInResult("a contact without friction has no tangential load")
+    if CREEPAGES[0] in dataset:
+        raise NotInResult("rolling bodies have creepages in place of shifts; expected creep")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
     if direction is None:
@@ -240,6 +243,45 @@ def loop(
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
     axes.legend(handles=style.handles_of(axes))
+    style.set_title(canvas, title_of(dataset), ax)
+    return canvas
+
+
+@figure("creep", "creep forces against creepage", needs="rolling")
+def creep(result: Result | Dataset, ax: Axes | None = None) -> Figure:
+    """Draw creep forces and torque of rolling bodies against the creepage, or spin, that changes most.
+
+    Forces are relative to friction times normal load, the torque to that times the contact radius.
+    """
+    dataset = dataset_of(result)
+    if CREEPAGES[0] not in dataset:
+        raise NotInResult("the bodies do not roll in this result")
+    dataset = dataset.isel(step=np.flatnonzero(np.isfinite(values_of(dataset, "rolled_distance"))))
+    length = {"spin": values_of(dataset, "contact_radius").max()}
+    spans = {name: float(np.ptp(values_of(dataset, name))) * length.get(name, 1.0) for name in CREEPAGES}
+    over = max(spans, key=lambda name: spans[name])
+    mu = float(dataset.attrs.get("friction_coefficient", np.nan))
+    scale = (mu if np.isfinite(mu) and mu > 0.0 else 1.0) * values_of(dataset, "normal_load")
+    canvas, axes = style.drawing(ax, 4.6, 3.6)
+    factor, unit = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
+    ends = np.flatnonzero(np.diff(dataset["segment"].values)) + 1  # a line for each segment
+    looks = (
+        (style.COMPUTED, "o", "tangential_load_x"),
+        (style.EXACT, "s", "tangential_load_y"),
+        (style.THIRD, "^", "torque"),
+    )
+    for color, mark, name in looks:
+        arm = values_of(dataset, "contact_radius") if name == "torque" else 1.0
+        values = values_of(dataset, name) / (scale * arm)
+        if np.abs(values).max(initial=0.0) > _UNSEEN:
+            label = label_of(name) + (" / radius" if name == "torque" else "")
+            place = np.insert(values_of(dataset, over) * factor, ends, np.nan)
+            axes.plot(place, np.insert(values, ends, np.nan), color=color, marker=mark, ms=3, label=label)
+    for line in (axes.axhline, axes.axvline):
+        line(0.0, color=style.GUIDE, lw=0.5, zorder=0)
+    axes.set(xlabel=style.titled(spelled(over), unit), ylabel=r"load / $\mu P$")
+    axes.legend(handles=style.handles_of(axes))
+    axes.grid(color="0.9", lw=0.5)
     style.set_title(canvas, title_of(dataset), ax)
     return canvas
 

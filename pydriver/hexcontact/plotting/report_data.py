@@ -14,12 +14,12 @@ import matplotlib
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..result.history_words import step_rows
+from ..result.history_words import rolled_steps, rolls, step_rows
 from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from ..text import scaled, worded
-from ..variables import LOADS, MAPS, RESIDUALS, TRACTIONS, VARIABLES, spelled
+from ..variables import LOADS, MAPS, RESIDUALS, ROLLED, TRACTIONS, VARIABLES, spelled
 from .history import panels_of, peak
 from .maps import Limits, Part
 from .sections import line_of
@@ -213,12 +213,15 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     if len(histories) < 2:
         return []
 
-    def curves_of(names: Mapping[str, str]) -> dict[str, Any]:
-        """Return unit and values of quantities by the labels of their curves."""
+    def curves_of(names: Mapping[str, str], rolled: bool = False) -> dict[str, Any]:
+        """Return unit and values of quantities by the labels of their curves, or of rolling steps alone."""
+        chosen = rolled_steps(histories) if rolled else histories
         largest = max(peak(name, histories) for name in names)
         factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
         values = {
-            word: rounded([factor * float(v) for v in (VARIABLES[n].before, *(h[n] for h in histories))], 5)
+            word: rounded(
+                [VARIABLES[n].before * factor] * (not rolled) + [factor * float(h[n]) for h in chosen], 5
+            )
             for n, word in names.items()
         }
         return {"unit": unit, "curves": values}
@@ -228,13 +231,14 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     over: dict[str, Any] = {"x": steps, "xlabel": "load step"}
     charts = [{"title": title, **over, **curves_of(names)} for title, names in panels.items()]
     shown = {name for names in panels.values() for name in names}
-    for motion, (load, way) in LOADS.items():
+    rolling = rolls(histories[-1])
+    for motion, (load, way) in (ROLLED if rolling else LOADS).items():
         if motion != "z" and {load, way} <= shown:
             title = f"{VARIABLES[load].title} over {VARIABLES[way].title.lower()}"
-            along = curves_of({way: ""})
+            along = curves_of({way: ""}, rolling)
             title += f", {motion}" if motion in "xy" else ""
             axis = {"x": along["curves"][""], "xlabel": f"{spelled(way)} ({along['unit']})"}
-            charts.append({"title": title, **axis, **curves_of({load: ""}), "points": True})
+            charts.append({"title": title, **axis, **curves_of({load: ""}, rolling), "points": True})
     known = {name: sign for sign, name in RESIDUALS.items() if name in histories[0]}
     residuals = {name: sign for name, sign in known.items() if peak(name, histories)}
     found = curves_of(residuals) if residuals else {"unit": "", "curves": {}}

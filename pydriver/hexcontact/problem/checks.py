@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..core.lattice import Lattice
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
-from ..deck.keys import MEANS, Deck, Solver
+from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
-from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, LOADS, WORN
+from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, WORN
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
 
 _THINNEST = 0.1  # layer over spacing, from which the sums of a periodic window end
+_ALONG = 1e-8  # sine of an angle between directions that are one
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
 
@@ -51,6 +52,8 @@ def checked(
         algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
         solver = solver.model_copy(update={"algorithm": algorithm})
         found += _mistakes(tables, _law_problems(tables, mu, algorithm))
+        if "load" in tables and "grid" in tables:
+            tables["grid"] = _turned(tables["grid"], tables["load"])
         if "load" in tables:
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
             period = repeating.period if repeating else _SOME_PERIOD
@@ -58,6 +61,7 @@ def checked(
             found += against
             if {"grid", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
                 found += _mistakes(tables, _period_problems(tables, steps))
+                found += _mistakes(tables | {"solver": solver}, _rolling_problems(tables, solver))
         if {"output", "wear"} <= tables.keys():
             found += _mistakes(tables, _field_problems(tables, algorithm))
     if steps and tables.get("wear"):
@@ -159,6 +163,65 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
                 yield ("load", place, "mean_gap"), sentence
 
 
+def _segments(loads: Sequence[Load]) -> Iterator[tuple[tuple[str | int, ...], Segment]]:
+    """Yield the segments of the entries of [[load]] that stand in the deck, with their keys."""
+    for place, load in enumerate(loads):
+        if load.path is None:
+            yield ("load", place), load
+        for number, segment in enumerate(load.path or ()):
+            yield ("load", place, "path", number), segment
+
+
+def _turned(grid: Grid, loads: Sequence[Load]) -> Grid:
+    """Return a grid with a row along the first direction of rolling, unless the deck gives its direction."""
+    for _, segment in _segments(loads):
+        if segment.rolling is not None and grid.direction is None:
+            return grid.model_copy(update={"direction": segment.rolling_direction or 0.0})
+    return grid
+
+
+def _rolling_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
+    """Yield tables and keys that rolling bodies refuse."""
+    rolling = [(key, segment) for key, segment in _segments(tables["load"]) if segment.rolling is not None]
+    if not rolling:
+        return
+    beside = "beside rolling"
+    if tables["grid"].periodic:
+        yield ("grid", "boundary"), f'expected "free" {beside}: the contact has a front and a rear'
+    if solver.algorithm != "incremental":
+        yield ("solver", "algorithm"), f'expected "incremental" with friction {beside}'
+    if solver.entry != "implicit":
+        yield ("solver", "entry"), f'expected "implicit" {beside}, whose steps are a spacing long'
+    if solver.method == "direct" and any(segment.rolling == "steady" for _, segment in rolling):
+        yield ("solver", "method"), 'expected "fft" beside steady rolling, whose equations are not symmetric'
+    for name, reason in {
+        "bulk": "a bulk strain does not travel with the contact",
+        "wear": "its cycles are loads that return",
+        "fatigue": "its cycles are loads that return",
+        "accuracy": "",
+        "interface": "",
+    }.items():
+        if tables.get(name):
+            yield (name,), f"is not available {beside}" + (f": {reason}" if reason else " yet")
+    for key, segment in rolling:
+        if segment.torque is not None:
+            angle = segment.rolling_direction or 0.0
+            for axis, part in (("x", math.sin(angle)), ("y", math.cos(angle))):
+                force = f"tangential_load_{axis}"
+                if abs(part) > _ALONG and getattr(segment, force) is None:
+                    yield (*key, "torque"), f"expected {force} beside it, and no creepage across"
+
+
+def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> Mistake | None:
+    """Return the fault of a direction of rolling that is no row of the lattice, with 0 as its spacing."""
+    for key, segment in _segments(loads):
+        if segment.rolling is not None and not spacing(segment.rolling_direction or 0.0):
+            degrees = f"{math.degrees(segment.rolling_direction or 0.0):g} deg"
+            sentence = "expected the direction of a row of the lattice; or remove grid.direction"
+            return Mistake((*key, "rolling_direction"), degrees, sentence)
+    return None
+
+
 def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
     """Yield mistakes with the values of their keys, unless these are absent or tables."""
     for key, sentence in found:
@@ -243,7 +306,8 @@ def _field_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
 def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
     """Yield faults of stresses: of a rigid body, without the fields of the surface, of equal names."""
     names: set[str] = set()
-    last = 0 if any(step.ramp is not None for step in steps) else len(steps)
+    open_ended = any(step.ramp is not None or (step.roll and not step.roll.steady) for step in steps)
+    last = 0 if open_ended else len(steps)
     stages = [stage_of(step) for step in steps] if tables["fatigue"] else []
     output, bodies = tables["output"], tables["body"]
     frictional = coulomb(tables.get("friction"), tables.get("interface")) is not None
@@ -303,7 +367,7 @@ def _cycle_problems(
 def stage_of(step: LoadStep) -> Stage:
     """Return segment, label and known loads of a load step."""
     targets = zip(MOTIONS, step.targets, strict=True)
-    known = {LOADS[m][t.control == "displacement"]: t.value for m, t in targets if not t.from_start}
+    known = {step.drives[m][t.control == "displacement"]: t.value for m, t in targets if not t.from_start}
     return step.segment, step.label, known | dict(zip(BULK_STRESS, step.bulk, strict=True))
 
 

@@ -7,7 +7,7 @@ segment does not name keeps its control and its value. See "control" in the deck
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any, Literal, NamedTuple
@@ -16,7 +16,7 @@ from ..deck.faults import MISSING, Mistake
 from ..deck.keys import MEANS, Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
 from ..deck.series import MOST_STEPS
-from ..variables import BULK_STRESS, LOADS
+from ..variables import BULK_STRESS, LOADS, ROLLED
 
 Control = Literal["force", "displacement"]
 Motion = Literal["z", "x", "y", "twist"]
@@ -40,6 +40,19 @@ class Target(NamedTuple):
         return self.value + self.from_start * start
 
 
+class Roll(NamedTuple):
+    """Rolling during a load step."""
+
+    direction: float  # angle from x of the direction that the contact travels in (rad)
+    distance: float = 0.0  # distance that the bodies roll (m); 0: the steady state
+    done: int = 0  # spacings that they have rolled at the end of the step, over the whole history
+
+    @property
+    def steady(self) -> bool:
+        """Whether the steady state is solved at once."""
+        return not self.distance
+
+
 class Ramp(NamedTuple):
     """The way of the loads in a segment."""
 
@@ -56,7 +69,8 @@ class Ramp(NamedTuple):
     def target(self, motion: Motion, fraction: float) -> Target:
         """Return the target of a motion at a fraction of the segment."""
         segment, start = self.segment, self.start[motion]
-        force, displacement = (getattr(segment, key) for key in LOADS[motion])
+        drives = ROLLED if segment.rolling else LOADS
+        force, displacement = (getattr(segment, key) for key in drives[motion])
         if force is None and displacement is None:
             return start
         goal = Target("displacement", displacement) if force is None else Target("force", force)
@@ -97,6 +111,12 @@ class LoadStep:
     fraction: float = 1.0  # fraction of the segment at the end of the step
     ramp: Ramp | None = None  # the ramp of a segment in chosen increments
     bulk: Stress = (0.0, 0.0, 0.0)  # bulk stress xx, yy, xy (Pa)
+    roll: Roll | None = None  # rolling; motions along x and y and about z are creepages and spin
+
+    @property
+    def drives(self) -> Mapping[Any, tuple[str, ...]]:
+        """Load and motion that drive each rigid motion."""
+        return LOADS if self.roll is None else ROLLED
 
     def until(self, fraction: float) -> LoadStep:
         """Return the part of an adaptive segment that ends at a fraction of it."""
@@ -112,7 +132,7 @@ class LoadStep:
     def values(self, begun: Mapping[str, float]) -> tuple[float, ...]:
         """Return the prescribed values for z, x, y and the twist."""
         return tuple(
-            target.at(begun[LOADS[motion][target.control == "displacement"]])
+            target.at(begun[self.drives[motion][target.control == "displacement"]])
             for motion, target in zip(MOTIONS, self.targets, strict=True)
         )
 
@@ -155,6 +175,9 @@ START: dict[Motion, Target] = {
 }
 
 
+_NO_CREEPAGE: dict[Motion, Target] = dict.fromkeys(("x", "y", "twist"), Target("displacement", 0.0))
+
+
 class History:
     """Load steps, unrolled from entries of [[load]] as they are appended.
 
@@ -172,6 +195,7 @@ class History:
         self._entries: list[Load] = []
         self._count = 0
         self._segments = 0
+        self._rolled = False
         self._now: Mapping[Any, Any] = {**START, "bulk": (0.0, 0.0, 0.0)}
         self._problems: dict[tuple[str | int, ...], Mistake] = {}
 
@@ -190,6 +214,13 @@ class History:
         key, segment, label, carries_on = stretch
         if self._period:
             segment = segment.model_copy(update=self._period.driven(segment))
+        roll = _roll(segment)
+        if roll and not self._rolled:
+            self._now = {**self._now, **_NO_CREEPAGE}
+        elif self._rolled and not roll:
+            sentence = "missing; expected rolling, since the bodies have rolled before"
+            self._complain(Mistake((*key, "rolling"), MISSING, sentence))
+        self._rolled = self._rolled or roll is not None
         ramp = Ramp(segment, self._now, not self._segments, self._now["bulk"])
         self._segments += not carries_on
         if segment.ramp == "cubic" and self._now["z"].control != "force":
@@ -202,7 +233,7 @@ class History:
         for fraction in segment.values or [step / count for step in range(1, count + 1)]:  # the last is 1
             self._now = ramp.targets(fraction)
             place = len(self.steps), self._segments - 1, label
-            step = LoadStep(*place, **self._now, fraction=fraction, ramp=ramp if chosen else None)
+            step = LoadStep(*place, **self._now, fraction=fraction, ramp=ramp if chosen else None, roll=roll)
             self.steps.append(step)
             for part in _WATCHED if chosen else (1.0,):
                 problems = list(_overload(key, stretch.segment, step.until(part), self._mu))
@@ -283,6 +314,31 @@ def load_steps(
     return tuple(history.steps), history.problems
 
 
+def _roll(segment: Segment) -> Roll | None:
+    """Return the rolling of a segment."""
+    if segment.rolling is None:
+        return None
+    distance = segment.rolling if isinstance(segment.rolling, float) else 0.0
+    return Roll(segment.rolling_direction or 0.0, distance)
+
+
+def rolled_out(steps: Sequence[LoadStep], spacing: Callable[[float], float]) -> tuple[LoadStep, ...]:
+    """Return a history with a load step for each spacing (m, by direction) of a rolled distance."""
+    found: list[LoadStep] = []
+    done = 0
+    for step in steps:
+        if step.roll is None or step.roll.steady:
+            roll = step.roll and step.roll._replace(done=done)
+            found.append(replace(step, index=len(found), roll=roll))
+            continue
+        count = max(round(step.roll.distance / spacing(step.roll.direction)), 1)
+        for number in range(1, count + 1):
+            done += 1
+            part = number / count
+            found.append(replace(step, index=len(found), fraction=part, roll=step.roll._replace(done=done)))
+    return tuple(found)
+
+
 def cycle_entries(loads: Sequence[Load], label: str) -> list[Load]:
     """Return the last entries of [[load]], which have the label."""
     return [*reversed([*takewhile(lambda load: load.label == label, reversed(loads))])]
@@ -328,7 +384,7 @@ def _overload(
     if not mu:
         for motion, target in tangential:
             by_force = target.control == "force"
-            name = LOADS[motion][0 if by_force else 1]
+            name = step.drives[motion][0 if by_force else 1]
             given = getattr(segment, name)
             # without friction, but with shear as an unknown, motions are free
             if target.value != 0 and given is not None and (by_force or mu is None):
@@ -340,7 +396,15 @@ def _overload(
     loads = {motion: target.value if target.control == "force" else 0.0 for motion, target in tangential}
     bound = mu * step.z.value if step.z.value > 0 else 0.0
     force = math.hypot(loads["x"], loads["y"])
-    if force > bound * (1 + 1e-12) or (bound == 0 and loads["twist"] != 0):
+    if step.roll and force and force >= bound:
+        name = "tangential_load_x" if segment.tangential_load_x is not None else "tangential_load_y"
+        given = getattr(segment, name)
+        sentence = (
+            f"expected less than friction.coefficient x normal_load = {bound:g} N in all, which takes a "
+            "creepage without bound"
+        )
+        yield Mistake((*key, name), MISSING if given is None else str(given), sentence)
+    elif force > bound * (1 + 1e-12) or (bound == 0 and loads["twist"] != 0):
         blamed = ("tangential_load_x", "tangential_load_y", "torque", "normal_load", *reversed(MEANS))
         name = next((name for name in blamed if getattr(segment, name) is not None), "steps")
         given = getattr(segment, name)

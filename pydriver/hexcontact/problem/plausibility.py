@@ -160,6 +160,7 @@ _NOTICED = 0.2  # Q/mu P below which slip dissipates next to no energy
 _ALIKE = 0.02  # beta up to which the shear of pressing is less than 1.5 % of the pressure
 _ROUND = 0.95  # smaller half-axis over radius from which an estimated contact counts as a circle
 _STEADY = 0.05  # exponent of the radius on the load up to which a contact does not grow: punches
+_ROUNDED = 1e-6  # spacings by which a rolled distance may differ from a whole number of them
 
 
 def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
@@ -314,6 +315,21 @@ def unjudged(case: Problem) -> str:
     )
 
 
+def rounded_distances(case: Problem) -> str:
+    """Return a note on rolled distances that are no whole number of spacings; empty without one."""
+    words = []
+    steps = [step for step in case.load_steps if step.roll and not step.roll.steady]
+    for segment in dict.fromkeys(step.segment for step in steps):
+        rolled = [step.roll for step in steps if step.segment == segment and step.roll]
+        given, spacing = rolled[0].distance, case.rolled_spacing(rolled[0].direction)
+        if abs(len(rolled) * spacing - given) > _ROUNDED * spacing:
+            words.append(
+                f"segment {segment + 1} rolls {quantity(len(rolled) * spacing, 'm')}, {len(rolled)} spacings "
+                f"of the lattice, and not {quantity(given, 'm')}"
+            )
+    return "; ".join(words)
+
+
 def _steepest(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     """Name the steepest surface, and the slope of the gap if the surfaces conform."""
     if (
@@ -370,7 +386,9 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
     largest = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
     slipping = max(largest, _NOTICED) if largest else 0.8 * (abs(case.pair.beta) > _ALIKE)
     targets = [(step.x, step.y, step.twist) for step in case.load_steps]
-    if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
+    if case.rolls or any(
+        len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)
+    ):
         return slipping, None, None
     values = np.array([[target.value for target in motions] for motions in targets])
     scale = np.abs(values).max(axis=0)
@@ -385,7 +403,13 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
     """Yield the error by steps with nodes that enter the contact, these steps, and the needed number."""
     solver, mu, beta = case.solver, case.friction_coefficient, abs(case.pair.beta)
-    if solver.algorithm != "incremental" or solver.entry != "implicit" or not mu or case.adaptive:
+    if (
+        solver.algorithm != "incremental"
+        or solver.entry != "implicit"
+        or not mu
+        or case.adaptive
+        or case.rolls
+    ):
         return
     coupled = beta > _ALIKE and not math.isnan(mu)
     growing = list(_growing(case))

@@ -28,10 +28,10 @@ from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
 from ..variables import LOADS
-from . import window
+from . import checks, window
 from .arguments import Body
 from .checks import checked
-from .loads import LoadStep, wearing_cycle
+from .loads import LoadStep, rolled_out, wearing_cycle
 from .plane_field import GAP, FieldSource, FrictionField, PlaneField
 from .window import Estimate, NoContactFound
 
@@ -146,10 +146,28 @@ class Problem:
         self._contact: Estimate | None = None  # if the window follows from it alone
         self.estimate: Estimate | None = None  # None for an array of gaps
         self.lattice = repeating.lattice if repeating else self._size(deck.grid, given.source, lattice)
+        if self.rolls:
+            self._roll(given.source)
         if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
             self.friction_law(self.lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
             raise deck_error(problems, given.source)
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the bodies roll."""
+        return any(step.roll for step in self.load_steps)
+
+    def rolled_spacing(self, direction: float) -> float:
+        """Return the distance (m) of two nodes along a row of the lattice."""
+        ahead = np.array(friction.row_ahead(self.lattice, direction))
+        return float(np.linalg.norm(ahead @ self.lattice.basis))
+
+    def _roll(self, source: Source) -> None:
+        """Unroll rolled distances into load steps of a spacing."""
+        if fault := checks.rolling_fault(self.deck.load, self.rolled_spacing):
+            raise deck_error([fault], source)
+        self.load_steps = rolled_out(self.load_steps, self.rolled_spacing)
 
     @cached_property
     def deck_tables(self) -> dict[str, Any]:

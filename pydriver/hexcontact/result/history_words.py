@@ -17,6 +17,7 @@ from ..deck.below import Stage
 from ..text import Row, cycle_count, listed, percent, quantity
 from ..variables import (
     BULK_STRESS,
+    CREEPAGES,
     LOADS,
     RESIDUALS,
     SUMMARY,
@@ -31,14 +32,15 @@ History = Mapping[str, Any]
 Extent = tuple[float, float]
 
 LOADS_AND_MOTIONS = {
-    name: (label_of(name), VARIABLES[name].units) for name in names_where(lambda v: v.motion)
+    name: (label_of(name), VARIABLES[name].units) for name in (*names_where(lambda v: v.motion), *CREEPAGES)
 }
-"""Short name and unit of each load and motion."""
+"""Short name and unit of each load and motion, and of creepages and spin."""
 
 WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
 """Fields of the steps of a cycle from which its wear follows."""
 
 _SLIP = 2  # among the zones
+_UNROLLED = ("shift_x", "shift_y", "twist")  # in whose place rolling bodies have creepages and spin
 _NOTICED = 1e-6  # share of the normal load or approach from which tangential ones are shown
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
@@ -57,11 +59,25 @@ def _scale(name: str, history: History) -> float:
     return abs(history[beside]) * length**power if length or power >= 0 else math.inf
 
 
+def rolls(history: History) -> bool:
+    """Test whether the bodies of a case roll."""
+    return CREEPAGES[0] in history
+
+
+def rolled_steps(histories: Iterable[History]) -> list[History]:
+    """Return the steps in which the bodies roll."""
+    return [h for h in histories if not math.isnan(float(h.get("rolled_distance", math.nan)))]
+
+
 def worth_showing(histories: Iterable[History]) -> list[str]:
-    """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise."""
+    """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise; no shifts while rolling."""
     histories = list(histories)
 
+    hidden = _UNROLLED if rolls(histories[-1]) else ()
+
     def shown(name: str) -> bool:
+        if name in hidden:
+            return False
         normal = VARIABLES[name].motion == "z"
         return normal or any(abs(h.get(name, 0.0)) > _NOTICED * _scale(name, h) for h in histories)
 
@@ -71,7 +87,7 @@ def worth_showing(histories: Iterable[History]) -> list[str]:
 def load_or_motion(name: str, history: History) -> str:
     """Write one of `LOADS_AND_MOTIONS`; noise is written as zero."""
     value = float(history[name])
-    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].units)
+    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].unit)
 
 
 def fitted(name: str, history: History) -> float:
@@ -269,6 +285,8 @@ def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], 
 
     Shear is along the direction of the largest tangential load.
     """
+    if rolls(histories[-1]):
+        return {}  # creepages are velocities
     names, found = worth_showing(histories), {}
     if (along := _loop_along(histories)) is not None:
         found["shear"] = along

@@ -18,7 +18,7 @@ from ..problem.preview import machine
 from ..problem.problem import Problem
 from ..result.history_words import unasked_path
 from ..result.step import Step
-from ..variables import LOADS
+from ..variables import LOADS, ROLLED
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .log import Log
@@ -95,8 +95,10 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
             "the half-spaces move as a whole, and what is solved is the layer"
         )
         listener.said("full contact", sentence, area=lattice.size * lattice.cell_area)
-    if (note := plausibility.unjudged(case)) and not case.trial:
-        listener.said("unjudged", f"note: {note}", note=note)
+    notes = {"unjudged": plausibility.unjudged(case), "rounded": plausibility.rounded_distances(case)}
+    for about, note in notes.items():
+        if note and not case.trial:
+            listener.said(about, f"note: {note}", note=note)
     for sentence in [] if case.trial else plausibility.warnings(case):
         listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
 
@@ -132,4 +134,5 @@ def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) ->
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:
     """Return the loads and motions at the end of a step by the keys of the deck; 0 without an entry."""
-    return {name: float(history.get(name, 0.0)) for pair in LOADS.values() for name in pair}
+    drives = (*LOADS.values(), *ROLLED.values())
+    return {name: float(history.get(name, 0.0)) for pair in drives for name in pair}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, pair_of
-from ..core.friction import ContactState, FrictionalContact
+from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
 from ..core.measures import measures
 from ..core.steps import AdaptiveSteps
@@ -20,7 +20,7 @@ from ..errors import DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from ..variables import BULK_STRAIN, BULK_STRESS, CORE, LOADS, NODAL_FRICTION, STATE, names_where
+from ..variables import BULK_STRAIN, BULK_STRESS, CORE, NODAL_FRICTION, STATE, names_where
 from .events import Listener
 from .memory_needed import fields_of, require_memory
 
@@ -110,6 +110,8 @@ class Window:
         if self.case.deck.bulk:
             bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
             bulk["bulk_body"] = self.case.deck.bulk.body
+        if target.roll:
+            bulk["rolled_distance"] = target.roll.done * self.case.rolled_spacing(target.roll.direction)
         history: dict[str, float | int | str] = {
             **self._history(solution, before),
             **bulk,
@@ -140,7 +142,7 @@ class Window:
         driven = {}
         for motion, drive in zip(MOTIONS, target.targets, strict=True):
             if motion == "z" or self.case.frictional:
-                name = LOADS[motion][drive.control == "displacement"]
+                name = target.drives[motion][drive.control == "displacement"]
                 # a ramp after the other control begins at the value that control led to
                 driven[name] = float(history[name] if drive.from_start else drive.value)
         known = self.case.deck.bulk.components if self.case.deck.bulk else ()
@@ -211,6 +213,7 @@ class FrictionWindow(Window):
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
+            rolling=None if target.roll is None else Rolling(target.roll.direction, target.roll.steady),
             **self._how,
         )
 
@@ -268,6 +271,7 @@ class FrictionWindow(Window):
         spent = solution.dissipated_energy - spent_before
         history = {**super()._history(solution, before), "dissipated_energy_step": spent}
         left_out = () if self.case.deck.bulk else BULK_STRAIN
+        left_out = left_out if self.case.rolls else (*left_out, *CORE["rolling"])
         left_out = (*left_out, _PATH_ERROR) if static else left_out
         return {name: value for name, value in history.items() if name not in left_out}
 

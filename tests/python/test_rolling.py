@@ -1,0 +1,330 @@
+"""Rolling from deck to result: loads, creepages and powers, plane references, refused decks, resumed runs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexcontact import Case, DeckError, open_result, plotting, resume
+from hexcontact.core.contact import ElasticPair, FlexibilityOperator
+from hexcontact.core.friction import FrictionalContact, Rolling
+from hexcontact.core.lattice import Lattice
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+F, D = "force", "displacement"
+STEADY = Rolling(0.0, steady=True)
+
+
+def ball(*loads: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    """Return a deck of a ball that is pressed by 100 N, with rolling loads."""
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0.25}
+    return {
+        "body": {"1": {**steel, "surface": {"shape": "sphere", "radius": 0.01}}, "2": steel},
+        "friction": {"coefficient": 0.3},
+        "grid": {"nodes_in_radius": 8},
+        "load": [{"normal_load": 100.0}, *loads],
+        **tables,
+    }
+
+
+def last(deck: dict[str, Any]) -> dict[str, Any]:
+    return Case.from_dict(deck).run().history.iloc[-1].to_dict()
+
+
+# --- from the deck ------------------------------------------------------------------------------------------
+
+
+def extrapolated(quantity: str, creepages: dict[str, float]) -> float:
+    """Return a load over mu P (torque: over mu P a) in the limit of a fine lattice, by 8 and 16 spacings."""
+    found = []
+    for nodes in (12, 24):
+        deck = ball({"rolling": "steady", **creepages}, grid={"nodes_in_radius": nodes})
+        case = Case.from_dict(deck)
+        history = case.run().history.iloc[-1]
+        radius = (0.75 * 100.0 * 0.01 / case.pair.effective_modulus) ** (1 / 3)
+        found.append(history[quantity] / (30.0 * (radius if quantity == "torque" else 1.0)))
+    return 2.0 * found[1] - found[0]
+
+
+def scaled(xi: float, eta: float, phi: float) -> dict[str, float]:
+    """Return creepages given in mu p0/G, and spin in mu p0/(G a)."""
+    pair = Case.from_dict(ball()).pair
+    radius = (0.75 * 100.0 * 0.01 / pair.effective_modulus) ** (1 / 3)
+    unit = 0.3 * 150.0 / (math.pi * radius**2) / (210e9 / 2.5)
+    return {"creepage_x": xi * unit, "creepage_y": eta * unit, "spin": phi * unit / radius}
+
+
+def reference_rows(case: str = "nonlinear") -> list[dict[str, str]]:
+    lines = [line for line in (REFERENCE / "rolling.csv").read_text().splitlines() if line[0] != "#"]
+    return [row for row in csv.DictReader(lines) if row["case"] == case]
+
+
+@pytest.mark.parametrize(
+    "creepage", [(-0.1, 0.0, 0.0), (-0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.0, 0.0, 1.0)], ids=str
+)
+def test_loads_of_creepages_tend_to_the_reference(creepage: tuple[float, float, float]) -> None:
+    names = {"Fx": "tangential_load_x", "Fy": "tangential_load_y", "Mz": "torque"}
+    rows = [r for r in reference_rows() if tuple(float(r[k]) for k in ("xi", "eta", "phi")) == creepage]
+    assert len(rows) == 3
+    for row in rows:
+        found = extrapolated(names[row["quantity"]], scaled(*creepage))
+        # twice the uncertainty: two lattices, of which the nodes at the edge are not averaged
+        assert found == pytest.approx(float(row["own"]), abs=2 * float(row["uncertainty"])), row["quantity"]
+
+
+def test_creepages_follow_from_loads_and_lead_back_to_them() -> None:
+    by_load = last(ball({"rolling": "steady", "tangential_load_x": "0.5 mu P", "tangential_load_y": 3.0}))
+    assert by_load["tangential_load_x"] == pytest.approx(15.0, rel=1e-7)
+    assert by_load["creepage_x"] < 0.0 < -by_load["creepage_y"]
+    given = {name: by_load[name] for name in ("creepage_x", "creepage_y")}
+    back = last(ball({"rolling": "steady", **given}))
+    assert back["tangential_load_x"] == pytest.approx(15.0, rel=1e-6)
+    assert back["tangential_load_y"] == pytest.approx(3.0, rel=1e-6)
+    with_torque = ball(
+        {"rolling": "steady", "tangential_load_x": 9.0, "tangential_load_y": 0.0, "torque": 2e-4}
+    )
+    spun = last(with_torque)
+    assert spun["torque"] == pytest.approx(2e-4, rel=1e-6)
+    assert spun["spin"] < 0.0
+
+
+def test_a_segment_with_steps_is_a_creep_curve() -> None:
+    result = Case.from_dict(ball({"rolling": "steady", "creepage_x": -0.008, "steps": 8})).run()
+    history = result.history
+    np.testing.assert_allclose(history["creepage_x"], np.linspace(0.0, -0.008, 9), atol=1e-15)
+    loads = history["tangential_load_x"].to_numpy()
+    assert (np.diff(loads) > -1e-9).all()
+    assert loads[-1] == pytest.approx(30.0, rel=1e-3)
+    assert loads[-1] <= 30.0 * (1 + 1e-9)
+    assert (history["dissipated_energy"] <= 0.0).all()
+    rolled = history[1:]
+    np.testing.assert_allclose(rolled["creep_power"], -rolled["tangential_load_x"] * rolled["creepage_x"])
+    # the scheme dissipates the rest
+    assert (rolled["slip_power"] < rolled["creep_power"]).all()
+    # points after the first start from the one before
+    assert rolled["operator_applications"].max() < 60
+    drawn = plotting.creep(result)
+    assert drawn.axes[0].get_xlabel() == "creepage x"
+    with pytest.raises(DeckError, match="expected creep"):
+        plotting.loop(result)
+
+
+def test_a_distance_leads_to_the_steady_state() -> None:
+    drive = {"tangential_load_x": 15.0, "creepage_y": 0.0005}
+    case = Case.from_dict(ball({"rolling": 2e-3, **drive}, {"rolling": "steady"}))
+    spacing = case.lattice.spacing
+    history = case.run().history
+    assert len(history) == round(2e-3 / spacing) + 2
+    before, steady = history.iloc[-2], history.iloc[-1]
+    assert before["rolled_distance"] == pytest.approx(spacing * (len(history) - 2))
+    for name in ("creepage_x", "tangential_load_y", "slip_power"):
+        assert before[name] == pytest.approx(steady[name], rel=1e-4), name
+    energy = history["dissipated_energy"].to_numpy()
+    assert energy[-2] - energy[-3] == pytest.approx(steady["slip_power"] * spacing, rel=1e-4)
+
+
+@pytest.mark.parametrize("direction", ["60 deg", "-120 deg", "35 deg"])
+def test_the_lattice_has_a_row_along_the_direction(direction: str) -> None:
+    angle = math.radians(float(direction.split()[0]))
+    along = last(ball({"rolling": "steady", "creepage_x": -0.002, "creepage_y": 0.001}))
+    c, s = math.cos(angle), math.sin(angle)
+    turned = {"creepage_x": -0.002 * c - 0.001 * s, "creepage_y": -0.002 * s + 0.001 * c}
+    found = last(ball({"rolling": "steady", "rolling_direction": direction, **turned}))
+    x, y = found["tangential_load_x"], found["tangential_load_y"]
+    assert c * x + s * y == pytest.approx(along["tangential_load_x"], rel=1e-6)
+    assert c * y - s * x == pytest.approx(along["tangential_load_y"], rel=1e-6)
+
+
+def test_a_run_in_the_middle_of_a_distance_resumes_to_the_same_bits(tmp_path: Path) -> None:
+    deck = ball({"rolling": 1e-4, "creepage_x": -0.002}, {"rolling": "steady", "spin": 3.0})
+    whole = Case.from_dict(deck).run(output=tmp_path / "whole.nc")
+    case = Case.from_dict(deck)
+
+    class StopError(Exception):
+        pass
+
+    def stop(step: Any) -> None:
+        if step.number == 5:
+            raise StopError
+
+    with pytest.raises(StopError):
+        case.run(output=tmp_path / "part.nc", on_step=stop)
+    resumed = resume(tmp_path / "part.nc")
+    for name in ("traction_x", "traction_y", "accumulated_slip", "creepage_x", "rolled_distance"):
+        np.testing.assert_array_equal(resumed.dataset[name], whole.dataset[name], name)
+    again = open_result(tmp_path / "whole.nc").dataset
+    assert again["spin"].attrs["units"] == "rad/m"
+
+
+def test_no_slip_is_the_linear_theory() -> None:
+    creepages = scaled(-0.1, 0.0, 0.0)
+    small, large = (
+        last(
+            ball(
+                {"rolling": "steady", "creepage_x": k * creepages["creepage_x"]},
+                friction={"coefficient": math.inf},
+            )
+        )
+        for k in (1.0, 10.0)
+    )
+    assert large["tangential_load_x"] == pytest.approx(10 * small["tangential_load_x"], rel=1e-6)
+    pair = Case.from_dict(ball()).pair
+    radius = (0.75 * 100.0 * 0.01 / pair.effective_modulus) ** (1 / 3)
+    c_11 = small["tangential_load_x"] / (-(radius**2) * 210e9 / 2.5 * creepages["creepage_x"])
+    assert c_11 == pytest.approx(4.24, abs=0.06)  # at 8 spacings in the radius; 4.115 in the limit
+
+
+def coefficients(ratio: float, spacings: int) -> dict[str, float]:
+    """Return the coefficients of Kalker of an ellipse, nu = 0.25, by spacings in its smaller half-axis."""
+    along, across = math.sqrt(ratio), math.sqrt(1.0 / ratio)
+    h, rows = (
+        min(along, across) / spacings,
+        math.ceil(1.8 * max(along, across) / min(along, across) * spacings),
+    )
+    lattice = Lattice(h, -rows, -2 * rows, 2 * rows + 1, 4 * rows + 1, (0.3 * h, 0.2 * h))
+    square = (lattice.x / along) ** 2 + (lattice.y / across) ** 2
+    pressure = np.sqrt(np.maximum(1.0 - square, 0.0))
+    pair = ElasticPair(0.75 / math.pi, 0.0, 0.25 / math.pi)
+    closing = FlexibilityOperator(lattice, pair).apply(pressure)[0]
+    contact = FrictionalContact(
+        *(lattice, pair, 2.0 * closing.max() - closing, pressure > 0.0),
+        friction_coefficient=math.inf,
+        rim_warning=False,
+    )
+    load, c = (
+        pressure.sum() * lattice.cell_area,
+        math.sqrt((pressure > 0).sum() * lattice.cell_area / math.pi),
+    )
+    state, found = contact.virgin(), []
+    for creepage in ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)):
+        state = contact.advance(state, [F, D, D, D], [load, *creepage], rolling=STEADY)
+        assert state.converged
+        found.append((state.tangential_load_x, state.tangential_load_y, state.torque))
+    across_by_spin = 0.5 * (found[2][1] - found[1][2])  # C23 = -C32, but for the lattice
+    return {
+        "C11": found[0][0] / c**2,
+        "C22": found[1][1] / c**2,
+        "C23": across_by_spin / c**3,
+        "C33": found[2][2] / c**4,
+    }
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_coefficients_of_the_linear_theory(ratio: float) -> None:
+    coarse, fine = coefficients(ratio, 8), coefficients(ratio, 16)
+    rows = [row for row in reference_rows("linear") if (row["nu"], float(row["a/b"])) == ("0.25", ratio)]
+    assert len(rows) == 4
+    for row in rows:
+        limit = 2.0 * fine[row["quantity"]] - coarse[row["quantity"]]
+        assert limit == pytest.approx(float(row["own"]), abs=2 * float(row["uncertainty"])), row["quantity"]
+
+
+# --- plane references ---------------------------------------------------------------------------------------
+
+
+def strip(
+    spacings: int, length: float, friction: float, beta: float = 0.0
+) -> tuple[FrictionalContact, Lattice, float]:
+    """Return a roller with p0 = a = E* = 1, nodes at the edges, cells 1:32; and its normal load."""
+    ratio, h = 32, 1.0 / spacings
+    rows, cols = round(length / 2 / (h * ratio)), round(1.15 * spacings)
+    origin = (h / 2 if beta else 0.0, 0.0)
+    lattice = Lattice(h, -rows - 2, -cols, 2 * rows + 5, 2 * cols + 1, origin, ratio, math.pi / 2)
+    inside = np.abs(lattice.y) <= length / 2
+    pressed = np.where(inside, np.sqrt(np.maximum(1.0 - lattice.x**2, 0.0)), 0.0)
+    pair = ElasticPair(1 / math.pi, beta / math.pi, 0.3 / 0.7 / math.pi)
+    closing = FlexibilityOperator(lattice, pair).apply(pressed)[0]
+    if beta:  # the pressure is found: a parabola whose ends do not press more than its middle
+        middle = np.argmin(np.abs(lattice.x[0]))
+        gap = lattice.x**2 + closing.max() - closing[:, [middle]]
+        touching = inside
+    else:
+        gap, touching = closing.max() + 1.0 - closing, pressed > 0.0
+    contact = FrictionalContact(
+        lattice, pair, gap, touching, friction_coefficient=friction, rim_warning=False
+    )
+    return contact, lattice, float(pressed.sum() * lattice.cell_area)
+
+
+def in_the_middle(lattice: Lattice, state: Any) -> float:
+    """Return Q/P of the row in the middle."""
+    row = int(np.argmin(np.abs(lattice.y[:, 0])))
+    return float(state.traction_x[row].sum() / state.pressure[row].sum())
+
+
+@pytest.mark.parametrize("creepage", [-0.2, -0.6, -1.0])
+def test_middle_of_a_roller_is_as_carter_has_it(creepage: float) -> None:
+    contact, lattice, load = strip(50, 40.0, 1.0)
+    state = contact.advance(contact.virgin(), [F, D, D, D], [load, creepage, 0, 0], rolling=STEADY)
+    assert state.converged
+    assert in_the_middle(lattice, state) == pytest.approx(1.0 - (1.0 - abs(creepage) / 2) ** 2, rel=3e-3)
+
+
+@pytest.mark.parametrize(("friction", "reference", "within"), [(0.002, 1.8202, 5e-3), (0.2, 1.2860, 1e-2)])
+def test_middle_of_an_unlike_roller_creeps_freely(friction: float, reference: float, within: float) -> None:
+    beta, length = 0.1438337, 60.0
+    contact, lattice, load = strip(50, length, friction, beta)
+    state, found = contact.virgin(), []
+    # the load beyond the ends of the roller is missing: 4 lambda_2 P'/L
+    expected = -beta * (reference - 2.0 / length)
+    for creepage in (0.98 * expected, 1.02 * expected):
+        state = contact.advance(state, [F, D, D, D], [load, creepage, 0, 0], rolling=STEADY)
+        assert state.converged
+        found.append((creepage, in_the_middle(lattice, state)))
+    (low, before), (high, after) = found
+    free = low - before * (high - low) / (after - before)
+    assert -free / beta + 2.0 / length == pytest.approx(reference, rel=within)
+
+
+# --- refused decks ------------------------------------------------------------------------------------------
+
+CREEP = {"rolling": "steady", "creepage_x": -0.001}
+
+
+@pytest.mark.parametrize(
+    ("loads", "tables", "words"),
+    [
+        ([{"rolling": "steady", "tangential_load_x": 30.0}], {}, "tangential_load_x = .*expected less than"),
+        ([{"rolling": 1e-4, "tangential_load_y": "1 mu P"}], {}, "tangential_load_y = .*expected less than"),
+        ([{**CREEP, "tangential_load_x": 3.0}], {}, "expected tangential_load_x or creepage_x, not both"),
+        ([{**CREEP, "spin": 1.0, "torque": 1e-4}], {}, "expected torque or spin, not both"),
+        ([{"creepage_x": 0.001}], {}, "needs rolling beside it"),
+        ([{**CREEP, "shift_y": 1e-6}], {}, "load.2.shift_y = .*expected nothing beside rolling"),
+        ([{**CREEP, "torque": 1e-4}], {}, "load.2.torque = .*expected tangential_load_y beside it"),
+        ([CREEP, {"tangential_load_x": 1.0}], {}, "load.3.rolling: missing; expected rolling"),
+        ([{"rolling": "slowly"}], {}, 'expected "steady" or a length above 0'),
+        ([{"rolling": 1e-4, "steps": 3}], {}, "load.2.steps = 3: expected nothing beside a rolled distance"),
+        ([{**CREEP, "steps": "auto"}], {}, "load.2.steps = .*expected a number beside rolling"),
+        ([CREEP], {"solver": {"method": "direct"}}, 'solver.method = "direct": expected "fft"'),
+        ([CREEP], {"solver": {"algorithm": "static"}}, 'solver.algorithm = "static": expected "incremental"'),
+        ([CREEP], {"solver": {"entry": "interpolated"}}, "solver.entry = .*expected"),
+        ([CREEP], {"bulk": {"body": 2}}, "bulk: is not available beside rolling"),
+        ([CREEP], {"accuracy": {"target": 0.05}}, "accuracy: is not available beside rolling yet"),
+        (
+            [CREEP],
+            {"grid": {"extent": [1e-3, 1e-3], "nodes_across": 48, "boundary": "periodic"}},
+            'grid.boundary = "periodic": expected "free" beside rolling',
+        ),
+        (
+            [CREEP],
+            {"grid": {"nodes_in_radius": 8, "direction": "10 deg"}},
+            "rolling_direction = .*expected the direction of a row of the lattice",
+        ),
+    ],
+)
+def test_decks_that_make_no_sense_are_refused(loads: list[Any], tables: dict[str, Any], words: str) -> None:
+    with pytest.raises(DeckError, match=words):
+        Case.from_dict(ball(*loads, **tables))
+
+
+def test_a_rounded_distance_is_noted(caplog: pytest.LogCaptureFixture) -> None:
+    case = Case.from_dict(ball({"rolling": 1e-4, "creepage_x": -0.001}))
+    with caplog.at_level("INFO", logger="hexcontact"):
+        case.run()
+    assert 'note="segment 2 rolls' in caplog.text
+    assert f"{round(1e-4 / case.lattice.spacing)} spacings of the lattice, and not 100.0 µm" in caplog.text

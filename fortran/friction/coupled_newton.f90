@@ -199,7 +199,7 @@ contains
       call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
       if (allocated(error)) return
       ! one by one: over all nodes they are large
-      allocate (c%columns(nodes%n_active, m), c%mb(nodes%n_active, m), c%rows(nodes%n_active, m), column(3*n), plane(2*n))
+      allocate (c%columns(nodes%n_active, m), c%mb(nodes%n_active, m), c%rows(step%pressed%n_active, m), column(3*n), plane(2*n))
       do k = 1, n_shear
         column = 0.0_wp
         call sheared%unpack(part(:, k), column(n + 1:))
@@ -210,7 +210,7 @@ contains
         ! the traction mu p e belongs to the pressure
         plane = reshape(step%driven%direction(k, now%problem), [2*n])
         column(:n) = step%system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
-        call nodes%pack(column, c%rows(:, k))
+        call step%pressed%pack(column(:n), c%rows(:, k))
       end do
       deallocate (part, shear_columns, plane)
       if (m == n_shear) return
@@ -224,7 +224,7 @@ contains
       call nodes%pack(column, c%mb(:, m))
       column(:n) = merge(1.0_wp, 0.0_wp, now%contact)
       call nodes%pack(column, c%columns(:, m))
-      c%rows(:, m) = c%columns(:, m)
+      c%rows(:, m) = 1.0_wp
     end associate
   end subroutine constrain
 

@@ -44,7 +44,7 @@ module hc_linear_system
   type :: constraints_t
     !> B, along which the multipliers act, and M B
     real(wp), allocatable :: columns(:, :), mb(:, :)
-    !> C, if it is not B
+    !> C at the first active nodes, as far as it is not B
     real(wp), allocatable :: rows(:, :)
     !> Multipliers m
     real(wp), allocatable :: multiplier(:)
@@ -263,8 +263,15 @@ contains
     real(wp), intent(in), contiguous :: x(:)
     real(wp) :: resultants(size(self%columns, 2))
 
+    integer :: n, m
+
     if (allocated(self%rows)) then
-      resultants = space%dots(self%rows, x)
+      n = size(self%rows, 1)
+      resultants = space%dots(self%rows, x(:n))
+      if (n == size(x)) return
+      do m = 1, size(resultants)
+        resultants(m) = resultants(m) + space%dot(self%columns(n + 1:, m), x(n + 1:))
+      end do
     else
       resultants = space%dots(self%columns, x)
     end if

@@ -212,7 +212,7 @@ contains
     !> Closing of the gap, or tangential displacements; then pressure, or shear tractions (n_col, n_row, 1 or 2)
     real(sp), intent(inout), target :: values(self%shape(1), self%shape(2), self%shape(3))
     !> Continuation beyond the nodes where displacements are given
-    type(edge_extension_t), intent(in) :: edge
+    type(edge_extension_t), intent(in), optional :: edge
     real(sp), allocatable :: traction(:, :, :)
     real(sp), pointer, contiguous :: field(:)
     integer :: m
@@ -223,15 +223,18 @@ contains
       values = traction
       return
     end if
-    do m = 1, size(values, 3)
-      field(1:size(values, 1)*size(values, 2)) => values(:, :, m)
-      call edge%extend(field)
-    end do
+    if (present(edge)) then
+      do m = 1, size(values, 3)
+        field(1:size(values, 1)*size(values, 2)) => values(:, :, m)
+        call edge%extend(field)
+      end do
+    end if
     if (self%tangential) then
       call self%convolution%convolve_in_place(tangential_block, values)
     else
       call self%convolution%convolve_in_place(normal_block, values)
     end if
+    if (.not. present(edge)) return
     do m = 1, size(values, 3)
       field(1:size(values, 1)*size(values, 2)) => values(:, :, m)
       call edge%fold(field)

@@ -43,6 +43,7 @@ contains
       new_test('step_equation', test_step_equation), &
       new_test('products_that_are_carried', test_products_that_are_carried), &
       new_test('restarts_of_gmres', test_restarts_of_gmres), &
+      new_test('rounded_directions', test_rounded_directions), &
       new_test('ends_of_gmres', test_ends_of_gmres) &
     ]
   end subroutine collect_linear_solvers
@@ -350,6 +351,54 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_products_that_are_carried
+
+  !> Directions of single precision: their rounding errors are in the residual and, within the drift, in the product, but not in
+  !> the constraint, however often the iteration begins anew.
+  subroutine test_rounded_directions(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    type(active_set_t) :: nodes
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    real(wp), allocatable :: rhs(:)
+    real(wp) :: x(5), ax(5), left(5)
+    integer :: i, most
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    system%matrix(2, 1) = -3.0_wp
+    call new_active_set(nodes, [.true., .true., .false., .true., .true.], system%space)
+    do most = 2, 4
+      x = [1.0_wp/3.0_wp, 2.0_wp, 0.0_wp, 3.0_wp, -1.0_wp/7.0_wp]
+      ax = matmul(system%matrix, x)
+      rhs = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp]
+      constraints%columns = spread([1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp], 2, 1)
+      constraints%mb = spread([1.0_wp, 0.9_wp, 0.7_wp, 0.3_wp], 2, 1)
+      ! C differs from B at the first two nodes
+      constraints%rows = spread([0.7_wp, 1.3_wp], 2, 1)
+      constraints%multiplier = [0.0_wp]
+      associate (c => [0.7_wp, 1.3_wp, 0.0_wp, 1.0_wp, 1.0_wp])
+        left(1) = dot_product(c, x)
+        iteration = iteration_t(tolerance=1.0e-5_wp, most=40, most_directions=most, rounded=.true.)
+        iteration%weight = [1.0_wp]
+        call freeing_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
+        if (allocated(error)) return
+        call check(error, dot_product(c, x), left(1), 1.0e-14_wp, 'constraint')
+      end associate
+      if (allocated(error)) return
+      call check_true(error, iteration%drift > 1.0e-8_wp .and. maxval(abs(ax - matmul(system%matrix, x))) < iteration%drift, &
+                      'product within the drift')
+      if (allocated(error)) return
+      left = [1.0_wp, 2.0_wp, 0.0_wp, 3.0_wp, -4.0_wp] - matmul(system%matrix, x) + constraints%multiplier(1)
+      left(3) = 0.0_wp
+      call check(error, norm2(left), 0.0_wp, 1.0e-5_wp + 2*iteration%drift, 'residual')
+      if (allocated(error)) return
+      call check(error, iteration%outcome, solution_accurate, 'outcome')
+      if (allocated(error)) return
+    end do
+  end subroutine test_rounded_directions
 
   !> GMRES with two directions at a time comes to the solution under a constraint, too, by more iterations; its product and its
   !> residual are those of the unknowns wherever it stops.

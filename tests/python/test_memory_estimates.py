@@ -1,12 +1,13 @@
 """What `check` says of the memory of a run, and what a run with an interim output takes at most."""
 
 import pytest
-from bench.memory import deck, measured
+from bench.memory import HALF, deck, measured
 
 DIRECT = '[solver]\nmethod = "direct"\n'
 BOX = "[[stress]]\ndepths = [1e-5, 2e-5, 3e-5, 4e-5, 5e-5, 6e-5, 7e-5, 8e-5]\n"
 POINTS = "[[stress]]\npoints = [[0.0, 0.0, 1e-5]]\n"
 INTERFACE = "[interface]\ncoefficient = 1e15\nexponent = 1\n"
+WAVES = {"frictionless": "", "friction, unlike": "[friction]\ncoefficient = 0.3\n"}
 MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 
 
@@ -45,10 +46,32 @@ def test_the_estimate_bounds_the_peak(problem: str, side: int, options: dict[str
     check(deck(problem, side, **options))  # type: ignore[arg-type]
 
 
-def test_a_load_step_takes_few_copies_of_its_state() -> None:
-    """Bytes a further node: 450 with like materials, 750 with whole records for the output."""
-    small, large = (measured(deck("friction, alike", side)).peak for side in (192, 384))
-    assert (large - small) / (384**2 - 192**2) < 600
+@pytest.mark.parametrize("problem", WAVES)
+def test_the_estimate_of_a_window_that_repeats(problem: str) -> None:
+    """Its transforms are not padded."""
+    shear = '[[load]]\nmean_traction_x = "60 MPa"\n' if WAVES[problem] else ""
+    memory = measured(
+        "[body.1]\nyoung_modulus = 210e9\npoisson_ratio = 0.3\n"
+        'surface = { shape = "formula", expression = "1e-6*(1 - cos(2*pi*x/1e-3)*cos(2*pi*y/1e-3))" }\n'
+        f"[body.2]\nrigid = true\n{WAVES[problem]}"
+        '[grid]\nboundary = "periodic"\nextent = ["1 mm", "1 mm"]\nnodes_across = 384\n'
+        f'[[load]]\nmean_pressure = "500 MPa"\n{shear}'
+    )
+    assert 0.9 < memory.estimate / memory.peak < 1.25
+
+
+@pytest.mark.parametrize(
+    ("problem", "sides", "most"),
+    [
+        ("frictionless", (384, 768), 170),
+        ("friction, alike", (192, 384), 560),
+        ("friction, unlike", (384, 512), 800),
+    ],
+)
+def test_bytes_of_a_further_node(problem: str, sides: tuple[int, int], most: int) -> None:
+    """Few copies of the state before, no field of the window for a mesh, directions in single precision."""
+    small, large = (measured(deck(problem, side, share=HALF, steps=1)).peak for side in sides)
+    assert (large - small) / (sides[1] ** 2 - sides[0] ** 2) < most
 
 
 def test_the_estimate_of_fatigue_parameters() -> None:

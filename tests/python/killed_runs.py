@@ -28,14 +28,14 @@ import hexcontact
 from hexcontact.case import Case
 from hexcontact.cli import app as cli
 from hexcontact.cli import run, solving  # noqa: F401
-from hexcontact.result import store
+from hexcontact.result import journal, store
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.step import Step
 
 warnings.simplefilter("ignore", hexcontact.PlausibilityWarning)  # of the coarse lattice
 CALLS = (  # what a run does to the disk
     *((os, name) for name in ("fsync", "replace", "unlink", "rmdir", "ftruncate", "pwrite", "mkdir", "open")),
-    (store, "write_record"),
+    (journal, "write_record"),
     (store, "write"),
     (builtins, "open"),
 )

@@ -16,7 +16,7 @@ from commands import ENVIRONMENT
 import hexcontact
 from hexcontact import Case
 from hexcontact.result import store as store_module
-from hexcontact.result.journal import journal_of
+from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.netcdf import read_output
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
@@ -113,7 +113,7 @@ def stopped(out: Path, after: int) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         case.run(out, on_step=stop)
-    assert len(store_module.Journal(journal_of(out))) == after
+    assert len(Journal(journal_of(out))) == after
 
 
 # --- a job that puts itself in line again -----------------------------------------------------------------

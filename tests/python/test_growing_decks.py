@@ -85,7 +85,7 @@ def test_a_failure_to_write_leaves_no_reference_to_it(out: Path, monkeypatch: py
     with pressed().start(out) as session:
         for number, load in enumerate(({"normal_load": 10.0}, {"tangential_load_x": 0.5}), start=1):
             with monkeypatch.context() as patched:
-                patched.setattr(store, "write_record", full)
+                patched.setattr(journal, "write_record", full)
                 with pytest.raises(ResourceError, match=f"step {number}"):
                     session.advance(**load)
             session.advance(**load)
@@ -124,7 +124,7 @@ def test_a_failed_interim_output_leaves_the_step(
 def test_a_failure_to_write_the_last_step_of_several(
     out: Path, monkeypatch: pytest.MonkeyPatch, after: int
 ) -> None:
-    write_record = store.write_record
+    write_record = journal.write_record
 
     def full(path: Path, *about: Any) -> None:
         if path.name.startswith("000004"):
@@ -134,7 +134,7 @@ def test_a_failure_to_write_the_last_step_of_several(
     with pressed().start(out) as session:
         session.advance(normal_load=10.0)
         with monkeypatch.context() as patched:
-            patched.setattr(store, "write_record", full)
+            patched.setattr(journal, "write_record", full)
             with pytest.raises(ResourceError, match="step 4"):
                 session.advance(tangential_load_x=1.5, steps=3, label="a long label of a segment")
         for _ in range(after):

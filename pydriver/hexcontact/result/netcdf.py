@@ -196,7 +196,13 @@ def _fault_of_histories(dataset: Dataset) -> str:
             return _NO_STEP.format(name)
     lattice = lattice_of(dataset)
     window = lattice.size * lattice.cell_area
-    parameters, story = dataset.attrs, str(dataset.attrs["history"])  # which may have several tolerances
+    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]), window)
+
+
+def _fault_of_numbers(
+    history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str, window: float
+) -> str:
+    """Return a fault of values by step; a resumed run may have several tolerances."""
     given = [parameters.get("tolerance", 1.0), parameters.get("cycle_tolerance", 0.0)]
     tolerances = [*given, *map(float, chain(*re.findall(_CHANGED, story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))

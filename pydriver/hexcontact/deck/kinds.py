@@ -154,8 +154,8 @@ class Kind:
         return core_schema.no_info_plain_validator_function(self.parse)
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
-        """Describe with `schema`."""
-        return getattr(self, "schema", {})
+        """Describe with a copy of `schema`, to which the table adds the words of its key."""
+        return dict(getattr(self, "schema", {}))
 
 
 class Read(Generic[_Value, _Given]):

@@ -299,6 +299,7 @@ CREEP = {"rolling": "steady", "creepage_x": -0.001}
         ([CREEP, {"tangential_load_x": 1.0}], {}, "load.3.rolling: missing; expected rolling"),
         ([{"rolling": "slowly"}], {}, 'expected "steady" or a length above 0'),
         ([{"rolling": 1e-4, "steps": 3}], {}, "load.2.steps = 3: expected nothing beside a rolled distance"),
+        ([{"rolling": 1000.0}], {}, "load.2.rolling = 1000.0: expected at most 100000 spacings"),
         ([{**CREEP, "steps": "auto"}], {}, "load.2.steps = .*expected a number beside rolling"),
         ([CREEP], {"solver": {"method": "direct"}}, 'solver.method = "direct": expected "fft"'),
         ([CREEP], {"solver": {"algorithm": "static"}}, 'solver.algorithm = "static": expected "incremental"'),

@@ -323,6 +323,14 @@ def test_decks_that_make_no_sense_are_refused(loads: list[Any], tables: dict[str
         Case.from_dict(ball(*loads, **tables))
 
 
+def test_loads_by_hand_are_refused() -> None:
+    session = Case.from_dict(ball(CREEP)).start()
+    next(session)
+    with pytest.raises(DeckError, match="expected all loads of rolling bodies in"):
+        session.advance(tangential_load_x=3.0)
+    assert next(session).history["creepage_x"] == -0.001
+
+
 def test_a_rounded_distance_is_noted(caplog: pytest.LogCaptureFixture) -> None:
     case = Case.from_dict(ball({"rolling": 1e-4, "creepage_x": -0.001}))
     with caplog.at_level("INFO", logger="hexcontact"):

@@ -114,6 +114,15 @@ def test_a_segment_with_steps_is_a_creep_curve() -> None:
         plotting.loop(result)
 
 
+def test_rolling_is_not_compared_with_solutions_of_bodies_that_do_not_roll() -> None:
+    result = Case.from_dict(
+        ball({"tangential_load_x": 9.0}, {"rolling": "steady", "tangential_load_x": 15.0})
+    ).run()
+    assert "Cattaneo" in str(result.compare(step=2))
+    assert "Hertz" in str(result.compare())
+    assert "Cattaneo" not in str(result.compare())
+
+
 def test_a_distance_leads_to_the_steady_state() -> None:
     drive = {"tangential_load_x": 15.0, "creepage_y": 0.0005}
     case = Case.from_dict(ball({"rolling": 2e-3, **drive}, {"rolling": "steady"}))

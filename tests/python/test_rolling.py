@@ -121,6 +121,8 @@ def test_rolling_is_not_compared_with_solutions_of_bodies_that_do_not_roll() -> 
     assert "Cattaneo" in str(result.compare(step=2))
     assert "Hertz" in str(result.compare())
     assert "Cattaneo" not in str(result.compare())
+    with pytest.raises(DeckError, match="of rolling bodies are no cycle"):
+        result.wear(1e-14, steps=[2, 3])
 
 
 def test_a_distance_leads_to_the_steady_state() -> None:

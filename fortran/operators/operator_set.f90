@@ -114,20 +114,30 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
-    integer :: m, n_node
 
     associate (n => self%flexibility%lattice%extent)
       acting(1:n(1), 1:n(2), 1:size(from)) => traction
       wanted(1:n(1), 1:n(2), 1:size(onto)) => displacement
     end associate
     call self%flexibility%apply(from, acting, onto, wanted, error)
-    if (allocated(error) .or. .not. self%rolling%steady) return
-    n_node = self%flexibility%lattice%size()
-    do m = 1, size(onto)
-      if (onto(m) == normal) cycle
-      call self%rolling%subtract_ahead(self%flexibility%lattice%extent(1), displacement((m - 1)*n_node + 1:m*n_node))
-    end do
+    if (.not. allocated(error)) call take_off_ahead(self, onto, displacement)
   end subroutine apply_operators
+
+  !> In steady rolling, take tangential displacements at the node ahead off those of each node.
+  subroutine take_off_ahead(self, components, displacement)
+    class(operators_t), intent(in) :: self
+    integer, intent(in) :: components(:)
+    !> One component after the other [m]
+    real(wp), intent(inout), contiguous, target :: displacement(:)
+    integer :: m, n
+
+    if (.not. self%rolling%steady) return
+    n = self%flexibility%lattice%size()
+    do m = 1, size(components)
+      if (components(m) == normal) cycle
+      call self%rolling%subtract_ahead(self%flexibility%lattice%extent(1), displacement((m - 1)*n + 1:m*n))
+    end do
+  end subroutine take_off_ahead
 
   !> Replace tractions, given as vectors, by the displacements along the same components.
   subroutine replace_by_displacement(self, components, values, error)
@@ -144,6 +154,7 @@ contains
       fields(1:n(1), 1:n(2), 1:size(components)) => values
     end associate
     call self%flexibility%replace(components, fields, error)
+    if (.not. allocated(error)) call take_off_ahead(self, components, values)
   end subroutine replace_by_displacement
 
   !> Return all work so far, in applications of the full operator.

@@ -114,6 +114,17 @@ def test_a_segment_with_steps_is_a_creep_curve() -> None:
         plotting.loop(result)
 
 
+def test_rolling_is_not_compared_with_solutions_of_bodies_that_do_not_roll() -> None:
+    result = Case.from_dict(
+        ball({"tangential_load_x": 9.0}, {"rolling": "steady", "tangential_load_x": 15.0})
+    ).run()
+    assert "Cattaneo" in str(result.compare(step=2))
+    assert "Hertz" in str(result.compare())
+    assert "Cattaneo" not in str(result.compare())
+    with pytest.raises(DeckError, match="of rolling bodies are no cycle"):
+        result.wear(1e-14, steps=[2, 3])
+
+
 def test_a_distance_leads_to_the_steady_state() -> None:
     drive = {"tangential_load_x": 15.0, "creepage_y": 0.0005}
     case = Case.from_dict(ball({"rolling": 2e-3, **drive}, {"rolling": "steady"}))
@@ -299,6 +310,7 @@ CREEP = {"rolling": "steady", "creepage_x": -0.001}
         ([CREEP, {"tangential_load_x": 1.0}], {}, "load.3.rolling: missing; expected rolling"),
         ([{"rolling": "slowly"}], {}, 'expected "steady" or a length above 0'),
         ([{"rolling": 1e-4, "steps": 3}], {}, "load.2.steps = 3: expected nothing beside a rolled distance"),
+        ([{"rolling": 1000.0}], {}, "load.2.rolling = 1000.0: expected at most 100000 spacings"),
         ([{**CREEP, "steps": "auto"}], {}, "load.2.steps = .*expected a number beside rolling"),
         ([CREEP], {"solver": {"method": "direct"}}, 'solver.method = "direct": expected "fft"'),
         ([CREEP], {"solver": {"algorithm": "static"}}, 'solver.algorithm = "static": expected "incremental"'),
@@ -320,6 +332,14 @@ CREEP = {"rolling": "steady", "creepage_x": -0.001}
 def test_decks_that_make_no_sense_are_refused(loads: list[Any], tables: dict[str, Any], words: str) -> None:
     with pytest.raises(DeckError, match=words):
         Case.from_dict(ball(*loads, **tables))
+
+
+def test_loads_by_hand_are_refused() -> None:
+    session = Case.from_dict(ball(CREEP)).start()
+    next(session)
+    with pytest.raises(DeckError, match="expected all loads of rolling bodies in"):
+        session.advance(tangential_load_x=3.0)
+    assert next(session).history["creepage_x"] == -0.001
 
 
 def test_a_rounded_distance_is_noted(caplog: pytest.LogCaptureFixture) -> None:

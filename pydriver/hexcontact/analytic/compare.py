@@ -203,7 +203,7 @@ class ClosedForms:
         scale = self.friction * history.normal_load
         load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
         direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
-        if pressed is None or direction is None or history.is_worn:
+        if pressed is None or direction is None or history.is_worn or history.rolls:
             return None
         loads = history.at_constant_pressure(np.array(direction) @ load, scale)
         if loads is None:
@@ -245,7 +245,7 @@ class ClosedForms:
         history = History(self.dataset, number, self.static)
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
         aside = shear > _ASIDE * self.friction * history.normal_load
-        if not history.normal_load > 0.0 or aside or history.is_worn:
+        if not history.normal_load > 0.0 or aside or history.is_worn or history.rolls:
             return None
         hertz = self.gap.contact(history.normal_load)
         contact = LubkinTorsion(
@@ -267,6 +267,8 @@ class History:
         self.dataset = dataset
         self.normal_load = float(dataset["normal_load"].values[last])
         self.is_worn = hertz_gap.is_worn(dataset.isel(step=self.steps))
+        rolled = "rolled_distance" in dataset  # not a number in steps without rolling
+        self.rolls = rolled and bool(np.isfinite(self["rolled_distance"]).any())
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.dataset:

@@ -12,6 +12,7 @@ from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
 from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
+from ..deck.series import MOST_STEPS
 from ..deck.surfaces import Separation, principal_curvatures
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
@@ -213,12 +214,18 @@ def _rolling_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
 
 
 def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> Mistake | None:
-    """Return the fault of a direction of rolling that is no row of the lattice, with 0 as its spacing."""
+    """Return the fault of a direction that is no row of the lattice, of spacing 0, or of too long a way."""
     for key, segment in _segments(loads):
-        if segment.rolling is not None and not spacing(segment.rolling_direction or 0.0):
+        if segment.rolling is None:
+            continue
+        length = spacing(segment.rolling_direction or 0.0)
+        if not length:
             degrees = f"{math.degrees(segment.rolling_direction or 0.0):g} deg"
             sentence = "expected the direction of a row of the lattice; or remove grid.direction"
             return Mistake((*key, "rolling_direction"), degrees, sentence)
+        if isinstance(segment.rolling, float) and segment.rolling > MOST_STEPS * length:
+            sentence = f"expected at most {MOST_STEPS} spacings of the lattice, each of them a load step"
+            return Mistake((*key, "rolling"), segment.rolling, sentence)
     return None
 
 

@@ -20,7 +20,7 @@ from ..interior.fields import region
 from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
 from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions, with_places
 from ..text import did_you_mean, text_table
-from ..variables import FIELDS, TRACTIONS, VARIABLES
+from ..variables import CREEPAGES, FIELDS, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .layout import Quantities, history_of, lattice_of, step_of
 from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
@@ -385,6 +385,8 @@ class Result:
         """
         if (segment is None) == (steps is None):
             raise DeckError("expected either segment or steps, which define the cycle")
+        if CREEPAGES[0] in self:
+            raise DeckError("the load steps of rolling bodies are no cycle: their surfaces move on")
         if segment is None:
             numbers = [int(self.step(integer(n, "steps"))["step"]) for n in steps or ()]
             if not numbers:

@@ -219,6 +219,8 @@ class Session:
         """
         given = {name: value for name, value in locals().items() if name != "self"}
         self._check_open()
+        if self.case.rolls:
+            raise DeckError("rolling: expected all loads of rolling bodies in [[load]], and none by hand")
         entry = with_radians(plain(given | {"label": label or None}))
         before = self._loads
         if not self._by_hand:  # iteration applied the loads of the case, or one for each solved step

@@ -328,7 +328,9 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
         standard = {"standard_name": f"projection_{axis}_coordinate"}
         about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
         chunks = [min(_TRIANGLES, lattice.size)]
-        columns.append(add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed))
+        columns.append(
+            add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed)
+        )
     about = {
         "cf_role": "face_node_connectivity",
         "long_name": "nodes at the corners of each triangle, counterclockwise",
@@ -391,13 +393,12 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
+            empty = dict.fromkeys("xy", np.empty(0))  # written in bands
             given = [
                 _text(file, name, values, layout)
                 if VARIABLES[name].dtype == "str"
                 else (_column(file, name, layout), values)
-                for name, values in (
-                    layout.axes() | dict.fromkeys("xy") | layout.histories() | layout.trials
-                ).items()
+                for name, values in (layout.axes() | empty | layout.histories() | layout.trials).items()
             ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
             file.setncatts(layout.attributes(complete))
@@ -406,7 +407,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
             for column, values in given:
-                if values is not None:
+                if column.name not in empty:
                     column[...] = values
             for first, band in _bands(layout.window, _CHUNK):
                 for name in "xy":

@@ -280,13 +280,16 @@ contains
     logical, intent(in) :: rounded
     !> Not zero: there is not enough memory
     integer, intent(out) :: stat
+    integer :: failed
 
     stat = 0
     if (allocated(self%single) .or. allocated(self%double)) return
     if (rounded) then
-      allocate (self%single(n), stat=stat)
+      allocate (self%single(n), stat=failed)
+      stat = failed
     else
-      allocate (self%double(n), stat=stat)
+      allocate (self%double(n), stat=failed)
+      stat = failed
     end if
   end subroutine reserve
 

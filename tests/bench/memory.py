@@ -51,7 +51,11 @@ PROBLEMS = {
     '[wear]\ncoefficient_1 = 1e-14\ncycle = "cycle"\ncycles = 30\njump = 10\n',
 }
 LARGEST_DIRECT = 128  # nodes along a side
-GOALS = {"frictionless": "≤ 80", "friction, alike": "≤ 300", "friction, unlike": "≤ 400"}  # bytes a window node
+GOALS = {
+    "frictionless": "≤ 80",
+    "friction, alike": "≤ 300",
+    "friction, unlike": "≤ 400",
+}  # bytes a window node
 
 
 class Memory(NamedTuple):

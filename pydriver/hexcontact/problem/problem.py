@@ -300,8 +300,8 @@ class Problem:
         method, shape = self.method_for(lattice), lattice.shape
         nodes = self.contact_nodes(lattice)
         if not self.frictional:
-            known = {"contact": nodes, "threads": memory.threads(), "periodic": lattice.periodic}
-            return contact.memory_needed(method, *shape, **known)
+            threads, periodic = memory.threads(), lattice.periodic
+            return contact.memory_needed(method, *shape, contact=nodes, threads=threads, periodic=periodic)
         return friction.memory_needed(
             method,
             *shape,

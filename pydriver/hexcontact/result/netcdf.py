@@ -400,13 +400,12 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
+            empty = dict.fromkeys("xy", np.empty(0))  # written in bands
             given = [
                 _text(file, name, values, layout)
                 if VARIABLES[name].dtype == "str"
                 else (_column(file, name, layout), values)
-                for name, values in (
-                    layout.axes() | dict.fromkeys("xy") | layout.histories() | layout.trials
-                ).items()
+                for name, values in (layout.axes() | empty | layout.histories() | layout.trials).items()
             ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
             file.setncatts(layout.attributes(complete))
@@ -415,7 +414,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
             for column, values in given:
-                if values is not None:
+                if column.name not in empty:
                     column[...] = values
             for first, band in _bands(layout.window, _CHUNK):
                 for name in "xy":

@@ -32,7 +32,7 @@ def fields_held(case: Problem) -> int:
         (entry, 45),  # places of nodes when their gap closed
         (case.adaptive, 40),  # the path in whole steps, and edges
         (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts
-        (case.deck.wear, 42),  # cycles before and after a jump, their record, the pressure ahead
+        (case.deck.wear, 56),  # cycles before and after a jump, their record, the pressure ahead
         (case.deck.wear, 3 * (1 + len(case.cycle)) if case.deck.wear else 0),  # guesses of its load steps
         (case.deck.interface, 6 if friction else 4),  # springs, and the symbol of bodies on them
     ]

@@ -27,6 +27,7 @@ from .registry import SEVERAL_RUNS, figure
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
+_JUMP = 1e-3  # of another creepage over the range of a curve, where it ends
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
@@ -264,7 +265,13 @@ def creep(result: Result | Dataset, ax: Axes | None = None) -> Figure:
     scale = (mu if np.isfinite(mu) and mu > 0.0 else 1.0) * values_of(dataset, "normal_load")
     canvas, axes = style.drawing(ax, 4.6, 3.6)
     factor, unit = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-    ends = np.flatnonzero(np.diff(dataset["segment"].values)) + 1  # a line for each segment
+    # a curve ends where another creepage, or the spin, changes
+    jumps = [
+        np.abs(np.diff(values_of(dataset, name))) * length.get(name, 1.0) > _JUMP * spans[over]
+        for name in CREEPAGES
+        if name != over
+    ]
+    ends = np.flatnonzero(np.any(jumps, axis=0)) + 1
     looks = (
         (style.COMPUTED, "o", "tangential_load_x"),
         (style.EXACT, "s", "tangential_load_y"),

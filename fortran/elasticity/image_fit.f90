@@ -5,7 +5,7 @@
 !> squares, by Gram and Schmidt's method on rows that are divided by the size of the response; a small multiple of the unit matrix
 !> below them bounds the coefficients (A.N. Tikhonov, 1963). The limit k = 0, which is the far field, has a large weight.
 !>
-!> Equations: docs/theory/coatings.md, (K5).
+!> Equations: docs/theory/coatings.md, (J5).
 module hc_image_fit
   use hc_precision, only: wp
   implicit none

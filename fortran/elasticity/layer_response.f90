@@ -8,7 +8,7 @@
 !> are added one by one from the bottom: a 2 x 2 compliance of what lies below becomes that of what lies below the next surface,
 !> with exponentials that only decay.
 !>
-!> Equations: docs/theory/coatings.md, (K1) to (K4).
+!> Equations: docs/theory/coatings.md, (J1) to (J4).
 module hc_layer_response
   use hc_precision, only: wp, pi
   implicit none
@@ -81,7 +81,7 @@ contains
     end associate
   end function half_space
 
-  !> Compute k times C_zz, C_LL, C_TT and -D of one layer on a half-space [1/Pa], (K2).
+  !> Compute k times C_zz, C_LL, C_TT and -D of one layer on a half-space [1/Pa], (J2).
   pure function one_layer(layer, base, x) result(f)
     type(layer_t), intent(in) :: layer, base
     !> Wave number times thickness
@@ -124,7 +124,7 @@ contains
     if (x > -1.0_wp) expm1 = 2.0_wp*exp(0.5_wp*x)*sinh(0.5_wp*x)
   end function expm1
 
-  !> Replace the compliance of what lies below a layer by that of what lies below its surface, (K3) and (K4).
+  !> Replace the compliance of what lies below a layer by that of what lies below its surface, (J3) and (J4).
   pure subroutine add_layer(layer, x, c, s)
     type(layer_t), intent(in) :: layer
     !> Wave number times thickness

@@ -12,7 +12,7 @@
 !>
 !> Symbols are computed from the responses themselves.
 !>
-!> Equations: docs/theory/coatings.md, (K1), (K5) to (K7).
+!> Equations: docs/theory/coatings.md, (J1), (J5) to (J7).
 module hc_layered_pair
   use, intrinsic :: iso_fortran_env, only: int64
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -355,7 +355,7 @@ contains
     call move_alloc(made, influence)
   end subroutine new_influence
 
-  !> Add the images to the six blocks of the outermost materials, (K6).
+  !> Add the images to the six blocks of the outermost materials, (J6).
   pure subroutine blocks(self, x, y, block)
     class(image_influence_t), intent(in) :: self
     real(wp), intent(in), contiguous :: x(:), y(:)
@@ -442,7 +442,7 @@ contains
     end do
   end subroutine find_symbols
 
-  !> Compute what responses add to the transform of the blocks at a wave vector, (K7); that of odd blocks over i.
+  !> Compute what responses add to the transform of the blocks at a wave vector, (J7); that of odd blocks over i.
   pure function change_at(self, basis, half) result(change)
     type(layered_pair_t), intent(in) :: self
     real(wp), intent(in) :: basis(2, 2)

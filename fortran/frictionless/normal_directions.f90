@@ -33,21 +33,19 @@ contains
     !$omp end parallel do
   end subroutine find_residual
 
-  !> Compute d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or the part of p on a fixed set.
-  subroutine projected_step(level, now, fixed)
+  !> Compute d = max(p + c z, 0) - p on the active nodes, -p elsewhere.
+  subroutine projected_step(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> The set of active nodes is fixed
-    logical, intent(in) :: fixed
     real(wp) :: part(size(now%p, 2)), mean, step_length
     real(sp) :: lack
     integer :: row
 
     step_length = level%options%normal%step_length
     mean = 0.0_wp
-    if (now%by_load .and. .not. fixed) then
+    if (now%by_load) then
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%p, 2)
         associate (from => now%span(1, row), to => now%span(2, row))
@@ -63,9 +61,7 @@ contains
       associate (from => now%span(1, row), to => now%span(2, row))
         associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
                    z => now%z(from:to, row, 1))
-          if (fixed) then
-            call projected_row(now%p_unit, p, active, d, part(row))
-          else if (now%by_load) then
+          if (now%by_load) then
             call projected_row(now%p_unit, p, active, d, part(row), [step_length, step_length*mean], z, now%punch(from:to, row))
           else
             call projected_row(now%p_unit, p, active, d, part(row), [step_length, 0.0_wp], z)

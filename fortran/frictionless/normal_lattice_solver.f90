@@ -255,16 +255,17 @@ contains
     logical, intent(inout) :: anew
     logical :: found
 
+    anew = anew .or. changed
     if (now%searches .and. .not. progress%fixed) then
-      call search_step(level, now, progress, found)
       anew = .true.
+      found = .false.
+      if (progress%step == searched .or. .not. any(now%p < 0.0_wp)) call search_step(level, now, progress, found)
       if (found) return
-      ! what is left of nodes that left the set goes first
-      call projected_step(level, now, .true.)
+      ! tension, and the pressure of nodes that left the set, go first
+      call searched_step(level, now, 0.0_wp, .false., found)
       call recurrence%restart()
     else if (changed) then
-      call projected_step(level, now, .false.)
-      anew = .true.
+      call projected_step(level, now)
     else
       progress%step = conjugate
       if (level%normal_law%is_compliant()) then

@@ -135,9 +135,9 @@ contains
     !> Sum of p + d
     real(wp), intent(out) :: total
     !> Length of the step, and share of the pressure of a punch that is taken off
-    real(wp), intent(in), optional :: step(2)
-    !> The direction; absent: no step
-    real(sp), intent(in), optional, contiguous :: z(:)
+    real(wp), intent(in) :: step(2)
+    !> The direction
+    real(sp), intent(in), contiguous :: z(:)
     !> The pressure of a punch; absent: none is taken off
     real(sp), intent(in), optional, contiguous :: punch(:)
     !> Sum of the punch where p + d is positive
@@ -149,8 +149,7 @@ contains
       carries(col) = merge(1, 0, active(col))
     end do
     before = pressure/unit
-    aim = before
-    if (present(z)) aim = aim + step(1)*z
+    aim = before + step(1)*z
     if (present(punch)) aim = aim - step(2)*punch
     total = 0.0_wp
     !$omp simd reduction(+: total)

@@ -85,7 +85,7 @@ contains
     call check(error, real(d, wp), [2.0_wp, -7.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'direction')
     if (allocated(error)) return
 
-    call projected_row(0.5_wp, p, active, d, total)
+    call projected_row(0.5_wp, p, active, d, total, [0.0_wp, 0.0_wp], z)
     call check(error, [real(d, wp), total], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.0_wp], 0.0_wp, 'no step')
     if (allocated(error)) return
     call projected_row(0.5_wp, p, active, d, total, [0.5_wp, 0.0_wp], z)

@@ -200,14 +200,14 @@ WRONG = [
         '"spere"',
         'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
         '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
-        '"torus", "waviness", "dent", "roller", "formula", "map" or "profile"; did you mean sphere?',
+        '"torus", "waviness", "dent", "roller", "formula", "map", "profile" or "rough"; did you mean sphere?',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
         "{ radius = 1 }",
         'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "ellipsoid", "cylinder", '
         '"cone", "power", "punch", "rounded_punch", "rectangular_punch", '
-        '"torus", "waviness", "dent", "roller", "formula", "map" or "profile"',
+        '"torus", "waviness", "dent", "roller", "formula", "map", "profile" or "rough"',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',

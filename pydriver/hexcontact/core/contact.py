@@ -83,7 +83,7 @@ class ElasticPair:
     lambda_5: float
 
     def __post_init__(self) -> None:
-        one, two, five = checked(**vars(self))
+        one, two, five = checked(lambda_1=self.lambda_1, lambda_2=self.lambda_2, lambda_5=self.lambda_5)
         if not (0 < one < np.inf and abs(two) < one and -one < five < np.inf):
             raise DeckError(
                 f"lambda_1, lambda_2, lambda_5 = {one:g}, {two:g}, {five:g}: expected finite numbers with "

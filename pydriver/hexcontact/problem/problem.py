@@ -155,8 +155,8 @@ class Problem:
 
     @property
     def rolls(self) -> bool:
-        """Whether the bodies roll."""
-        return any(step.roll for step in self.load_steps)
+        """Whether the bodies roll: from the first step that does on, all do."""
+        return bool(self.load_steps) and self.load_steps[-1].roll is not None
 
     def rolled_spacing(self, direction: float) -> float:
         """Return the distance (m) of two nodes along a row of the lattice."""

@@ -50,8 +50,9 @@ module hc_normal_lattice_solver
     real(wp) :: fixed_start = 1.0_wp
     !> Length of searched steps before their cut
     real(wp) :: length = 1.0_wp
-    !> Kind of the last step
+    !> Kind of the last step; it took tension away, of which rounding errors are left
     integer :: step = projected
+    logical :: emptied = .false.
     !> Times that the pressure was fitted to the load
     integer :: fits = 0
   contains
@@ -259,7 +260,10 @@ contains
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
       found = .false.
-      if (progress%step == searched .or. .not. any(now%p < 0.0_wp)) call search_step(level, now, progress, found)
+      if (progress%step == searched .or. progress%emptied .or. .not. any(now%p < 0.0_wp)) then
+        call search_step(level, now, progress, found)
+      end if
+      progress%emptied = .not. found
       if (found) return
       ! tension, and the pressure of nodes that left the set, go first
       call searched_step(level, now, 0.0_wp, .false., found)

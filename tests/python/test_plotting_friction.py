@@ -197,7 +197,7 @@ def rolling() -> xarray.Dataset:
                 "creepage_x": -creepage,
                 "rolled_distance": 0.0,
                 "torque": torque,
-                "segment": 2 + (torque != 0.0),
+                "spin": 0.01 * (torque != 0.0),
             }
         )
         for load, creepage, torque in ((0.3, 0.1, 0.0), (0.5, 0.2, 0.0), (0.45, 0.2, -0.02))
@@ -206,7 +206,7 @@ def rolling() -> xarray.Dataset:
     return made([pressed, *steps])
 
 
-def test_creep_forces_are_drawn_over_the_creepage_segment_by_segment() -> None:
+def test_creep_forces_are_drawn_over_the_creepage_up_to_a_spin() -> None:
     [force, torque] = [line for line in plotting.creep(rolling()).axes[0].lines if len(line.get_xdata()) > 2]
     np.testing.assert_allclose(force.get_xdata(), [-0.1, -0.2, np.nan, -0.2])
     np.testing.assert_allclose(force.get_ydata(), [0.3, 0.5, np.nan, 0.45])

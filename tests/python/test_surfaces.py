@@ -13,6 +13,7 @@ from hexcontact.deck.json_schema import deck_schema
 from hexcontact.deck.keys import Body
 from hexcontact.deck.kinds import Quantity
 from hexcontact.deck.measured import Map, Profile
+from hexcontact.deck.rough import Rough
 from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
@@ -176,9 +177,9 @@ def test_all_shapes_of_the_deck_are_there() -> None:
         "rounded_punch",
         *("ellipsoid", "rectangular_punch", "torus", "waviness", "dent", "roller"),
         "formula",
-        *("map", "profile"),
+        *("map", "profile", "rough"),
     }
-    assert set(SHAPES.values()) == {type(surface) for surface in SOME} | {Map, Profile}
+    assert set(SHAPES.values()) == {type(surface) for surface in SOME} | {Map, Profile, Rough}
 
 
 @pytest.mark.parametrize(

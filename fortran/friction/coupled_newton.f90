@@ -275,8 +275,6 @@ contains
                                 options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
-      ! a law that depends on the direction has springs along t, too, on which rounded directions do not converge
-      iteration%rounded = .not. allocated(now%shear%rest)
       call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
       if (allocated(error)) return
       now%outcome = iteration%outcome

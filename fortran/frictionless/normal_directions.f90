@@ -156,8 +156,8 @@ contains
       !$omp end parallel do
       if (.not. now%by_load) exit
       lack = sum(part) - now%pressures/now%p_unit
-      if (abs(lack) <= rounding*now%pressures/now%p_unit .or. .not. sum(punch) > 0.0_wp) exit
-      off = off + lack/sum(punch)
+      if (abs(lack) <= rounding*now%pressures/now%p_unit) exit
+      off = off + lack/merge(sum(punch), now%punch_sum, sum(punch) > 0.0_wp)
     end do
     steep = steepness(level, now) > least_share*max(uncut, 0.0_wp)
   end subroutine searched_step

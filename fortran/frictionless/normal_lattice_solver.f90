@@ -257,6 +257,7 @@ contains
     logical :: found
 
     anew = anew .or. changed
+    if (progress%step == conjugate) progress%emptied = .false.
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
       found = .false.

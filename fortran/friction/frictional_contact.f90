@@ -150,9 +150,9 @@ contains
     if (coupled) then
       ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction; the products of all
       ! directions off the contact; without the displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 - 4)*field + 3*directions*half
+      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 - 4)*field + 3*directions*field
       ! packed: both of all directions, residuals, constraints twice, and their rows for the pressure; without the products there
-      inside = inside + 3*(2*directions*half + (2 + 2*n_force)*field) + n_force*field - 3*directions*half
+      inside = inside + 3*(2*directions + 2 + 2*n_force)*field + n_force*field - 3*directions*field
     else
       ! product of a direction
       everywhere = everywhere + 2*field

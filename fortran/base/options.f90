@@ -101,8 +101,6 @@ module hc_options
     !> Round-off that is allowed in displacements that are carried along, relative to the largest; where more may be
     !> left, they are computed afresh
     real(wp) :: displacement_rounding = 1.0e-10_wp
-    !> The same relative to the residual of a coupled sweep, which another one follows
-    real(wp) :: drift_share = 1.0e-2_wp
     !> Component of the traction across the direction of slip, relative to the largest that friction allows, that is no step
     !> towards a solution: nodes are fixed in stick instead
     real(wp) :: most_across = 5.0_wp

@@ -278,11 +278,7 @@ contains
       call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
       if (allocated(error)) return
       now%outcome = iteration%outcome
-      now%drift = iteration%drift
-      ! as long as the residual is far larger, the next sweep begins with a product anyway
-      if (now%drift <= max(options%displacement_rounding, options%drift_share*iteration%residual)) return
-      call system%product(step%x, step%ax, error)
-      now%drift = 0.0_wp
+      if (iteration%drift > options%displacement_rounding) call system%product(step%x, step%ax, error)
     end associate
   end subroutine solve
 

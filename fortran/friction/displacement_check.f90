@@ -20,11 +20,10 @@ contains
     type(friction_iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: applications, largest, rounding
+    real(wp) :: applications, largest
     real(wp), allocatable :: q(:), moved(:), by_pressure(:), w(:), u(:)
 
-    rounding = max(now%problem%options%newton%displacement_rounding, now%drift)
-    associate (n => size(now%p))
+    associate (n => size(now%p), rounding => now%problem%options%newton%displacement_rounding)
       allocate (moved(3*n), by_pressure(3*n), source=0.0_wp)
       applications = now%operators%flexibility%applications
       call now%operators%apply([normal], now%p, [normal, along_x, along_y], by_pressure, error)

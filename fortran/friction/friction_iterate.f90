@@ -40,8 +40,6 @@ module hc_friction_iterate
     !> Approach, shifts and twist
     real(wp) :: motion(n_motion) = 0.0_wp
     real(wp) :: residual_normal = 1.0_wp, residual_tangential = 1.0_wp
-    !> Bound of the rounding errors that a linear solution has left in the displacements, relative to the largest
-    real(wp) :: drift = 0.0_wp
     !> Too few nodes stick: some were fixed in stick so that a prescribed load can be carried
     logical :: fixed = .false.
     !> Even so nothing resists a motion whose load is prescribed
@@ -241,7 +239,6 @@ contains
     space = self%operators%space
     self%cut = .false.
     self%joint = .false.
-    self%drift = 0.0_wp
     if (.not. allocated(self%w)) call allocate_displacements(self)
     if (.not. allocated(self%shear%compliance)) call self%shear%reset_frames()
     allocate (moved(3*n))

@@ -135,7 +135,7 @@ contains
       state%motion = now%motion
       less = 0.0_wp
       ! what carried displacements lack: those of the cut, and their rounding errors
-      if (known .and. judged) less = cut_off(now, state) + 2*max(options%displacement_rounding, now%drift)
+      if (known .and. judged) less = cut_off(now, state) + 2*options%displacement_rounding
       known = known .and. less <= options%cut_share*step%tolerance
       if (known) then
         call collect(now, state)

@@ -65,8 +65,6 @@ module hc_linear_system
     integer :: most = 0, made = 0
     !> GMRES: directions that are stored; after as many the iteration begins anew with the residual that is left
     integer :: most_directions = 0
-    !> GMRES: directions are stored in single precision, whose rounding errors the drift contains
-    logical :: rounded = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)
     !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off

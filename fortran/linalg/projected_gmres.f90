@@ -8,14 +8,11 @@
 !> Of the products A z only the part off the active nodes is stored: with the weights W, the matrix H of Arnoldi's method and
 !> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s.
 !>
-!> Directions that are stored in single precision are multiplied as they are stored, and what their rounding takes from C^T x is
-!> given back.
-!>
 !> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869).
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
   use hc_field_space, only: field_space_t
@@ -25,14 +22,6 @@ module hc_projected_gmres
   private
 
   public :: projected_gmres
-
-  !> A vector that is stored in one of the precisions.
-  type :: stored_t
-    real(wp), allocatable :: double(:)
-    real(sp), allocatable :: single(:)
-  contains
-    procedure :: reserve, put, get, add_to
-  end type stored_t
 
 contains
 
@@ -59,22 +48,20 @@ contains
     type :: direction_t
       !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
       !> nodes; the product A z on the others
-      type(stored_t) :: v, z, beyond
+      real(wp), allocatable :: v(:), z(:), beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
     type(active_set_t) :: others
-    !> On the active nodes: a residual or direction, and the next residual; a product over all nodes
-    real(wp), allocatable :: packed(:), next(:), image(:)
+    !> On the active nodes; a product over all nodes
+    real(wp), allocatable :: packed(:), image(:)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(iteration%weight))
     !> H, and after rotations
     real(wp), dimension(iteration%most_directions + 1, iteration%most_directions) :: arnoldi, h
     real(wp), dimension(iteration%most_directions + 1) :: g, left
     real(wp), dimension(iteration%most_directions) :: c, s, y
-    !> Shares of the constraints, and C^T z
-    real(wp), dimension(size(constraints%multiplier), iteration%most_directions) :: share, lost
-    real(wp) :: length, began, rounding
+    real(wp) :: share(size(constraints%multiplier), iteration%most_directions), length, began
     real(wp) :: inverse(size(constraints%multiplier), size(constraints%multiplier))
     !> Norms of the columns, with the weights of the residual
     real(wp) :: along(size(constraints%multiplier))
@@ -107,8 +94,7 @@ contains
       integer :: i, part
 
       others = nodes%complement(size(x))
-      allocate (next(nodes%n_active), packed(nodes%n_active))
-      rounding = merge(real(epsilon(1.0_sp), wp), epsilon(1.0_wp), iteration%rounded)
+      allocate (basis(1)%v(nodes%n_active), packed(nodes%n_active))
       part = size(x)/size(iteration%weight)
       last(0) = 0
       do i = 1, size(iteration%weight)
@@ -120,13 +106,13 @@ contains
         call weigh(iteration%weight, packed)
         along(i) = sqrt(space%dot(packed, packed))
       end do
-      call nodes%pack(rhs, next)
+      call nodes%pack(rhs, basis(1)%v)
       deallocate (rhs)
       call nodes%pack(ax, packed)
-      next = next - packed
-      call space%add_columns(constraints%columns, constraints%multiplier, next)
-      call weigh(iteration%weight, next)
-      length = sqrt(space%dot(next, next))
+      basis(1)%v = basis(1)%v - packed
+      call space%add_columns(constraints%columns, constraints%multiplier, basis(1)%v)
+      call weigh(iteration%weight, basis(1)%v)
+      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
       iteration%residual = length
       iteration%drift = epsilon(1.0_wp)*length
     end subroutine begin
@@ -140,49 +126,39 @@ contains
 
       directions = 0
       began = length
-      next = next/length
+      basis(1)%v = basis(1)%v/length
       g = 0.0_wp
       g(1) = began
       h = 0.0_wp
       do k = 1, most
-        call basis(k)%v%reserve(nodes%n_active, iteration%rounded, stat)
-        if (stat == 0) call basis(k)%z%reserve(nodes%n_active, iteration%rounded, stat)
-        if (stat == 0) call basis(k)%beyond%reserve(others%n_active, iteration%rounded, stat)
+        stat = 0
+        if (.not. allocated(basis(k)%z)) then
+          allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+        end if
         if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
         if (stat /= 0) then
           call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
           return
         end if
-        call basis(k)%v%put(next)
-        call weigh(1.0_wp/iteration%weight, next)
-        call system%precondition_packed(nodes, size(x), next, packed, error)
+        call space%copy(basis(k)%v, packed)
+        call weigh(1.0_wp/iteration%weight, packed)
+        call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
         if (allocated(error)) return
-        share(:, k) = -matmul(inverse, constraints%resultants(space, packed))
-        call space%add_columns(constraints%mb, share(:, k), packed)
-        call basis(k)%z%put(packed)
-        lost(:, k) = 0.0_wp
-        if (iteration%rounded) then
-          call basis(k)%z%get(packed)
-          lost(:, k) = constraints%resultants(space, packed)
-        end if
-        call system%product_packed(nodes, packed, image, error)
+        share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k)%z))
+        call space%add_columns(constraints%mb, share(:, k), basis(k)%z)
+        call system%product_packed(nodes, basis(k)%z, image, error)
         if (allocated(error)) return
-        call nodes%pack(image, next)
-        if (iteration%rounded) then
-          call others%pack(image, basis(k)%beyond%single)
-        else
-          call others%pack(image, basis(k)%beyond%double)
-        end if
-        call space%add_columns(constraints%columns, -share(:, k), next)
-        call weigh(iteration%weight, next)
+        call nodes%pack(image, basis(k + 1)%v)
+        call others%pack(image, basis(k)%beyond)
+        call space%add_columns(constraints%columns, -share(:, k), basis(k + 1)%v)
+        call weigh(iteration%weight, basis(k + 1)%v)
         do i = 1, k
-          call basis(i)%v%get(packed)
-          h(i, k) = space%dot(packed, next)
-          next = next - h(i, k)*packed
+          h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
+          basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
         end do
-        h(k + 1, k) = sqrt(space%dot(next, next))
+        h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
         arnoldi(:, k) = h(:, k)
-        if (h(k + 1, k) > 0.0_wp) next = next/h(k + 1, k)
+        if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
         do i = 1, k - 1
           rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
           h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
@@ -190,10 +166,7 @@ contains
         end do
         length = hypot(h(k, k), h(k + 1, k))
         if (.not. length > 0.0_wp) iteration%outcome = solution_broke_off
-        if (iteration%outcome == solution_broke_off) then
-          call basis(k)%v%get(next)
-          exit
-        end if
+        if (iteration%outcome == solution_broke_off) exit
         directions = k
         c(k) = h(k, k)/length
         s(k) = h(k + 1, k)/length
@@ -215,7 +188,7 @@ contains
       end do
       ! where nodes slip far, or motions are all but free, the terms of A x are large and cancel
       do i = 1, directions
-        iteration%drift = iteration%drift + rounding*abs(y(i))*(norm2(arnoldi(:i + 1, i)) &
+        iteration%drift = iteration%drift + epsilon(1.0_wp)*abs(y(i))*(norm2(arnoldi(:i + 1, i)) &
                                                                        + dot_product(abs(share(:, i)), along))
       end do
       ! solution and product from the same directions: the preconditioner is of single precision, and where a node
@@ -224,37 +197,23 @@ contains
       packed = 0.0_wp
       do i = 1, directions + 1
         left(i) = -dot_product(arnoldi(i, :directions), y(:directions))
-        if (i <= directions) call basis(i)%v%add_to(packed, -left(i))
+        packed = packed - left(i)*basis(i)%v
       end do
-      ! the last residual is the next direction, which is not stored yet
-      packed = packed - left(directions + 1)*next
       call weigh(1.0_wp/iteration%weight, packed)
       call space%add_columns(constraints%columns, matmul(share(:, :directions), y(:directions)), packed)
       call nodes%add(1.0_wp, packed, ax)
       do i = 1, directions
-        if (iteration%rounded) then
-          call nodes%add(y(i), basis(i)%z%single, x)
-          call others%add(y(i), basis(i)%beyond%single, ax)
-        else
-          call nodes%add(y(i), basis(i)%z%double, x)
-          call others%add(y(i), basis(i)%beyond%double, ax)
-        end if
+        call nodes%add(y(i), basis(i)%z, x)
+        call others%add(y(i), basis(i)%beyond, ax)
       end do
-      if (iteration%rounded) then
-        packed = 0.0_wp
-        call space%add_columns(constraints%mb, -matmul(inverse, matmul(lost(:, :directions), y(:directions))), packed)
-        call nodes%add(1.0_wp, packed, x)
-      end if
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return
       left(1) = left(1) + began
-      call basis(1)%v%get(packed)
-      packed = left(1)*packed
-      do i = 2, directions
-        call basis(i)%v%add_to(packed, left(i))
+      basis(1)%v = left(1)*basis(1)%v
+      do i = 2, directions + 1
+        basis(1)%v = basis(1)%v + left(i)*basis(i)%v
       end do
-      next = packed + left(directions + 1)*next
-      length = sqrt(space%dot(next, next))
+      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     end subroutine take_step
 
     !> Multiply by one factor for each part.
@@ -270,64 +229,5 @@ contains
     end subroutine weigh
 
   end subroutine projected_gmres
-
-  !> Take memory for a number of values, unless there is some.
-  pure subroutine reserve(self, n, rounded, stat)
-    class(stored_t), intent(inout) :: self
-    !> Number of values
-    integer, intent(in) :: n
-    !> In single precision
-    logical, intent(in) :: rounded
-    !> Not zero: there is not enough memory
-    integer, intent(out) :: stat
-    integer :: failed
-
-    stat = 0
-    if (allocated(self%single) .or. allocated(self%double)) return
-    if (rounded) then
-      allocate (self%single(n), stat=failed)
-      stat = failed
-    else
-      allocate (self%double(n), stat=failed)
-      stat = failed
-    end if
-  end subroutine reserve
-
-  !> Store values.
-  pure subroutine put(self, values)
-    class(stored_t), intent(inout) :: self
-    real(wp), intent(in), contiguous :: values(:)
-
-    if (allocated(self%single)) then
-      self%single(:) = real(values, sp)
-    else
-      self%double(:) = values
-    end if
-  end subroutine put
-
-  !> Return the values as they are stored.
-  pure subroutine get(self, values)
-    class(stored_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: values(:)
-
-    if (allocated(self%single)) then
-      values = self%single
-    else
-      values = self%double
-    end if
-  end subroutine get
-
-  !> Add a multiple of them to others.
-  pure subroutine add_to(self, values, factor)
-    class(stored_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: values(:)
-    real(wp), intent(in) :: factor
-
-    if (allocated(self%single)) then
-      values = values + factor*self%single
-    else
-      values = values + factor*self%double
-    end if
-  end subroutine add_to
 
 end module hc_projected_gmres

@@ -43,7 +43,7 @@ contains
       new_test('step_equation', test_step_equation), &
       new_test('products_that_are_carried', test_products_that_are_carried), &
       new_test('restarts_of_gmres', test_restarts_of_gmres), &
-      new_test('rounded_directions', test_rounded_directions), &
+      new_test('rows_of_some', test_rows_of_some), &
       new_test('ends_of_gmres', test_ends_of_gmres) &
     ]
   end subroutine collect_linear_solvers
@@ -352,9 +352,8 @@ contains
     end do
   end subroutine test_products_that_are_carried
 
-  !> Directions of single precision: their rounding errors are in the residual and, within the drift, in the product, but not in
-  !> the constraint, however often the iteration begins anew.
-  subroutine test_rounded_directions(error)
+  !> A constraint whose rows differ from its columns at the first nodes holds, however often the iteration begins anew.
+  subroutine test_rows_of_some(error)
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
     type(active_set_t) :: nodes
@@ -381,24 +380,23 @@ contains
       constraints%multiplier = [0.0_wp]
       associate (c => [0.7_wp, 1.3_wp, 0.0_wp, 1.0_wp, 1.0_wp])
         left(1) = dot_product(c, x)
-        iteration = iteration_t(tolerance=1.0e-5_wp, most=40, most_directions=most, rounded=.true.)
+        iteration = iteration_t(tolerance=1.0e-5_wp, most=40, most_directions=most)
         iteration%weight = [1.0_wp]
         call freeing_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
         if (allocated(error)) return
         call check(error, dot_product(c, x), left(1), 1.0e-14_wp, 'constraint')
       end associate
       if (allocated(error)) return
-      call check_true(error, iteration%drift > 1.0e-8_wp .and. maxval(abs(ax - matmul(system%matrix, x))) < iteration%drift, &
-                      'product within the drift')
+      call check_true(error, maxval(abs(ax - matmul(system%matrix, x))) < iteration%drift, 'product within the drift')
       if (allocated(error)) return
       left = [1.0_wp, 2.0_wp, 0.0_wp, 3.0_wp, -4.0_wp] - matmul(system%matrix, x) + constraints%multiplier(1)
       left(3) = 0.0_wp
-      call check(error, norm2(left), 0.0_wp, 1.0e-5_wp + 2*iteration%drift, 'residual')
+      call check(error, norm2(left), 0.0_wp, 1.0e-5_wp, 'residual')
       if (allocated(error)) return
       call check(error, iteration%outcome, solution_accurate, 'outcome')
       if (allocated(error)) return
     end do
-  end subroutine test_rounded_directions
+  end subroutine test_rows_of_some
 
   !> GMRES with two directions at a time comes to the solution under a constraint, too, by more iterations; its product and its
   !> residual are those of the unknowns wherever it stops.

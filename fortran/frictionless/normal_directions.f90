@@ -10,8 +10,7 @@ module hc_normal_directions
   implicit none
   private
 
-  public :: find_residual, projected_step, searched_step, steepness, next_direction, next_sprung_direction, curvature, &
-            find_sprung_step
+  public :: find_residual, projected_step, searched_step, next_direction, next_sprung_direction, curvature, find_sprung_step
 
 contains
 
@@ -39,7 +38,8 @@ contains
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    real(wp) :: part(size(now%p, 2)), mean, step_length
+    real(wp), dimension(size(now%p, 2)) :: part, punch
+    real(wp) :: mean, step_length
     real(sp) :: lack
     integer :: row
 
@@ -55,21 +55,7 @@ contains
       !$omp end parallel do
       mean = sum(part)/now%punch_sum
     end if
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
-    do row = 1, size(now%p, 2)
-      now%d(:, row, 1) = 0.0_sp
-      associate (from => now%span(1, row), to => now%span(2, row))
-        associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
-                   z => now%z(from:to, row, 1))
-          if (now%by_load) then
-            call projected_row(now%p_unit, p, active, d, part(row), [step_length, step_length*mean], z, now%punch(from:to, row))
-          else
-            call projected_row(now%p_unit, p, active, d, part(row), [step_length, 0.0_wp], z)
-          end if
-        end associate
-      end associate
-    end do
-    !$omp end parallel do
+    call cut(level, now, step_length, step_length*mean, part, punch)
     if (.not. sum(part) > 0.0_wp) then
       ! none of the pressure is left where it should be
       now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
@@ -91,17 +77,17 @@ contains
   !> the last step before the cut.
   !>
   !> What the cut changes of a prescribed load is taken off along the punch before it, so that there is no tension, (N8).
-  subroutine searched_step(level, now, length, follows, steep)
+  subroutine searched_step(level, now, length, curved, fall)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Length of the step before the cut
     real(wp), intent(in) :: length
-    !> d and its product are those of the last step; otherwise there is none
-    logical, intent(in) :: follows
-    !> The step goes down, not much less than without the cut
-    logical, intent(out) :: steep
+    !> d^T K d of the last step, which d and its product are; 0: there is none
+    real(wp), intent(in) :: curved
+    !> Fall of the energy along the step by its length, -g^T d; 0: much less than without the cut
+    real(wp), intent(out) :: fall
     !> Newton's method for the part along the punch, and the error of the load that is left to rounding
     integer, parameter :: max_cuts = 12
     real(wp), parameter :: rounding = 1.0e-7_wp
@@ -123,7 +109,7 @@ contains
     mean = 0.0_wp
     if (now%by_load) mean = sum(sum_z)/now%punch_sum
     back = 0.0_sp
-    if (follows) back = max(real(-sum(part)/curvature(level, now), sp), 0.0_sp)
+    if (curved > 0.0_wp) back = max(real(-sum(part)/curved, sp), 0.0_sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
@@ -139,28 +125,43 @@ contains
     uncut = length*sum(part)
     off = length*mean
     do try = 1, max_cuts
-      !$omp parallel do schedule(static) num_threads(level%space%threads)
-      do row = 1, size(now%p, 2)
-        now%d(:, row, 1) = 0.0_sp
-        associate (from => now%span(1, row), to => now%span(2, row))
-          associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
-                     z => now%z(from:to, row, 1))
-            if (now%by_load) then
-              call projected_row(now%p_unit, p, active, d, part(row), [length, off], z, now%punch(from:to, row), punch(row))
-            else
-              call projected_row(now%p_unit, p, active, d, part(row), [length, 0.0_wp], z)
-            end if
-          end associate
-        end associate
-      end do
-      !$omp end parallel do
+      call cut(level, now, length, off, part, punch)
       if (.not. now%by_load) exit
       lack = sum(part) - now%pressures/now%p_unit
       if (abs(lack) <= rounding*now%pressures/now%p_unit) exit
       off = off + lack/merge(sum(punch), now%punch_sum, sum(punch) > 0.0_wp)
     end do
-    steep = steepness(level, now) > least_share*max(uncut, 0.0_wp)
+    fall = steepness(level, now)
+    if (.not. fall > least_share*max(uncut, 0.0_wp)) fall = 0.0_wp
   end subroutine searched_step
+
+  !> Compute d = max(p + length z - off u, 0) - p on the active nodes, u the punch under a prescribed load, and -p elsewhere.
+  subroutine cut(level, now, length, off, part, punch)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
+    !> Length, and share of the punch that is taken off
+    real(wp), intent(in) :: length, off
+    !> By rows: sums of p + d, and of the punch where it is positive
+    real(wp), intent(out), contiguous :: part(:), punch(:)
+    integer :: row
+
+    punch = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      now%d(:, row, 1) = 0.0_sp
+      associate (from => now%span(1, row), to => now%span(2, row))
+        associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+                   z => now%z(from:to, row, 1))
+          if (now%by_load) then
+            call projected_row(now%p_unit, p, active, d, part(row), [length, off], z, now%punch(from:to, row), punch(row))
+          else
+            call projected_row(now%p_unit, p, active, d, part(row), [length, 0.0_wp], z)
+          end if
+        end associate
+      end associate
+    end do
+    !$omp end parallel do
+  end subroutine cut
 
   !> Compute -g^T d, the fall of the energy along a direction by its length.
   real(wp) function steepness(level, now)

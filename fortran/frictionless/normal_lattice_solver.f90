@@ -30,8 +30,8 @@ module hc_normal_lattice_solver
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, &
     linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
-  use hc_normal_directions, only: find_residual, projected_step, searched_step, steepness, next_direction, &
-    next_sprung_direction, curvature, find_sprung_step
+  use hc_normal_directions, only: find_residual, projected_step, searched_step, next_direction, next_sprung_direction, &
+    curvature, find_sprung_step
   implicit none
   private
 
@@ -50,6 +50,8 @@ module hc_normal_lattice_solver
     real(wp) :: fixed_start = 1.0_wp
     !> Length of searched steps before their cut
     real(wp) :: length = 1.0_wp
+    !> Of a searched step: fall of the energy by its length, and d^T K d
+    real(wp) :: fall = 0.0_wp, curved = 0.0_wp
     !> Kind of the last step; it took tension away, of which rounding errors are left
     integer :: step = projected
     logical :: emptied = .false.
@@ -267,7 +269,7 @@ contains
       progress%emptied = .not. found
       if (found) return
       ! tension, and the pressure of nodes that left the set, go first
-      call searched_step(level, now, 0.0_wp, .false., found)
+      call searched_step(level, now, 0.0_wp, 0.0_wp, progress%fall)
       call recurrence%restart()
     else if (changed) then
       call projected_step(level, now)
@@ -296,7 +298,8 @@ contains
     shortest = level%options%normal%least_searched*progress%length
     found = .false.
     do while (progress%length > shortest)
-      call searched_step(level, now, progress%length, progress%step == searched, found)
+      call searched_step(level, now, progress%length, merge(progress%curved, 0.0_wp, progress%step == searched), progress%fall)
+      found = progress%fall > 0.0_wp
       progress%step = merge(searched, projected, found)
       if (found) return
       progress%length = 0.5_wp*progress%length
@@ -316,7 +319,8 @@ contains
 
     share_of_step = 1.0_wp
     if (progress%step == searched) then
-      best = steepness(level, now)/curvature(level, now)
+      progress%curved = curvature(level, now)
+      best = progress%fall/progress%curved
       ! all of it ends where there is no tension
       share_of_step = min(best, 1.0_wp)
       progress%length = min(progress%length*min(max(best, 0.5_wp), 2.0_wp), 2.0_wp)

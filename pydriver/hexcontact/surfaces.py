@@ -6,6 +6,7 @@ touch a flat, and infinite where it has no surface that could touch.
 
 from .deck.measured import Map, Profile
 from .deck.rough import Rough
+from .deck.separation import Separation, principal_curvatures
 from .deck.surfaces import (
     SHAPES,
     Cone,
@@ -20,13 +21,11 @@ from .deck.surfaces import (
     RectangularPunch,
     Roller,
     RoundedPunch,
-    Separation,
     Sphere,
     Surface,
     SurfaceSum,
     Torus,
     Waviness,
-    principal_curvatures,
     shape,
 )
 

@@ -20,7 +20,8 @@ from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.lattice import Lattice, Pattern
 from hexcontact.deck import keys as tables
 from hexcontact.deck.faults import Source
-from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
+from hexcontact.deck.separation import Separation
+from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Sphere
 from hexcontact.deck.toml import STARTERS, starter, written
 from hexcontact.errors import DeckError
 from hexcontact.problem.preview import case_rows

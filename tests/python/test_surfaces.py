@@ -14,6 +14,7 @@ from hexcontact.deck.keys import Body
 from hexcontact.deck.kinds import Quantity
 from hexcontact.deck.measured import Map, Profile
 from hexcontact.deck.rough import Rough
+from hexcontact.deck.separation import Separation, principal_curvatures
 from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
@@ -28,13 +29,11 @@ from hexcontact.deck.surfaces import (
     RectangularPunch,
     Roller,
     RoundedPunch,
-    Separation,
     Sphere,
     Surface,
     SurfaceSum,
     Torus,
     Waviness,
-    principal_curvatures,
     shape,
 )
 from hexcontact.deck.table_base import meaning

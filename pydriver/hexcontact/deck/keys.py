@@ -37,8 +37,9 @@ from .kinds import (
     WordOr,
     refuse,
 )
+from .separation import Separation
 from .series import DRIVEN, MOST_STEPS, Series
-from .surfaces import Flat, Point, Separation, Surface, SurfaceKind
+from .surfaces import Flat, Point, Surface, SurfaceKind
 from .table_base import Table, extended, meaning, problems_of
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, SPIN, Dimension
 

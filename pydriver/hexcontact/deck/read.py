@@ -22,8 +22,9 @@ from ..text import listed, visible
 from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .interface import FROM_PYTHON
 from .keys import Deck
+from .separation import Separation
 from .series import Series, read_series
-from .surfaces import Flat, Separation, Surface
+from .surfaces import Flat, Surface
 from .toml import parse_toml, read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time

@@ -12,8 +12,8 @@ from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
 from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
+from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MOST_STEPS
-from ..deck.surfaces import Separation, principal_curvatures
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, WORN

@@ -17,7 +17,7 @@ from ..core.lattice import Lattice
 from ..deck.height_map import HeightMap, Placed, in_si
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
 from ..deck.map_file import MOST_POINTS, netcdf_map
-from ..deck.surfaces import Separation
+from ..deck.separation import Separation
 from ..deck.units import LENGTH, NUMBER, Dimension
 from ..errors import DeckError
 from ..text import listed

@@ -294,7 +294,7 @@ contains
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))
-        found%contact%area_error = 0.2_wp*lattice%cell_area()*count(contact .and. .not. all_around(contact))
+        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact)
         return
       end if
       found%pressure_center = center_of(lattice, state%pressure)
@@ -303,14 +303,21 @@ contains
     end associate
   end subroutine measure_contact
 
-  !> Find the nodes whose neighbors along rows and columns are all in a zone of a window that repeats.
-  pure function all_around(zone) result(inside)
+  !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
+  pure integer function edge_nodes(zone) result(n)
     !> Nodes of the zone
     logical, intent(in) :: zone(:, :)
-    logical :: inside(size(zone, 1), size(zone, 2))
+    integer :: row
 
-    inside = cshift(zone, 1, dim=1) .and. cshift(zone, -1, dim=1) .and. cshift(zone, 1, dim=2) .and. cshift(zone, -1, dim=2)
-  end function all_around
+    n = 0
+    associate (n_row => size(zone, 2))
+      do row = 1, n_row
+        associate (here => zone(:, row), below => zone(:, modulo(row - 2, n_row) + 1), above => zone(:, modulo(row, n_row) + 1))
+          n = n + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
+        end associate
+      end do
+    end associate
+  end function edge_nodes
 
   !> Measure the cells of a zone alone; its edge stays unknown.
   pure type(zone_measures_t) function cells_of(lattice, n_node) result(found)

@@ -357,10 +357,6 @@ class Measured(Surface):
         """Name the shape and its file."""
         return f"{self.shape} of {self.file.name}" if self.file else self.shape
 
-    def rows(self, spacing: float) -> Iterator[str]:
-        """Yield lines about the map, beside the spacing of a lattice."""
-        raise NotImplementedError
-
 
 @shape("map")
 class Map(Measured):

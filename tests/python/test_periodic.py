@@ -191,6 +191,14 @@ def test_wrong_decks_are_told(name: str) -> None:
         waves(**({"friction_coefficient": 0.3, "loads": {"mean_pressure": 1e6}} | arguments))
 
 
+def test_a_wave_may_be_steepest_at_the_seam() -> None:
+    """Between few nodes its step there is larger than all others."""
+    wave = "1e-6*(2 + sin(2*pi*x/1e-3 + pi/16) - 0.3*sin(4*pi*x/1e-3 + pi/8))"
+    assert waves(16, wave, loads={"mean_pressure": 1e6}).run().complete
+    with pytest.raises(DeckError, match="the gap does not repeat"):
+        waves(16, f"{wave} + 1e-5*x", loads={"mean_pressure": 1e6})
+
+
 def test_lattices_of_python_repeat_too() -> None:
     with pytest.raises(DeckError, match="a multiple of four columns expected"):
         gap = lambda x, y: 0 * x  # noqa: E731

@@ -98,8 +98,11 @@ def _repeating(
             return None, faults
     try:
         surfaces = tables["body"].separation.repeating(window.sides(lattice))
-        heights = PlaneField(surfaces if gap is None else gap, GAP).over(lattice)
+        field = PlaneField(surfaces if gap is None else gap, GAP)
+        heights = field.over(lattice)
         fault = window.seam_fault(heights)
+        if fault and field.repeats(lattice, heights):
+            fault = ""
     except DeckError as error:
         if gap is not None:
             raise

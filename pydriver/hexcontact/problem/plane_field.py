@@ -42,6 +42,7 @@ class Rule(NamedTuple):
 
 _OR_OPEN = "or inf where nothing can touch"
 _LEAST = -np.finfo(float).max
+_ALIKE = 1e-6  # difference of heights one period apart, beside their range
 GAP = Rule("gap", "heights", f"numbers, {_OR_OPEN}", LENGTH, 3, _LEAST, np.inf, constant=False)
 _AT_LEAST_0 = "finite numbers of at least 0"
 COEFFICIENT = Rule(
@@ -136,6 +137,20 @@ class PlaneField:
             raise DeckError(f"{key}: expected lengths of at most {LARGEST:g} m, {_OR_OPEN}")
         ours = self.at_nodes or self.map or not self.given
         return values if ours else values.copy()  # a function may keep, and change, its result
+
+    def repeats(self, lattice: Lattice, values: Array) -> bool:
+        """Test whether a function has the same values one window further, along both directions."""
+        if self.at_nodes or self.maps or not np.isfinite(values).all():
+            return False
+        across, up = lattice.basis * [[lattice.n_col], [lattice.n_row]]
+        try:
+            ahead = [
+                self.at(lattice.x[edge] + side[0], lattice.y[edge] + side[1]) - values[edge]
+                for edge, side in ((np.s_[:, :1], across), (np.s_[:1], up))
+            ]
+        except (DeckError, ValueError):  # it is known in the window only
+            return False
+        return all(abs(change).max() <= _ALIKE * np.ptp(values) for change in ahead)
 
     def _refuse(self, values: Array, bad: Mask, x: Array, y: Array) -> None:
         """Refuse values at the first of some points."""

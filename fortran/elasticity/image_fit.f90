@@ -3,7 +3,7 @@
 !> A term exp(-k z) of a response is the load itself, seen from the depth z (an image): displacements by a pyramid follow from its
 !> potentials below the surface, and no Bessel function is needed. Depths are a geometric series. Coefficients are those of least
 !> squares, by Gram and Schmidt's method on rows that are divided by the size of the response; a small multiple of the unit matrix
-!> below them bounds the coefficients (A.N. Tikhonov, 1963). The limit k = 0, which is the far field, has a large weight.
+!> below them bounds the coefficients (A.N. Tikhonov, 1963). The limit k = 0, which is the far field, has a larger weight.
 !>
 !> Equations: docs/theory/coatings.md, (J5).
 module hc_image_fit
@@ -14,13 +14,13 @@ module hc_image_fit
   public :: image_depths, wave_numbers, fit_images
 
   !> Smallest depth over the smallest thickness.
-  real(wp), parameter :: nearest = 0.25_wp
+  real(wp), parameter :: nearest = 0.5_wp
   !> Depths by a factor of e
-  real(wp), parameter :: density = 6.0_wp
+  real(wp), parameter :: density = 7.0_wp
   !> Wave numbers times thickness, between which functions are fitted
   real(wp), parameter :: lowest = 1.0e-3_wp, highest = 25.0_wp
   !> Weight of k = 0; multiple of the unit matrix
-  real(wp), parameter :: far_weight = 1.0e3_wp, bound = 1.0e-13_wp
+  real(wp), parameter :: far_weight = 10.0_wp, bound = 1.0e-15_wp
 
 contains
 

@@ -39,7 +39,7 @@ module hc_layered_pair
   !> Name of the medium in keys of spectra.
   character(len=8), parameter :: name = 'layered '
   !> Largest depths of images over the thickness of all layers, which are tried until the fit is good enough.
-  real(wp), parameter :: deepest(6) = [24.0_wp, 60.0_wp, 150.0_wp, 400.0_wp, 1000.0_wp, 3000.0_wp]
+  real(wp), parameter :: deepest(9) = [24.0_wp, 60.0_wp, 150.0_wp, 400.0_wp, 1.0e3_wp, 3.0e3_wp, 1.0e4_wp, 3.0e4_wp, 1.0e5_wp]
   !> Errors of the fit, relative to the response: good enough; too large.
   real(wp), parameter :: good = 1.0e-7_wp, largest_error = 1.0e-6_wp
   !> Wave numbers of the fit, and those at which its error is measured.

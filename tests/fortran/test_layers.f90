@@ -203,12 +203,12 @@ contains
     call check(error, found(:, 1)/expected(1, 1), expected(:, 1)/expected(1, 1), 1.0e-10_wp, 'blocks')
   end subroutine test_far
 
-  !> The kernels of layers are images to 1e-6, for moduli apart by a factor of a hundred.
+  !> The kernels of layers are images to 1e-6, for moduli apart by a factor of a thousand, and for a soft layer below a hard one.
   subroutine test_fits(error)
     type(error_t), allocatable, intent(out) :: error
     type(layered_pair_t) :: pair
     type(material_t) :: rigid
-    real(wp), parameter :: ratio(7) = [0.01_wp, 0.1_wp, 0.5_wp, 2.0_wp, 10.0_wp, 30.0_wp, 100.0_wp]
+    real(wp), parameter :: ratio(8) = [0.001_wp, 0.1_wp, 0.5_wp, 2.0_wp, 10.0_wp, 30.0_wp, 100.0_wp, 1000.0_wp]
     integer :: i
 
     rigid%rigid = .true.
@@ -216,7 +216,13 @@ contains
       call new_layered_pair(pair, [material_t(1.0_wp, 0.3_wp), rigid], [coating_t(1.0_wp, material_t(ratio(i), 0.25_wp))], &
                             [coating_t :: ], error)
       if (allocated(error)) return
-      call check_true(error, pair%fit_error < 1.0e-6_wp .and. pair%n_image() < 60, 'layer on a half-space')
+      call check_true(error, pair%fit_error < 1.0e-6_wp .and. pair%n_image() < 75, 'layer on a half-space')
+      if (allocated(error)) return
+      call new_layered_pair(pair, [material_t(1.0_wp, 0.3_wp), rigid], &
+                            [coating_t(1.0_wp, material_t(1.0_wp, 0.3_wp)), &
+                             coating_t(1.0_wp, material_t(min(ratio(i), 1.0_wp), 0.4_wp))], [coating_t :: ], error)
+      if (allocated(error)) return
+      call check_true(error, pair%fit_error < 1.0e-6_wp, 'soft layer below a hard one')
       if (allocated(error)) return
     end do
     call new_layered_pair(pair, [rigid, rigid], [coating_t(1.0_wp, material_t(1.0_wp, 0.49_wp))], [coating_t :: ], error)

@@ -24,6 +24,7 @@ from hexcontact.text import shown
 from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 
 DOCS = Path(__file__).parent
+_OF_ALL = "offset", "tilt", "moves"  # keys of every shape
 TABLES: dict[str, type[Table]] = {  # by their headings in keys.md
     "Top level": deck_keys.Deck,
     "[body.1] and [body.2]": deck_keys.Body,
@@ -129,12 +130,12 @@ def shapes() -> str:
     for name, shape in surfaces.SHAPES.items():
         first = [f"`{name}`", shape.formula]
         for key, info in documented(shape).items():
-            if key not in ("offset", "tilt"):
+            if key not in _OF_ALL:
                 lines.append(row([*first, *cells_of(key, info)]))
                 first = ["", ""]
         if first[0]:
             lines.append(row([*first, *[""] * len(HEADER)]))
-    lines += [row(["all", "", *cells_of(key, surfaces.Flat.model_fields[key])]) for key in ("offset", "tilt")]
+    lines += [row(["all", "", *cells_of(key, surfaces.Flat.model_fields[key])]) for key in _OF_ALL]
     return "\n".join(lines) + "\n"
 
 

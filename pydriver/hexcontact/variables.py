@@ -119,6 +119,7 @@ _WORK = ("normal_load", 1)
 _AREA = {"least": 0.0, "most": "window"}
 _FROM_0: dict[str, Any] = {"least": 0.0}
 _WORN: dict[str, Any] = {"padding": 0.0, "frictional": True, "core": "wear"}
+MOVED_GAP = "moved_gap"  # field of a case with surfaces that move with rolling bodies
 _AREAS, _SLIP = "Contact and stick area", "Slip in the step"
 
 # fmt: off
@@ -150,6 +151,10 @@ VARIABLES: dict[str, Variable] = {
         "m", "length of the slip path so far", padding=0.0, title="Accumulated slip", least=0.0
     ),
     "dissipation_density": _shear("J/m2", "energy by area dissipated so far", padding=0.0, title="Energy"),
+    MOVED_GAP: _node(
+        "m", "gap of the undeformed surfaces where those that move have come to",
+        title="Gap before loading", frictional=True, core="moves",
+    ),
     "worn_depth": _node("m", "depth that is worn off both bodies", title="Worn depth", **_WORN),
     "worn_depth_step_change": _node("m", "change of the worn depth by jumps of half the size", **_WORN),
     "cycle_dissipation_density": _node("J/m2", "energy by area that friction takes in a cycle", **_WORN),

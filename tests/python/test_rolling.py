@@ -348,3 +348,141 @@ def test_a_rounded_distance_is_noted(caplog: pytest.LogCaptureFixture) -> None:
         case.run()
     assert 'note="segment 2 rolls' in caplog.text
     assert f"{round(1e-4 / case.lattice.spacing)} spacings of the lattice, and not 100.0 µm" in caplog.text
+
+
+# --- surfaces that move with their bodies -------------------------------------------------------------------
+
+DENT = {"shape": "dent", "depth": 4e-7, "radius": 8e-5, "rim": 5e-8, "moves": True}
+DRIVEN = {"tangential_load_x": 9.0, "creepage_y": 0.0005}
+
+
+def dented(at: tuple[float, float], *loads: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    """Return a deck of the ball with a dent that is bound to it."""
+    deck = ball(*loads, **tables)
+    deck["body"]["1"]["surface"] = [deck["body"]["1"]["surface"], DENT | {"offset": at}]
+    return deck
+
+
+def test_a_dent_far_away_changes_nothing() -> None:
+    load = {"rolling": 6e-5, **DRIVEN}
+    plain = Case.from_dict(ball(load)).run().dataset
+    far = Case.from_dict(dented((3e-3, 0.0), load)).run().dataset
+    for name in ("pressure", "traction_x", "slip_increment_y", "creepage_x", "approach"):
+        np.testing.assert_array_equal(far[name], plain[name], name)
+    np.testing.assert_array_equal(far["moved_gap"][-1], far["initial_gap"])
+
+
+def test_a_dent_passes_and_leaves_the_steady_state() -> None:
+    case = Case.from_dict(dented((3.5e-4, 0.0), {"rolling": 1.6e-3, **DRIVEN}))
+    result = case.run()
+    history = result.history
+    steady = last(ball({"rolling": "steady", **DRIVEN}))
+    for name in ("creepage_x", "tangential_load_y", "slip_power", "max_pressure", "approach"):
+        assert history[name].iloc[-1] == pytest.approx(steady[name], rel=1e-3), name
+        assert np.ptp(history[name].iloc[1:]) > 0.004 * abs(steady[name]), name
+    # bodies are alike, so the pressure is that of a dent at rest at the place it has come to
+    chosen = [8, 12, 20]
+    for step in chosen:
+        place = 3.5e-4 - step * case.lattice.spacing
+        at_rest = ball(grid={"spacing": case.lattice.spacing, "window": list(case.lattice.shape)})
+        still = DENT | {"offset": (place, 0.0), "moves": False}
+        at_rest["body"]["1"]["surface"] = [at_rest["body"]["1"]["surface"], still]
+        pressure = Case.from_dict(at_rest).run().dataset["pressure"][-1]
+        np.testing.assert_allclose(
+            result.dataset["pressure"][step], pressure, atol=1e-6 * float(pressure.max()), err_msg=str(step)
+        )
+
+
+def test_the_mirrored_dent_has_the_mirrored_history() -> None:
+    there, mirrored = (
+        Case.from_dict(
+            dented((2e-4, side * 6e-5), {"rolling": 4e-4, "creepage_x": -1e-3, "creepage_y": side * 5e-4})
+        )
+        .run()
+        .history
+        for side in (1.0, -1.0)
+    )
+    for name, sign in (
+        ("tangential_load_x", 1),
+        ("tangential_load_y", -1),
+        ("torque", -1),
+        ("slip_power", 1),
+    ):
+        size = abs(there[name]).max()
+        np.testing.assert_allclose(mirrored[name], sign * there[name], atol=1e-6 * size, err_msg=name)
+
+
+def test_a_dent_comes_from_the_direction_of_rolling_and_back() -> None:
+    loads = {"rolling": 3e-4, "creepage_x": -1e-3}, {"rolling": 1e-4, "rolling_direction": "180 deg"}
+    along = Case.from_dict(dented((2e-4, 0.0), *loads)).run().history
+    c, s = math.cos(math.pi / 3), math.sin(math.pi / 3)
+    turned = (
+        {"rolling": 3e-4, "rolling_direction": "60 deg", "creepage_x": -1e-3 * c, "creepage_y": -1e-3 * s},
+        {"rolling": 1e-4, "rolling_direction": "-120 deg"},
+    )
+    found = Case.from_dict(dented((2e-4 * c, 2e-4 * s), *turned)).run().history
+    for name in ("max_pressure", "approach", "slip_power", "rolled_distance"):
+        np.testing.assert_allclose(found[name], along[name], rtol=1e-6, err_msg=name)
+    back = np.searchsorted(along["segment"], 3)
+    assert along["approach"].iloc[back] == pytest.approx(along["approach"].iloc[back - 2], rel=1e-7)
+    assert (np.diff(along["rolled_distance"].dropna()) > 0.0).all()
+
+
+def test_a_run_with_a_dent_resumes_to_the_same_bits(tmp_path: Path) -> None:
+    deck = dented((1.5e-4, 2e-5), {"rolling": 1.5e-4, **DRIVEN})
+    whole = Case.from_dict(deck).run(output=tmp_path / "whole.nc").dataset
+
+    class StopError(Exception):
+        pass
+
+    def stop(step: Any) -> None:
+        if step.number == 7:
+            raise StopError
+
+    with pytest.raises(StopError):
+        Case.from_dict(deck).run(output=tmp_path / "part.nc", on_step=stop)
+    resumed = resume(tmp_path / "part.nc").dataset
+    for name in ("pressure", "traction_x", "accumulated_slip", "moved_gap", "approach", "creepage_x"):
+        np.testing.assert_array_equal(resumed[name], whole[name], name)
+
+
+def test_a_map_that_moves_is_the_dent_it_holds() -> None:
+    along, across = np.linspace(-4e-4, 9e-4, 261), np.linspace(-4e-4, 4e-4, 161)
+    load = {"rolling": 2e-4, **DRIVEN}
+    deck = dented((2e-4, 0.0), load)
+    dent = Case.from_dict(deck).run().history
+    far = np.hypot(along[:, None] - 2e-4, across) / DENT["radius"]
+    heights = DENT["depth"] * np.maximum(1.0 - far**2, 0.0) ** 2
+    heights -= np.where(abs(far - 1.25) < 0.25, DENT["rim"] * np.sin(2 * math.pi * (far - 1.0)) ** 2, 0.0)
+    shape = {"shape": "map", "x": along, "y": across, "heights": heights, "upwards": False, "moves": True}
+    deck["body"]["1"]["surface"][1] = shape
+    mapped = Case.from_dict(deck).run().history
+    np.testing.assert_allclose(mapped["max_pressure"], dent["max_pressure"], rtol=2e-3)
+    np.testing.assert_allclose(mapped["creepage_x"], dent["creepage_x"], rtol=2e-2, atol=1e-6)
+    deck["load"][1]["rolling"] = 8e-4
+    with pytest.raises(DeckError, match=r"body.1.surface: the contact of load step \d+ .*end"):
+        Case.from_dict(deck).run()
+
+
+@pytest.mark.parametrize(
+    ("loads", "shape", "words"),
+    [
+        (
+            [{"rolling": "steady", **DRIVEN}],
+            DENT,
+            'load.2.rolling = "steady": expected a distance: .*moves = true',
+        ),
+        ([{"rolling": 1e-4}, {"rolling": "steady"}], DENT, "load.3.rolling = .*expected a distance"),
+        ([{"tangential_load_x": 3.0}], DENT, "body.1.surface: expected no moves = true without rolling"),
+        (
+            [{"rolling": 1e-4}],
+            {"shape": "punch", "radius": 1e-3, "moves": True},
+            "body.1.surface: expected no moves = true of a punch, which ends",
+        ),
+    ],
+)
+def test_surfaces_that_cannot_move_are_refused(loads: list[Any], shape: dict[str, Any], words: str) -> None:
+    deck = ball(*loads)
+    deck["body"]["1"]["surface"] = [deck["body"]["1"]["surface"], shape]
+    with pytest.raises(DeckError, match=words):
+        Case.from_dict(deck)

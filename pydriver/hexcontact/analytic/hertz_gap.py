@@ -47,6 +47,12 @@ def is_worn(history: Mapping[Any, Any]) -> bool:
     return worn is not None and bool(np.ravel(worn)[-1] > 0.0)
 
 
+def is_moving(deck: str) -> bool:
+    """Test whether surfaces move with their rolling bodies, so that the gap is not the initial one."""
+    separation = recorded(deck).separation
+    return separation is not None and separation.moves
+
+
 def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
     """Test whether the pressure of a result is that of a contact without friction."""
     return (
@@ -69,10 +75,11 @@ class QuadraticGap:
     def of(cls, dataset: Dataset) -> QuadraticGap | None:
         """Return the gap of a result; None if Hertz does not hold: another law or shape, a line contact."""
         try:
-            known = cls.of_deck(str(dataset.attrs.get("deck", "")), dataset.attrs)
+            deck = str(dataset.attrs.get("deck", ""))
+            known, moves = cls.of_deck(deck, dataset.attrs), is_moving(deck)
         except DeckError:  # a surface of a later version
-            known = None
-        if known or "initial_gap" not in dataset:
+            known, moves = None, False
+        if known or moves or "initial_gap" not in dataset:
             return known
         gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
         if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
@@ -96,7 +103,7 @@ class QuadraticGap:
     def of_deck(cls, deck: str, attributes: Mapping[Any, Any]) -> QuadraticGap | None:
         """Return the gap of the surfaces of a deck; None if they are unknown, or as of `of`."""
         separation = recorded(deck).separation
-        if separation is None or separation.quadratic is None:
+        if separation is None or separation.moves or separation.quadratic is None:
             return None
         hessian, center = separation.quadratic
         return cls._elliptic(attributes, hessian, center, float(separation(*center)))

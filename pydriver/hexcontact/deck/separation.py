@@ -25,10 +25,20 @@ class Separation:
 
     surface_1: Surface
     surface_2: Surface
+    at_rest: Separation | None = None  # before surfaces moved with their bodies; its heights count on
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
-        return self._sum(x, y) - self.first_touch[2]
+        return self._sum(x, y) - (self.at_rest or self).first_touch[2]
+
+    def moved(self, by: ArrayLike) -> Separation:
+        """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
+        return Separation(self.surface_1.moved(by), self.surface_2.moved(by), self.at_rest or self)
+
+    @property
+    def moves(self) -> bool:
+        """Whether shapes are bound to rolling bodies."""
+        return bool(self.surface_1.moving or self.surface_2.moving)
 
     @property
     def flat(self) -> bool:

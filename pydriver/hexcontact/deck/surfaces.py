@@ -99,6 +99,9 @@ class Surface(Argument):
         (0.0, 0.0),
         "turns the shape about the axes through its center along x and y; the surface rises with y, x",
     )
+    moves: Annotated[bool, Flag()] = meaning(
+        False, "true: bound to its rolling body, with which it passes through the contact"
+    )
 
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
@@ -141,6 +144,16 @@ class Surface(Argument):
     def repeating(self, sides: tuple[float, float] | None) -> Surface:
         """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
         return self
+
+    @property
+    def moving(self) -> tuple[Surface, ...]:
+        """The shapes that are bound to a rolling body."""
+        return (self,) if self.moves else ()
+
+    def moved(self, by: ArrayLike) -> Surface:
+        """Return the surface after its body has moved by a vector (m), with the shapes bound to it."""
+        x, y = np.add(self.offset, by)
+        return self.model_copy(update={"offset": (float(x), float(y))}) if self.moves else self
 
     def candidate(self, x: ArrayLike, y: ArrayLike) -> Mask:
         """Return where the shape has a surface that could touch (False outside a punch)."""
@@ -558,6 +571,15 @@ class SurfaceSum(Surface):
     def measured(self) -> tuple[Any, ...]:
         """Those of all shapes."""
         return tuple(one for part in self.parts for one in part.measured)
+
+    @property
+    def moving(self) -> tuple[Surface, ...]:
+        """Those of all shapes."""
+        return tuple(one for part in self.parts for one in part.moving)
+
+    def moved(self, by: ArrayLike) -> Surface:
+        """Return the sum of the moved shapes."""
+        return SurfaceSum(parts=tuple(part.moved(by) for part in self.parts))
 
     def repeating(self, sides: tuple[float, float] | None) -> Surface:
         """Return the sum of shapes over a window that repeats."""

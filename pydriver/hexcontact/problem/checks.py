@@ -16,7 +16,7 @@ from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MOST_STEPS
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
-from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, WORN
+from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
@@ -71,6 +71,7 @@ def checked(
         found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
         found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
+        found += _mistakes(tables, _moving_problems(tables)) if "load" in tables else []
         found += _mistakes(tables, _coating_problems(tables, repeating))
     if found:
         raise deck_error(found, given.source)
@@ -216,6 +217,26 @@ def _rolling_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
                     yield (*key, "torque"), f"expected {force} beside it, and no creepage across"
 
 
+def _moving_problems(tables: Mapping[str, Any]) -> Found:
+    """Yield faults of surfaces that move with rolling bodies, and loads that do not let them pass."""
+    bodies = tables["body"]
+    if not bodies.separation.moves:
+        return
+    for number, body in (("1", bodies.body_1), ("2", bodies.body_2)):
+        for one in body.surface.moving if body.surface else ():
+            if math.isfinite(one.reach):
+                sentence = f"expected no moves = true of a {one.shape}, which ends, so that bodies lose touch"
+                yield ("body", number, "surface"), sentence
+    ways = [(key, segment.rolling) for key, segment in _segments(tables["load"]) if segment.rolling]
+    for key, way in ways:
+        if way == "steady":
+            sentence = "expected a distance: with a surface that moves = true there is no steady state"
+            yield (*key, "rolling"), sentence
+    if not ways:
+        key = ("body", "1" if bodies.body_1.surface and bodies.body_1.surface.moving else "2", "surface")
+        yield key, "expected no moves = true without rolling over a distance in [[load]]"
+
+
 def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> Mistake | None:
     """Return the fault of a direction that is no row of the lattice, of spacing 0, or of too long a way."""
     for key, segment in _segments(loads):
@@ -311,6 +332,8 @@ def _field_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
         yield ("output", "fields"), sentence
     elif not tables["wear"] and (missing := [name for name in fields if name in WORN]):
         yield ("output", "fields"), f"a run without [wear] has no {', '.join(missing)}"
+    elif MOVED_GAP in fields and "body" in tables and not tables["body"].separation.moves:
+        yield ("output", "fields"), f"a run without surfaces that move has no {MOVED_GAP}"
 
 
 def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:

@@ -45,7 +45,8 @@ class Roll(NamedTuple):
 
     direction: float  # angle from x of the direction that the contact travels in (rad)
     distance: float = 0.0  # distance that the bodies roll (m); 0: the steady state
-    done: int = 0  # spacings that they have rolled at the end of the step, over the whole history
+    done: float = 0.0  # distance that they have rolled at the end of the step, over the whole history (m)
+    way: tuple[int, int] = (0, 0)  # columns and rows that the contact has travelled by then
 
     @property
     def steady(self) -> bool:
@@ -322,20 +323,27 @@ def _roll(segment: Segment) -> Roll | None:
     return Roll(segment.rolling_direction or 0.0, distance)
 
 
-def rolled_out(steps: Sequence[LoadStep], spacing: Callable[[float], float]) -> tuple[LoadStep, ...]:
-    """Return a history with a load step for each spacing (m, by direction) of a rolled distance."""
+def rolled_out(
+    steps: Sequence[LoadStep], row: Callable[[float], tuple[tuple[int, int], float]]
+) -> tuple[LoadStep, ...]:
+    """Return a history with a load step for each spacing of a rolled distance.
+
+    `row` returns, by direction, columns and rows to the node ahead, and their distance (m).
+    """
     found: list[LoadStep] = []
-    done = 0
+    done, way = 0.0, (0, 0)
     for step in steps:
         if step.roll is None or step.roll.steady:
-            roll = step.roll and step.roll._replace(done=done)
+            roll = step.roll and step.roll._replace(done=done, way=way)
             found.append(replace(step, index=len(found), roll=roll))
             continue
-        count = max(round(step.roll.distance / spacing(step.roll.direction)), 1)
+        (cols, rows), spacing = row(step.roll.direction)
+        count = max(round(step.roll.distance / spacing), 1)
         for number in range(1, count + 1):
-            done += 1
-            part = number / count
-            found.append(replace(step, index=len(found), fraction=part, roll=step.roll._replace(done=done)))
+            here = way[0] + number * cols, way[1] + number * rows
+            roll = step.roll._replace(done=done + number * spacing, way=here)
+            found.append(replace(step, index=len(found), fraction=number / count, roll=roll))
+        done, way = done + count * spacing, here
     return tuple(found)
 
 

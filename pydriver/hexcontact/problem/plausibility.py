@@ -321,7 +321,7 @@ def rounded_distances(case: Problem) -> str:
     steps = [step for step in case.load_steps if step.roll and not step.roll.steady]
     for segment in dict.fromkeys(step.segment for step in steps):
         rolled = [step.roll for step in steps if step.segment == segment and step.roll]
-        given, spacing = rolled[0].distance, case.rolled_spacing(rolled[0].direction)
+        given, spacing = rolled[0].distance, case.row_along(rolled[0].direction)[1]
         if abs(len(rolled) * spacing - given) > _ROUNDED * spacing:
             words.append(
                 f"segment {segment + 1} rolls {quantity(len(rolled) * spacing, 'm')}, {len(rolled)} spacings "

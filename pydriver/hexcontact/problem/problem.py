@@ -158,16 +158,21 @@ class Problem:
         """Whether the bodies roll: from the first step that does on, all do."""
         return bool(self.load_steps) and self.load_steps[-1].roll is not None
 
-    def rolled_spacing(self, direction: float) -> float:
-        """Return the distance (m) of two nodes along a row of the lattice."""
-        ahead = np.array(friction.row_ahead(self.lattice, direction))
-        return float(np.linalg.norm(ahead @ self.lattice.basis))
+    @property
+    def moves(self) -> bool:
+        """Whether surfaces move with the rolling bodies."""
+        return not self.gap_given and self.surfaces.moves
+
+    def row_along(self, direction: float) -> tuple[tuple[int, int], float]:
+        """Return columns and rows to the node ahead along a row of the lattice, and its distance (m)."""
+        col, row = friction.row_ahead(self.lattice, direction)
+        return (col, row), float(np.linalg.norm([col, row] @ self.lattice.basis))
 
     def _roll(self, source: Source) -> None:
         """Unroll rolled distances into load steps of a spacing."""
-        if fault := checks.rolling_fault(self.deck.load, self.rolled_spacing):
+        if fault := checks.rolling_fault(self.deck.load, lambda direction: self.row_along(direction)[1]):
             raise deck_error([fault], source)
-        self.load_steps = rolled_out(self.load_steps, self.rolled_spacing)
+        self.load_steps = rolled_out(self.load_steps, self.row_along)
 
     @cached_property
     def deck_tables(self) -> dict[str, Any]:
@@ -233,14 +238,21 @@ class Problem:
 
     # --- data of the solvers --------------------------------------------------------------------------------
 
-    def initial_gap(self, lattice: Lattice) -> tuple[Array, Mask]:
+    def initial_gap(self, lattice: Lattice, step: LoadStep | None = None) -> tuple[Array, Mask]:
         """Return the gap before loading over the nodes of a window, and where the bodies can touch.
 
-        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch.
-        DeckError if a gap given in Python does not fit the window or is NaN somewhere.
+        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch. It is that
+        of a load step, if surfaces move with their bodies. DeckError if a gap given in Python does not fit the
+        window or is NaN somewhere.
         """
-        gap = self._gap.over(lattice)
+        gap = self._gap_in(step).over(lattice)
         return gap, np.isfinite(gap)
+
+    def _gap_in(self, step: LoadStep | None) -> PlaneField:
+        """Return the gap of a load step: docs/theory/rolling.md, (K7)."""
+        if step is None or step.roll is None or not self.moves:
+            return self._gap
+        return PlaneField(self.surfaces.moved(-np.array(step.roll.way) @ self.lattice.basis), GAP)
 
     def friction_law(self, lattice: Lattice) -> FrictionLaw:
         """Return the law of friction at the nodes of a window.
@@ -251,7 +263,8 @@ class Problem:
 
     def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
-        name, fault = self._gap.fault_near(lattice, contact) if self.period is None else ("", "")
+        gap = self._gap_in(self.load_steps[number - 1] if self.moves else None)
+        name, fault = gap.fault_near(lattice, contact) if self.period is None else ("", "")
         if fault:
             raise DeckError(f"{name}: the contact of load step {number} {fault}")
 

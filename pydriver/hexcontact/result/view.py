@@ -9,13 +9,19 @@ from typing import Protocol, TypeAlias, cast
 
 import numpy as np
 
-from ..analytic.hertz_gap import QuadraticGap, friction_of, is_worn, pressure_is_frictionless
+from ..analytic.hertz_gap import (
+    QuadraticGap,
+    friction_of,
+    is_moving,
+    is_worn,
+    pressure_is_frictionless,
+)
 from ..arrays import Array, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.lattice import linear
 from ..errors import NotInResult
 from ..text import visible, worded
-from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
+from ..variables import BULK_STRESS, LARGEST, MOVED_GAP, TRACTIONS, VARIABLES, WORN, spelled
 from .layout import lattice_of, step_of
 from .step import is_kept, nodal
 
@@ -88,6 +94,8 @@ class StepView:
                 raise NotInResult(f"a contact without friction has no {words}")
             if name in WORN and "wear_cycles" not in self.data:
                 raise NotInResult("the surfaces do not wear; a deck with [wear] is needed")
+            if name == MOVED_GAP and not is_moving(str(self.data.attrs.get("deck", ""))):
+                raise NotInResult("no surface moves with a rolling body; moves = true is needed")
             raise NotInResult(f"the {words} was not kept (output.fields)")
         values = self.data[name].values
         if not is_kept(values):

@@ -12,7 +12,7 @@ from ..deck.units import readable
 from ..problem.checks import stage_of
 from ..problem.problem import Problem
 from ..text import listed
-from ..variables import DISPLACEMENTS, STATE, WORN
+from ..variables import DISPLACEMENTS, MOVED_GAP, STATE, WORN
 
 _ITEM = 8  # bytes of a float
 # Measured by tests/bench/memory.py.
@@ -153,5 +153,5 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
 
 def fields_of(case: Problem) -> tuple[str, ...]:
     """Return the fields of each step of a case: its whole state, and displacements that the deck names."""
-    worn = WORN if case.deck.wear else ()
+    worn = WORN if case.deck.wear else (MOVED_GAP,) if case.moves else ()
     return (*STATE[case.frictional], *worn, *(name for name in DISPLACEMENTS if name in case.output.fields))

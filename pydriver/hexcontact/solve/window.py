@@ -20,7 +20,7 @@ from ..errors import DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from ..variables import BULK_STRAIN, BULK_STRESS, CORE, NODAL_FRICTION, STATE, names_where
+from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
 from .events import Listener
 from .memory_needed import fields_of, require_memory
 
@@ -46,11 +46,11 @@ class Window:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
-        gap, self.candidate = case.initial_gap(lattice)
-        self.initial_gap: Array = self._where_touching(gap)
+        self.gap, self.candidate = case.initial_gap(lattice)
+        self.initial_gap: Array = self._where_touching(self.gap)
         self.friction = case.friction_law(lattice)
         self._bodies: dict[int, FlexibilityOperator] = {}
-        self.contact: Any = self._solver(gap)
+        self.contact: Any = self._solver(self.gap)
 
     def _solver(self, gap: Array) -> Any:
         """Return the solver for an initial gap (inf where nothing can touch)."""
@@ -97,6 +97,8 @@ class Window:
         fields = {"initial_gap": self.initial_gap}
         fields |= {name: getattr(solution, name) for name in self.state}
         fields["gap"] = self._where_touching(solution.gap)
+        if self.case.moves:
+            fields[MOVED_GAP] = self._where_touching(self.gap)
         if self.worn is not None:
             fields["worn_depth"] = self.worn
         if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
@@ -111,7 +113,7 @@ class Window:
             bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
             bulk["bulk_body"] = self.case.deck.bulk.body
         if target.roll:
-            bulk["rolled_distance"] = target.roll.done * self.case.rolled_spacing(target.roll.direction)
+            bulk["rolled_distance"] = target.roll.done
         history: dict[str, float | int | str] = {
             **self._history(solution, before),
             **bulk,
@@ -153,7 +155,7 @@ class Window:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
-        gap = self.initial_gap if self.worn is None else self.initial_gap + self.worn
+        gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
         found = given | measures(self.lattice, self.friction, gap, self.candidate, solution)
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
@@ -206,7 +208,10 @@ class FrictionWindow(Window):
         target: LoadStep,
         values: tuple[float, ...],
     ) -> ContactState:
-        """Advance a state to new loads and motions."""
+        """Advance a state to new loads and motions, with surfaces that move at their new place."""
+        if self.case.moves:
+            self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
+            self.contact = self._solver(self.gap)
         return self.contact.advance(
             self.contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],

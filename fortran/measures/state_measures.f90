@@ -303,8 +303,9 @@ contains
     end associate
   end subroutine measure_contact
 
-  !> Test whether the pressure rises to an end of the surface, where it has no bound: a node beside one that cannot touch has more of it
-  !> than its neighbor on the other side.
+  !> Test whether the pressure rises to an end of the surface, where it has no bound.
+  !>
+  !> A node beside one that cannot touch has more pressure than its neighbor on the other side.
   pure logical function rises_to_end(candidate, pressure) result(rises)
     !> Nodes that can touch (n_col, n_row)
     logical, intent(in) :: candidate(:, :)

@@ -18,7 +18,7 @@ module hc_state_measures
   private
 
   public :: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
-  public :: state_measures_t, zone_measures_t, measure_state, measure_contact
+  public :: state_measures_t, zone_measures_t, measure_state, measure_contact, rises_to_end
 
   !> Size of a zone: of the cells of its nodes, and to its edge between the nodes.
   type :: zone_measures_t
@@ -302,6 +302,37 @@ contains
       found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
     end associate
   end subroutine measure_contact
+
+  !> Test whether the pressure rises to an end of the surface, where it has no bound.
+  !>
+  !> A node beside one that cannot touch has more pressure than its neighbor on the other side.
+  pure logical function rises_to_end(candidate, pressure) result(rises)
+    !> Nodes that can touch (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    integer :: n, m
+
+    rises = .false.
+    if (all(candidate)) return
+    n = size(pressure, 1)
+    m = size(pressure, 2)
+    associate (touch => candidate, p => pressure)
+      rises = any(rises_beside(touch(3:, :), touch(:n - 2, :), p(3:, :), p(2:n - 1, :), p(:n - 2, :)))
+      if (.not. rises) rises = any(rises_beside(touch(:, 3:), touch(:, :m - 2), p(:, 3:), p(:, 2:m - 1), p(:, :m - 2)))
+    end associate
+  end function rises_to_end
+
+  !> Test whether the pressure rises from one neighbor of a node to it, and the other neighbor cannot touch.
+  elemental logical function rises_beside(after_touches, before_touches, after, here, before) result(rises)
+    !> Neighbors that can touch
+    logical, intent(in) :: after_touches, before_touches
+    !> Pressures of a node and its neighbors [Pa]
+    real(wp), intent(in) :: after, here, before
+
+    rises = (.not. after_touches .and. before > 0.0_wp .and. here > before) .or. &
+            (.not. before_touches .and. after > 0.0_wp .and. here > after)
+  end function rises_beside
 
   !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
   pure integer function edge_nodes(zone) result(n)

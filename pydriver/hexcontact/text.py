@@ -105,6 +105,8 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     """Write a number with a prefix of its unit: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``."""
     if math.isnan(value):
         return "-"
+    if value == math.inf:
+        return "unbounded"
     if value == 0 or math.isinf(value):
         return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")

@@ -6,6 +6,7 @@ motions, residuals, panels and maps, arrays of the compiled core.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
@@ -260,7 +261,8 @@ VARIABLES: dict[str, Variable] = {
     "stick_min_y": _stick("m", "smallest y coordinate of a sticking node"),
     "stick_max_y": _stick("m", "largest y coordinate of a sticking node"),
     "max_pressure": _measure(
-        "Pa", "largest contact pressure of a node", title="Max pressure", least=0.0, summary=1, **_ALWAYS
+        "Pa", "largest contact pressure of a node; infinite if it rises to an end of a surface",
+        title="Max pressure", least=0.0, most=math.inf, summary=1, **_ALWAYS,
     ),
     "max_traction": _stick(
         "Pa", "largest shear traction of a node",

@@ -38,7 +38,9 @@ from hexcontact.deck.surfaces import (
 )
 from hexcontact.deck.table_base import meaning
 from hexcontact.deck.units import NUMBER
-from hexcontact.errors import DeckError, PlausibilityWarning
+from hexcontact.errors import DeckError
+from hexcontact.problem.preview import case_rows
+from hexcontact.text import quantity
 
 ROOT = Path(__file__).parents[2]
 SOME = [
@@ -264,12 +266,48 @@ def test_a_ball_in_a_groove_is_the_ellipse_of_hertz() -> None:
     assert abs(compared["approach"]) < 2e-3
 
 
-def test_a_sharp_end_is_told() -> None:
-    roller = Roller(radius=5e-3, length=2e-3)
-    with pytest.warns(
-        PlausibilityWarning, match="body.1.surface ends sharply: there the pressure has no bound"
-    ):
-        Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, spacing=1e-5, normal_load=10.0)
+SHARP = {
+    "roller": (Roller(radius=5e-3, length=2e-3), True),
+    "chamfer": (Roller(radius=5e-3, length=2e-3, profile="chamfer", chamfer="0.1 mm"), False),
+    "crown": (Roller(radius=5e-3, length=2e-3, profile="crown", crown_radius=1.0), False),
+    "punch": (Punch(radius=2e-4), True),
+    "rectangle": (RectangularPunch(width=4e-4, length=2e-4), True),
+    "rounded": (RectangularPunch(width=4e-4, length=2e-4, edge_radius=1e-3), False),
+    "sphere": (Sphere(radius=5e-3), False),
+    "arc to its rim": (Sphere(radius=5e-3, exact=True), False),
+}
+
+
+@pytest.mark.parametrize("name", SHARP)
+def test_the_pressure_at_a_sharp_end_is_no_number(name: str) -> None:
+    """In `check`, result, summary and comparison, also where the load ends in the middle of the surface."""
+    surface, unbounded = SHARP[name]
+    case = Case(body_1={**STEEL, "surface": surface}, body_2=STEEL, spacing=1e-5, normal_load=10.0)
+    assert ("unbounded at an end of a surface" in dict(case_rows(case))["contact"]) == unbounded
+    result = case.run()
+    assert math.isinf(float(result.max_pressure[-1])) == unbounded
+    assert ("unbounded" in repr(result.compare())) == (name == "roller")
+    layer = case.changed({"interface": {"coefficient": 1e13}}) if unbounded else case
+    assert math.isfinite(float(layer.run().max_pressure[-1]))
+
+
+def test_the_plane_contact_stands_beside_a_roller(tmp_path: Path) -> None:
+    load, half_length, radius = 14.5, 1e-3, 5e-3
+    half_width = math.sqrt(4 * load / (2 * half_length) * radius / (math.pi * E_STAR))
+    peak = load / (math.pi * half_length * half_width)
+    roller = Roller(radius=radius, length=2 * half_length, profile="crown", crown_radius=2.0)
+    case = Case(
+        body_1={**STEEL, "surface": roller},
+        body_2=STEEL,
+        lattice="rectangular",
+        spacing=(2e-5, 2e-6),
+        normal_load=load,
+    )
+    assert f"half-width {quantity(half_width, 'm')}" in dict(case_rows(case))["plane contact"]
+    [entry] = case.run(tmp_path / "roller.nc").compare()
+    assert (entry.quantity, entry.solution) == ("max_pressure", "Hertz, plane contact")
+    assert entry.exact == pytest.approx(peak, rel=1e-12)
+    assert 1.0 < entry.computed / peak < 1.5
 
 
 def test_a_profile_by_moduli_needs_them() -> None:

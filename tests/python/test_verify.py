@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation import checks, fatigue, frame, normal, page, runs
+from validation import checks, fatigue, frame, normal, page, repeating, runs, surfaces
 from validation import reference as table_of_references
 from validation.frame import Check
 from validation.reference import TABLE, Comparison, reference
@@ -223,3 +223,22 @@ def test_control() -> None:
     comparison = normal.control()
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 2 * 4 * 3
+
+
+SURFACES = {
+    "rollers": (surfaces.rollers, {}),
+    "hollow": (surfaces.hollow, {}),
+    "measured": (surfaces.measured, {"points": (41,)}),
+    "westergaard": (repeating.westergaard, {"nodes": 128, "shares": (0.3,)}),
+    "asperity": (repeating.asperity, {"cells": (8, 16)}),
+    "rough": (repeating.rough, {"nodes": (64, 128), "pressures": (0.03,), "seeds": (1,)}),
+    "superposed": (repeating.superposed, {"nodes": 64, "parts": (0.6,)}),
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_surfaces_and_windows_that_repeat(name: str) -> None:
+    check, sizes = SURFACES[name]
+    comparison = check(**sizes)
+    assert failures(comparison) == []
+    assert sum(row.passed is not None for row in comparison.rows) >= 3

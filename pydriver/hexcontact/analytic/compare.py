@@ -363,9 +363,12 @@ def closed_solutions(dataset: Dataset, number: int) -> tuple[list[Exact], str]:
 
 def _normal(closed: ClosedForms, load: float) -> list[Exact]:
     """Return the contact without friction."""
-    pressed = closed.pressed
-    if pressed is None or not hertz_gap.pressure_is_frictionless(closed.dataset.attrs):
+    pressed, attributes = closed.pressed, closed.dataset.attrs
+    if not hertz_gap.pressure_is_frictionless(attributes):
         return []
+    if pressed is None:
+        plane = hertz_gap.plane_contact(str(attributes.get("deck", "")), attributes, load)
+        return [Exact("Hertz, plane contact", {"max_pressure": plane[1]})] if plane else []
     contact = pressed.contact(load)
     values = {"max_pressure": contact.max_pressure, "approach": contact.approach + pressed.lowest}
     if not pressed.rim:
@@ -527,7 +530,9 @@ class Comparison(Sequence[Entry]):
                 *(quantity(v, VARIABLES[entry.quantity].unit, 6) for v in (entry.exact, entry.computed)),
                 f"{100 * entry.error:.3f} % rms"
                 if math.isnan(entry.exact)
-                else f"{100 * entry.error:+.3f} %",
+                else f"{100 * entry.error:+.3f} %"
+                if math.isfinite(entry.error)
+                else "-",
             )
             for entry in self
         ]
@@ -591,7 +596,7 @@ def _own(exact: Mapping[str, float] | object, name: str, dataset: Dataset) -> Ex
 def _entries(data: Any, exact: Exact) -> Iterator[Entry]:
     """Yield the lines of one solution."""
     for name, value in exact.values.items():
-        if name in data and math.isfinite(computed := float(data[name])):
+        if name in data and not math.isnan(computed := float(data[name])):
             error = (computed - value) / abs(value) if value else (0.0 if computed == 0.0 else math.inf)
             yield Entry(name, exact.solution, value, computed, error)
     if "pressure" not in data:

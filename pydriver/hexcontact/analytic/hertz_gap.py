@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays import Array, Dataset
 from ..core.measures import half_axes
 from ..deck.read import recorded
+from ..deck.surfaces import Roller
 from ..errors import DeckError
 from ..variables import BULK_STRESS, INTERFACE
 from .frictionless import EllipticContact, hertz_ellipse
@@ -129,13 +130,27 @@ class QuadraticGap:
         return self.contact(load).approach + self.lowest
 
 
+def plane_contact(deck: str, attributes: Mapping[Any, Any], load: float) -> tuple[float, float] | None:
+    """Return half-width (m) and pressure (Pa) of plane contact of the roller of a deck; None without one."""
+    surface, modulus = recorded(deck).only_surface, attribute_of(attributes, "effective_modulus")
+    if not isinstance(surface, Roller) or math.isnan(modulus) or is_compliant(attributes):
+        return None
+    return surface.plane_contact(modulus, load)
+
+
 def against_hertz(
     deck: str, attributes: Mapping[str, Any], history: Mapping[str, Any]
 ) -> list[tuple[str, float, float, str]]:
-    """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail."""
+    """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail.
+
+    Beside a roller on a flat stands the pressure of plane contact.
+    """
     gap, load = QuadraticGap.of_deck(deck, attributes), float(history["normal_load"])
-    if gap is None or not load > 0.0 or is_worn(history) or not pressure_is_frictionless(attributes):
+    if not load > 0.0 or is_worn(history) or not pressure_is_frictionless(attributes):
         return []
+    if gap is None:
+        plane = plane_contact(deck, attributes, load)
+        return [("max_pressure", plane[1], float(history["max_pressure"]), "Pa")] if plane else []
     hertz = gap.contact(load)
     known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (gap.approach(load), "m")}
     if half_axes(history):

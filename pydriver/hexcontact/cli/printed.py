@@ -241,7 +241,9 @@ def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: Histo
     rows: list[Row] = []
     for name, exact, value, unit in compared:
         off, error = f"{100 * (value / exact - 1):+.3f} %", float(history.get(f"{name}_error", math.nan))
-        if not math.isnan(error):
+        if math.isinf(value):
+            off = "-"
+        elif not math.isnan(error):
             off += f" (± {percent(error / value)} estimated)"
         rows.append((named.get(name, spelled(name)), quantity(exact, unit, 6), quantity(value, unit, 6), off))
     return rows
@@ -270,7 +272,7 @@ def trial_rows(result: Result) -> list[Row]:
         ("spacing", *(quantity(float(own["trial_spacing"][k]), "m") for k in shown), ""),
         ("nodes", *(f"{int(own['trial_nodes'][k]):,}" for k in shown), ""),
     ]
-    for name in names:
+    for name in relative:
         values = own[f"trial_{name}"].isel(step=-1)
         values_shown = (quantity(float(values[k]), VARIABLES[name].units, 5) for k in shown)
         rows.append((spelled(name.removesuffix("_fit")), *values_shown, percent(relative[name])))

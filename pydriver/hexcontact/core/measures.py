@@ -20,6 +20,7 @@ from .flat import boundary as boundary
 from .flat import boundary_circle as boundary_circle
 from .flat import bulk_strain as bulk_strain
 from .flat import edge_radius as edge_radius
+from .flat import is_unbounded as is_unbounded
 from .flat import pressure_center as pressure_center
 from .flat import slip_ring as slip_ring
 from .flat import unresolved_slip_zones as unresolved_slip_zones

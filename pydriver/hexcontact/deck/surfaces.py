@@ -127,11 +127,6 @@ class Surface(Argument):
             height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
         return height
 
-    @property
-    def sharp(self) -> bool:
-        """Whether the shape ends sharply under pressure, along a profile that should have an end."""
-        return False
-
     def beside(self, modulus: float) -> Surface:
         """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
         return self
@@ -457,10 +452,14 @@ class Roller(Surface):
         """Half of the length."""
         return self.length / 2
 
-    @property
-    def sharp(self) -> bool:
-        """Whether no profile relieves the ends."""
-        return self.profile == "sharp"
+    def plane_contact(self, modulus: float, load: float) -> tuple[float, float]:
+        """Return half-width (m) and largest pressure (Pa) of plane contact with a flat under P/l.
+
+        b² = 4 P R/(π E* l), p0 = 2 P/(π b l) (K. L. Johnson, Contact Mechanics, 1985, section 4.2).
+        """
+        by_length = load / self.length
+        half_width = math.sqrt(4.0 * by_length * self.radius / (math.pi * modulus))
+        return half_width, 2.0 * by_length / (math.pi * half_width)
 
     def beside(self, modulus: float) -> Surface:
         """Return the roller with the logarithmic profile of the modulus."""
@@ -481,7 +480,7 @@ class Roller(Surface):
             if not self._modulus:
                 raise DeckError("design_load: its profile follows from the moduli of the bodies, in a case")
             by_length = self.design_load / self.length
-            width = math.sqrt(4.0 * by_length * self.radius / (math.pi * self._modulus))
+            width, _ = self.plane_contact(self._modulus, self.design_load)
             # the end drops by (P/(pi E* l)) ln(3.2976 l/2b): Johns and Gohar, Tribology Int. 14, 1981
             end = 1.0 - 2.0 * width / (3.2976 * self.length)
             drop = -by_length / (math.pi * self._modulus) * np.log(1.0 - end * np.minimum(place, 1.0) ** 2)
@@ -557,11 +556,6 @@ class SurfaceSum(Surface):
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the sum of the heights (m)."""
         return np.asarray(sum(part.height(x, y) for part in self.parts))
-
-    @property
-    def sharp(self) -> bool:
-        """Whether one of them does."""
-        return any(part.sharp for part in self.parts)
 
     def beside(self, modulus: float) -> Surface:
         """Return the sum of shapes of the modulus."""

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import TriMesh
 from matplotlib.figure import Figure, FigureBase
-from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefiner
+from matplotlib.tri import Triangulation, UniformTriRefiner
 
 from ..analytic.compare import ClosedForms, PartialSlip
 from ..arrays import Array, Dataset, Mask
@@ -273,14 +273,22 @@ def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]
     if not (depth and mesh.triangles.size and view.tractions.source == "edges"):
         return mesh
     coarse = Triangulation(mesh.x, mesh.y, mesh.triangles)
-    fine = UniformTriRefiner(coarse).refine_triangulation(subdiv=depth)
+    fine, owner = UniformTriRefiner(coarse).refine_triangulation(return_tri_index=True, subdiv=depth)
     values = field(fine.x, fine.y)
     cannot = 1.0 - np.isfinite(view.field("gap"))
     beside = linear(cannot, view.basis, view.start, fine.x, fine.y, 1.0) > 0.0
     if beside.any():
-        joined = LinearTriInterpolator(coarse, mesh.values)(fine.x[beside], fine.y[beside])
-        values[beside] = np.ma.filled(joined, 0.0)
+        values[beside] = _on_triangles(mesh, owner[beside], fine.x[beside], fine.y[beside])
     return ZoneMesh(fine.x, fine.y, values, fine.triangles)
+
+
+def _on_triangles(mesh: ZoneMesh, owner: Array, x: Array, y: Array) -> Array:
+    """Interpolate a field of a mesh at points, each in a triangle of its own; 0 in triangles without area."""
+    corners = mesh.triangles[owner]
+    u, v = mesh.x[corners] - x[:, None], mesh.y[corners] - y[:, None]
+    areas = np.roll(u, -1, 1) * np.roll(v, -2, 1) - np.roll(u, -2, 1) * np.roll(v, -1, 1)
+    whole, sums = areas.sum(axis=1), (areas * mesh.values[corners]).sum(axis=1)
+    return np.divide(sums, whole, out=np.zeros_like(sums), where=whole != 0.0)
 
 
 # --- the fields -----------------------------------------------------------------------------------

@@ -192,9 +192,10 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "max_pressure": known.max_pressure,
         "slope": max(known.slope, *known.body_slopes, 0.0),
         "gap_slope": known.slope,
-        "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
         "spacings": known.spacings(case.lattice),
     }
+    if math.isfinite(known.max_pressure):
+        found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
         along = np.concatenate([one.distances for one in case.maps]) / case.lattice.spacing
         found |= {
@@ -247,18 +248,8 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
             if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most
         ]
         known = found | _words(case, found) if passed else {}
-        case.judged[estimated] = [*(limit.words.format(**known) for limit in passed), *_sharp_ends(case)]
+        case.judged[estimated] = [limit.words.format(**known) for limit in passed]
     return case.judged[estimated]
-
-
-def _sharp_ends(case: Problem) -> Iterator[str]:
-    """Yield a sentence about each body that ends sharply on the other one."""
-    for number, body in enumerate((case.body_1, case.body_2), 1):
-        if body.surface and body.surface.sharp:
-            yield (
-                f"body.{number}.surface ends sharply: there the pressure has no bound, and the largest "
-                "pressure is that of the lattice"
-            )
 
 
 def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
@@ -283,7 +274,9 @@ def row(case: Problem) -> str:
     if case.estimate is None:
         return ""
     found = expected(case)
-    pressure, axes = quantity(found["max_pressure"], "Pa", 3), _half_axes(found)
+    pressures, axes = "unbounded at an end of a surface", _half_axes(found)
+    if "pressure_ratio" in found:
+        pressures = f"about {quantity(found['max_pressure'], 'Pa', 3)}, {found['pressure_ratio']:.2g} E*"
     spacings = _counted(found["spacings"], "spacing")
     size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {spacings}"
     if axes:
@@ -292,8 +285,7 @@ def row(case: Problem) -> str:
         size = f"half-axes about {major} by {minor}, {spacings} in the smaller one; "
         size += f"extent about {along} in x, {across} in y"
     return (
-        f"{size}; p_max about {pressure}, "
-        f"{found['pressure_ratio']:.2g} E*; slope at the edge {found['slope']:.2g}"
+        f"{size}; p_max {pressures}; slope at the edge {found['slope']:.2g}"
         f"{_steepest(case, found)['gap_words']}"
     )
 

@@ -12,13 +12,13 @@ import os
 import platform
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from ..core.contact import CoatedPair
 from ..core.lattice import Lattice
 from ..deck.keys import Body, Bulk, Coating
 from ..deck.kinds import Quantity
-from ..deck.surfaces import Surface, SurfaceSum
+from ..deck.surfaces import Flat, Roller, Surface, SurfaceSum
 from ..text import Row, percent, quantity
 from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility
@@ -177,6 +177,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("interface", interface),
         ("friction", _friction(case)),
         ("contact", plausibility.row(case)),
+        ("plane contact", _plane_contact(case)),
         ("contact", "full, one unknown: p = P/A over all nodes" if case.full_contact else ""),
         ("spacing", quantity(lattice.spacing, "m") + _cells(lattice)),
         (
@@ -193,6 +194,18 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("work", work(case)),
     ]
     return [row for row in rows if row[1]]
+
+
+def _plane_contact(case: Problem) -> str:
+    """Return half-width and pressure of plane contact beside a roller on a flat; empty for others."""
+    surfaces = case.surfaces.surface_1, case.surfaces.surface_2
+    curved = [surface for surface in surfaces if not isinstance(surface, Flat)]
+    load = largest_loads(case)["normal_load"]
+    if len(curved) != 1 or not isinstance(curved[0], Roller) or not load or case.deck.interface:
+        return ""
+    half_width, pressure = curved[0].plane_contact(case.pair.effective_modulus, load)
+    by_length, width = quantity(load / curved[0].length, "N/m"), quantity(half_width, "m")
+    return f"{by_length}: half-width {width}, p_max {quantity(pressure, 'Pa')} between the ends"
 
 
 def law_in_words(case: Problem) -> str:
@@ -297,7 +310,8 @@ def _surface(surface: Surface | None) -> str:
         value = getattr(surface, name)
         if name == "shape" or value == field.default:
             continue
-        unit = next((kind.dimension.unit for kind in field.metadata if isinstance(kind, Quantity)), "")
+        kinds = (*field.metadata, *(kind for one in get_args(field.annotation) for kind in get_args(one)))
+        unit = next((kind.dimension.unit for kind in kinds if isinstance(kind, Quantity)), "")
         if name == "offset":
             given.append(f"{name} ({', '.join(quantity(part, 'm') for part in value)})")
         elif name == "tilt":

@@ -18,6 +18,7 @@ import numpy as np
 from ..arrays import Array, Mask, reals
 from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
 from ..core.lattice import Lattice, Pattern
+from ..core.measures import is_unbounded
 from ..deck.faults import MISSING, Mistake
 from ..deck.height_map import Placed
 from ..deck.keys import Grid
@@ -57,7 +58,7 @@ class Estimate(NamedTuple):
     upper: Array
     cell: float  # coarse spacing (m); the edge of the contact is within one cell of the bounds
     size: Array  # extent (m) of the contact in x and in y, (2,)
-    max_pressure: float  # largest pressure (Pa)
+    max_pressure: float  # largest pressure (Pa); infinite where it rises to an end of a surface
     slope: float = 0.0  # largest slope of the gap within the contact
     # those of the surfaces of body 1 and body 2; empty if only their gap is known
     body_slopes: tuple[float, ...] = ()
@@ -183,6 +184,8 @@ def estimate_contact(
             if finer.size <= MOST_COARSE_NODES:
                 lattice = finer
                 continue
+        if interface == UNILATERAL and is_unbounded(np.isfinite(height), pressure):
+            estimate = estimate._replace(max_pressure=math.inf)
         surfaces = [height, *(surface(x, y) for surface in heights)]
         slope, *body_slopes = (_steepest(each, lattice, contact) for each in surfaces)
         return estimate._replace(slope=slope, body_slopes=tuple(body_slopes))

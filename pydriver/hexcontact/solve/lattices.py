@@ -299,11 +299,13 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
 def relative_errors(
     histories: Sequence[Mapping[str, Any]], errors: Sequence[Mapping[str, float]]
 ) -> dict[str, float]:
-    """Return the largest error of each of the `JUDGED` quantities, over its largest value."""
+    """Return the largest error of each bounded quantity of `JUDGED`, over its largest value."""
     found = {}
     for name in JUDGED:
         if name in errors[0]:
             largest = max(abs(float(history[name])) for history in histories)
+            if math.isinf(largest):
+                continue
             error = float(np.max([step[name] for step in errors]))  # NaN if one is
             found[name] = error / largest if largest else math.inf if error else 0.0
     return found

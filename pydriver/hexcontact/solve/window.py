@@ -14,7 +14,7 @@ from ..arrays import Array
 from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import measures
+from ..core.measures import is_unbounded, measures
 from ..core.steps import AdaptiveSteps
 from ..errors import DeckError
 from ..problem.loads import MOTIONS, LoadStep
@@ -157,6 +157,8 @@ class Window:
         given = {name: known[name] for name in _STEPPED if name in known}
         gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
         found = given | measures(self.lattice, self.friction, gap, self.candidate, solution)
+        if not self.case.deck.interface and is_unbounded(self.candidate, solution.pressure):
+            found["max_pressure"] = math.inf
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
             found["mean_gap"] = float(solution.gap.mean())

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated
 
+from ..core.ranks import refuse_copies
 from ..solve.interruption import signal_pipe
 from . import frame
 
@@ -30,6 +31,7 @@ def run(
     from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
+    refuse_copies()
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with messages.logging(deck, *([output] if output else [])):
         case = frame.case_of(deck, settings)
@@ -63,6 +65,7 @@ def resume(
     from ..solve import restart
     from .solving import Messages, overview, picture_beside, solved, with_tables
 
+    refuse_copies()
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(frame.setting, settings or ()))
     with (

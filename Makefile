@@ -62,7 +62,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check slurm-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -148,6 +148,13 @@ flang-check: $(STAMPS)/build-tools  ## Fortran unit tests on a build of LLVM's f
 	@echo "Building hexcontact with $(FLANG) ($(FLANG_BUILD))"
 	@[ -e $(FLANG_BUILD)/build.ninja ] || FC=$(FLANG) meson setup $(FLANG_BUILD) -Dopenmp=enabled -Dwarning_level=0
 	@meson test -C $(FLANG_BUILD) --print-errorlogs --timeout-multiplier 5
+
+# dask-jobqueue is not in .venv, where tests expect it to be missing.
+JOBQUEUE := build/jobqueue
+slurm-check: install $(STAMPS)/extra-test  ## the job scripts of cases/cluster on a Slurm of one node, which the tests start and end (minutes)
+	@sh .ci/bootstrap.sh --slurm
+	@[ -d $(JOBQUEUE) ] || $(pip) install --quiet --no-deps --target $(JOBQUEUE) dask-jobqueue || true
+	@PYTHONPATH=$(CURDIR)/$(JOBQUEUE) $(py) -m pytest --quiet $(PYTEST_ARGS) tests/batch
 
 perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
 	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"

@@ -5,6 +5,7 @@
 #
 #   sh .ci/bootstrap.sh            check, install what is missing, create .venv
 #   sh .ci/bootstrap.sh --flang flang-22  the same, with that flang and its OpenMP
+#   sh .ci/bootstrap.sh --slurm    the same, with CI=true also Slurm, for its tests
 #   sh .ci/bootstrap.sh --cpp      the same, with a C++ compiler (pocketfft)
 #   sh .ci/bootstrap.sh --venv-ok  say nothing; succeed if .venv is usable
 #
@@ -239,6 +240,18 @@ if [ "${CI:-}" = true ] && ! has_browser; then
     say 'Chromium cannot be installed; with CI=true the tests open pages in it. Install chromium.' >&2
     exit 1
   fi
+fi
+
+# Elsewhere apt would start the daemons for good; the tests that need them are skipped.
+slurm_packages='slurmctld slurmd slurm-client munge'
+has_slurm() { PATH=$PATH:/usr/sbin have slurmctld; }
+if [ "${1:-}" = --slurm ] && ! has_slurm; then
+  if [ "${CI:-}" = true ] && can_apt; then
+    say "Installing with apt: $slurm_packages"
+    # shellcheck disable=SC2086
+    { apt_get update && apt_get install -y --no-install-recommends $slurm_packages; } >/dev/null
+  fi
+  has_slurm || say "Slurm is not here, so its tests are skipped: sudo apt-get install $slurm_packages"
 fi
 
 # --- the virtual environment ----------------------------------------------

@@ -240,7 +240,7 @@ class Lock:
 
     The operating system holds the lock, and releases it when the process dies.
     File systems differ in whether another machine notices, so the file names process and host:
-    a lock left by another host counts as held. `output` is named in messages; `began` is when the run began
+    a lock left by another host counts as held, unless a requeued job of Slurm left it. `output` is named in messages; `began` is when the run began
     that a resumed one continues (s since 1970), see `begun`.
     """
 
@@ -264,7 +264,8 @@ class Lock:
         if holder is None:
             os.close(self._descriptor)
             raise _no_lock(path)
-        if held or holder.get("host", os.uname().nodename) != os.uname().nodename:
+        here = holder.get("host", os.uname().nodename) == os.uname().nodename
+        if held or not (here or _is_over(holder)):
             os.close(self._descriptor)
             since = f" since {holder['since']}" if "since" in holder else ""
             advice = f"if that run is over, delete {path}"
@@ -279,6 +280,7 @@ class Lock:
             "host": os.uname().nodename,
             "since": time.strftime("%F %T"),
             "time": time.time(),
+            **_job(),
         }
         if began is not None and math.isfinite(began):
             text["began"] = began
@@ -299,6 +301,21 @@ class Lock:
         if _same_file(self.path, self._descriptor):
             self.path.unlink(missing_ok=True)
         os.close(self._descriptor)
+
+
+def _job() -> dict[str, Any]:
+    """Return the Slurm job of this process and how often it was requeued; nothing without one."""
+    number, cluster = (os.environ.get(f"SLURM_{name}", "") for name in ("JOB_ID", "CLUSTER_NAME"))
+    requeued = os.environ.get("SLURM_RESTART_COUNT", "")
+    if not number:
+        return {}
+    return {"job": f"{number} {cluster}", "requeued": int(requeued) if requeued.isdecimal() else 0}
+
+
+def _is_over(holder: dict[str, Any]) -> bool:
+    """Test whether an earlier attempt of the job of this process wrote the lock: a job runs once at a time."""
+    job, before = _job(), holder.get("requeued")
+    return bool(job) and holder.get("job") == job["job"] and type(before) is int and before < job["requeued"]
 
 
 def holder_of(text: bytes) -> dict[str, Any] | None:

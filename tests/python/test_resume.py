@@ -378,6 +378,24 @@ def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path: Path) -> None:
     assert hexcontact.resume(out, on_step=meddle).complete
 
 
+def test_a_requeued_job_resumes_on_another_node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lock of a node that has failed is that of an attempt that is over."""
+    out = tmp_path / "out.nc"
+    stopped(made(), out, 2)
+    holder = {"process": 1, "host": "node7", "job": "12 alpha", "requeued": 0}
+    (journal_of(out) / "lock").write_text(json.dumps(holder))
+    monkeypatch.setenv("SLURM_JOB_ID", "12")
+    monkeypatch.setenv("SLURM_CLUSTER_NAME", "alpha")
+    with pytest.raises(DeckError, match="is being written by another run, process 1 on node7"):
+        resume(out)  # another task of the same attempt
+    monkeypatch.setenv("SLURM_RESTART_COUNT", "1")
+    monkeypatch.setenv("SLURM_CLUSTER_NAME", "beta")
+    with pytest.raises(DeckError, match="is being written by another run"):
+        resume(out)  # a job of the same number
+    monkeypatch.setenv("SLURM_CLUSTER_NAME", "alpha")
+    assert len(resume(out)) == 4
+
+
 def test_a_process_number_that_was_given_again_holds_no_lock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -556,6 +574,32 @@ def test_a_signal_ends_the_run_and_resume_goes_on(
     assert (again.returncode, again.stderr) == (0, "")
     assert "a sphere.nc is finished, all its load steps are there; written: " in again.stdout
     assert (tmp_path / "a sphere.png").exists()
+
+
+def test_a_run_resumes_where_there_is_something_to_resume(tmp_path: Path) -> None:
+    """One command starts a run, continues it and leaves it finished; a job is requeued with it."""
+    (tmp_path / "deck.toml").write_text(commands.DECK)
+    words = ("run", "deck.toml", "--output", "out.nc", "--resume")
+
+    stopped(Case.from_toml(tmp_path / "deck.toml"), tmp_path / "out.nc", 1)
+    (tmp_path / "other.toml").write_text(commands.DECK.replace("20 N", "21 N"))
+    other = commands.inside(tmp_path, "run", "other.toml", *words[2:])
+    assert other.returncode == 2 and "their decks differ" in other.stderr
+    assert commands.inside(tmp_path, *words).returncode == 0
+    [line] = xarray.open_dataset(tmp_path / "out.nc").attrs["history"].splitlines()[1:]
+    assert "resumed after step 1" in line
+    whole_run = commands.inside(tmp_path, *words[:3], "whole.nc", "--resume")
+    assert whole_run.returncode == 0
+    same(tmp_path / "out.nc", tmp_path / "whole.nc")
+
+    before = content(tmp_path)
+    again = commands.inside(tmp_path, *words)
+    assert again.returncode == 0 and "all its load steps are there" in again.stdout
+    other = commands.inside(tmp_path, "run", "other.toml", *words[2:])
+    assert other.returncode == 2 and "their decks differ" in other.stderr
+    assert content(tmp_path) == before
+    both = commands.inside(tmp_path, *words, "--overwrite")
+    assert both.returncode == 2 and "--resume: expected no --overwrite with it" in both.stderr
 
 
 def test_resume_is_refused_in_a_sentence(tmp_path: Path) -> None:

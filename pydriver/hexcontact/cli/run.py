@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ..core.ranks import refuse_copies
+from ..errors import DeckError
 from ..solve.interruption import signal_pipe
 from . import frame
+
+if TYPE_CHECKING:
+    from .solving import Messages
 
 
 @frame.command("hexcontact run cases/hertz_spheres.toml --plot")
@@ -18,6 +22,9 @@ def run(
         Path | None, frame.output_to("File to write; default: the deck's output.file, or DECK.nc here.")
     ] = None,
     overwrite: Annotated[bool, frame.flag("overwrite", "Replace an existing output.")] = False,
+    again: Annotated[
+        bool, frame.flag("resume", "Resume an interrupted run of this deck; keep a finished result.")
+    ] = False,
     plot: frame.Plot = False,
     quiet: frame.Quiet = False,
     as_json: frame.AsJson = False,
@@ -27,11 +34,13 @@ def run(
 ) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
-    from ..solve import log
+    from ..solve import log, restart
     from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
     refuse_copies()
+    if again and overwrite:
+        raise DeckError("--resume: expected no --overwrite with it")
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with messages.logging(deck, *([output] if output else [])):
         case = frame.case_of(deck, settings)
@@ -39,6 +48,8 @@ def run(
         log.refuse_same(log_file, [target])
         if plot:  # refuses before the run
             picture_beside(target)
+        if again and restart.was_begun(target, case):
+            return _resumed(target, plot, messages, case=case)
         with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
             histories, extent = solved(case, store, pipe, deck.stem, messages)
         picture = overview(target) if plot else None
@@ -62,17 +73,20 @@ def resume(
 
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
-    from ..solve import restart
-    from .solving import Messages, overview, picture_beside, solved, with_tables
+    from .solving import Messages
 
     refuse_copies()
     messages = Messages("resume", quiet, as_json, log_file, log_level)
-    overrides = dict(map(frame.setting, settings or ()))
-    with (
-        signal_pipe() as pipe,
-        messages.logging(file),
-        restart.reopened(file, overrides=overrides) as again,
-    ):
+    with messages.logging(file):
+        return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
+
+
+def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
+    """Resume the run of an output, with the case or the overrides of `restart.reopened`."""
+    from ..solve import restart
+    from .solving import overview, picture_beside, solved, with_tables
+
+    with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
         if again is not None:
             if plot:
                 picture_beside(again.store.path)

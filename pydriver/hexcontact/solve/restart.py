@@ -16,7 +16,7 @@ from ..deck.read import recorded
 from ..errors import DeckError, HexcontactError, PlausibilityWarning, warn
 from ..problem import plausibility
 from ..problem.problem import Problem
-from ..result.journal import TrialFolder, journal_of
+from ..result.journal import Journal, TrialFolder, journal_of
 from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
 from ..result.result import Result
@@ -93,6 +93,15 @@ def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
         list(write_stresses(output, case))
 
 
+def was_begun(path: Path, case: Problem) -> bool:
+    """Return whether a run of the case left finished steps or a result; DeckError if it is of another case."""
+    if not (path.exists() or Journal(journal_of(path)) or TrialFolder(journal_of(path))):
+        return False
+    with contextlib.closing(open_result(path)) as found:
+        _require_same(path, found.deck, case)
+    return True
+
+
 @contextlib.contextmanager
 def reopened(
     path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
@@ -136,6 +145,12 @@ def physics(deck: str) -> dict[str, Any]:
     return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
+def _require_same(path: Path, deck: str, case: Problem) -> None:
+    """Refuse a case whose deck states another problem than that of a result."""
+    if not deck or physics(deck) != physics(case.deck_text):
+        raise DeckError(f"the case is not the one that {path} is the result of: their decks differ")
+
+
 def output_of(path: Path) -> Path:
     """Return the output of a run, by its own path or that of its journal."""
     if path.is_dir() and path.name.endswith(".d"):
@@ -174,8 +189,7 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
     if case is not None:
         if overrides:
             raise DeckError("expected a case or overrides, not both")
-        if not metadata.deck or physics(metadata.deck) != physics(case.deck_text):
-            raise DeckError(f"the case is not the one that {path} is the result of: their decks differ")
+        _require_same(path, metadata.deck, case)
         return case
     if not metadata.deck:
         raise DeckError(f"the journal of {path} holds no deck")

@@ -1,11 +1,7 @@
-"""Names of arrays, data sets and tables, and checks of what users pass before the core takes it."""
+"""Names of arrays, data sets and tables; arrays of real numbers from what users pass."""
 
 from __future__ import annotations
 
-import math
-import operator
-from collections.abc import Callable, Collection, Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +18,6 @@ else:  # xarray and pandas are imported at their first use
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-_LARGEST_INTEGER = 2**31 - 1  # of the core
 
 
 def reals(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None, meaning: str = "") -> Array:
@@ -52,99 +46,3 @@ def has_entries(values: Any) -> bool:
         return np.ndim(values) > 0
     except ValueError:
         return True
-
-
-def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
-    """Return arguments as arrays of real numbers of one shape, by their names."""
-    arrays = {name: reals(values, name) for name, values in coordinates.items()}
-    try:
-        return dict(zip(arrays, np.broadcast_arrays(*arrays.values()), strict=True))
-    except ValueError as error:
-        shapes = " and ".join(str(array.shape) for array in arrays.values())
-        raise DeckError(f"{' and '.join(arrays)}: arrays of shapes {shapes} do not broadcast") from error
-
-
-def number(
-    value: Any, name: str, expected: str = "a number", fits: Callable[[float], bool] | None = None
-) -> float:
-    """Return an argument as a real number, which may be infinite."""
-    try:
-        if isinstance(value, str | bytes) or np.iscomplexobj(value):
-            raise TypeError(f"a value of the type {type(value).__name__}")
-        found = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise DeckError(f"{name} = {_shown(value)}: expected {expected}") from error
-    if found != found or (fits and not fits(found)):
-        raise DeckError(f"{name} = {_shown(value)}: expected {expected}")
-    return found
-
-
-def numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """Return arguments as real numbers by their names."""
-    return {name: number(value, name) for name, value in values.items()}
-
-
-def integer(value: Any, name: str, expected: str = "an integer") -> int:
-    """Return an argument as an integer of 32 bits."""
-    try:
-        found = operator.index(value)
-    except TypeError as error:
-        raise DeckError(f"{name} = {_shown(value)}: expected {expected}") from error
-    if abs(found) > _LARGEST_INTEGER:
-        raise DeckError(f"{name} = {_shown(value)}: expected {expected} of at most {_LARGEST_INTEGER}")
-    return found
-
-
-positive = partial(number, expected="a positive number", fits=lambda value: 0.0 < value < math.inf)
-
-
-def word(value: Any, name: str, allowed: Collection[str]) -> str:
-    """Return an argument that is one of a few words."""
-    if not isinstance(value, str) or value not in allowed:
-        raise DeckError(f"{name} = {_shown(value)}: expected {' or '.join(map(repr, allowed))}")
-    return value
-
-
-def vector(value: Any, name: str, expected: str, count: int) -> Array:
-    """Return an argument of a few finite numbers."""
-    array = reals(value, name)
-    if array.shape != (count,) or not np.isfinite(array).all():
-        raise DeckError(f"{name} = {value!r}: expected {expected}")
-    return array
-
-
-_ARGUMENTS: dict[str, Callable[[Any, str], Any]] = {
-    **dict.fromkeys(("row_first", "col_first", "n_row", "n_col", "max_sweeps", "max_cuts"), integer),
-    "threads": partial(integer, expected="an integer of at least 0"),  # the core checks the bound
-    "method": partial(word, allowed=("direct", "fft")),
-    "iteration": partial(word, allowed=("newton", "dissertation")),
-    "coupling": partial(word, allowed=("full", "goodman")),
-    "entry": partial(word, allowed=("implicit", "interpolated")),
-    **dict.fromkeys(("lambda_1", "lambda_2", "lambda_5", "young_modulus", "poisson_ratio"), number),
-    "spacing": partial(number, expected="a positive length in meters", fits=lambda v: 0 < v < math.inf),
-    **dict.fromkeys(("cell_ratio", "shear_modulus", "yield_stress"), positive),
-    "cell_angle": partial(
-        number, expected="an angle in radians between 0 and pi", fits=lambda v: 0 < v < math.pi
-    ),
-    "direction": partial(number, expected="an angle in radians", fits=lambda v: abs(v) <= math.pi),
-    "normal_load": partial(number, expected="a number not below zero", fits=lambda v: 0 <= v < math.inf),
-    "approach": partial(number, fits=math.isfinite),
-    "tolerance": partial(number, expected="a number between 0 and 1", fits=lambda v: 0 < v < 1),
-    "friction_coefficient": partial(number, expected="a number of at least 0, or inf", fits=lambda v: v >= 0),
-    "shear_limit": partial(number, expected="a number above 0, or inf", fits=lambda v: v > 0),
-    "slope": partial(number, expected="a finite number", fits=math.isfinite),
-    "origin": partial(vector, expected="two finite lengths in meters", count=2),
-    "interface": partial(vector, expected="a coefficient, an exponent and a stiffness", count=3),
-    "value": partial(vector, expected="four finite numbers", count=4),
-}
-"""Checks of the arguments of the core by their names."""
-
-
-def checked(**arguments: Any) -> tuple[Any, ...]:
-    """Return arguments of the core after the check that belongs to the name of each."""
-    return tuple(_ARGUMENTS[name](value, name) for name, value in arguments.items())
-
-
-def _shown(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."

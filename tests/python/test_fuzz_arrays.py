@@ -380,7 +380,7 @@ def bad() -> Iterator[tuple[str, str, str]]:
     )
     yield "lattice, rows", "a number", "n_row = 1.0: expected an integer"
     yield "loads", "a number", "load: expected an array of tables"
-    yield "values of an advance", "a set", "value: an array of real numbers expected"
+    yield "values of an advance", "a set", r"value = \{.*: expected four finite numbers"
 
 
 @pytest.mark.parametrize(("taker", "name", "sentence"), list(bad()))

@@ -148,7 +148,7 @@ FORMATS: dict[str, dict[str, object]] = {  # by the version that first wrote the
         "solution": "level copy spacing origin nodes histories",
     },
     "0.5.0": {
-        **{"result": 1, "journal": 4, "study": 1},
+        **{"result": 1, "journal": 5, "study": 1},
         "record": "run index lattice history control",
         "metadata": "title deck fields every planned_steps parameters run created version resumed deck_file",
         "header": "metadata loads steps",

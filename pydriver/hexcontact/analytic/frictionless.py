@@ -21,8 +21,9 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, positive, reals
+from ..arrays import Array, reals
 from ..core import flat
+from ..core.calls import positive
 from ..errors import DeckError
 
 Profile = Callable[[Array], Array]

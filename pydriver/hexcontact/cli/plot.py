@@ -132,7 +132,8 @@ def plot(
         if len(files) > 1 or any(one is not None for one in options):
             raise DeckError(f"--what {what}: expected one deck, and no other options but --output, --format")
         picture = output or frame.beside(files[0], f"_{what}.{format or 'png'}")
-        frame.print_output(f"written: {drawn_deck(files[0], what, picture)}")
+        figure = figures[what].draw(frame.case_of(files[0], None))
+        frame.print_output(f"written: {_save(figure, f'{what} of {files[0]}', picture)}")
         return
     study = study_of(files[0]) if len(files) == 1 else None
     table = read_table(files[0]) if len(files) == 1 and study is None else None
@@ -243,13 +244,6 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     except DeckError as error:  # such as no such step, nothing in contact
         raise DeckError(f"cannot draw {about}: {error}") from error
     return _save(figure, about, picture)
-
-
-def drawn_deck(deck: Path, what: str, picture: Path) -> Path:
-    """Draw a picture of a deck that was not run; return its file."""
-    from ..plotting.registry import entries
-
-    return _save(entries()[what].draw(frame.case_of(deck, None)), f"{what} of {deck}", picture)
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:

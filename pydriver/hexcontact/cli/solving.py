@@ -156,16 +156,10 @@ def with_tables(
     """Write the missing tables [[stress]] and [[fatigue]] of a result; signals end the process."""
     if not (missing := missing_stresses(output)):
         return
-
-    def work() -> None:
-        for path in solving.write_stresses(output, case, listener):
-            if listener is not None:
-                listener.said("written", file=path)
-
     try:
         for signaled in late:  # while the output was completed
             raise signaled
-        in_background(work, pipe)
+        in_background(lambda: solving.write_stresses(output, case, listener), pipe)
     except Interrupted as signaled:
         if missing := missing_stresses(output):
             for path in missing.values():

@@ -11,9 +11,10 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Mask, checked, reals
+from ..arrays import Array, Mask, reals
 from ..errors import DeckError, RimWarning, warn
 from . import flat, kernel_cache
+from .calls import checked
 from .handles import Handle, HeldState, Solved
 from .lattice import Lattice
 
@@ -193,22 +194,17 @@ class CoatedPair(ElasticPair):
 
 def pair_of(one: Any, two: Any) -> ElasticPair:
     """Return the constants of body 1 and body 2, with their materials and coatings; None: rigid."""
-    below = (
-        one and one.young_modulus,
-        one and one.poisson_ratio,
-        two and two.young_modulus,
-        two and two.poisson_ratio,
-    )
-    if not ((one and one.coating) or (two and two.coating)):
-        return ElasticPair.from_materials(*below)
+    bodies = one, two
+    below = [(body.young_modulus, body.poisson_ratio) if body else (None, None) for body in bodies]
     coatings = [
-        [
-            (layer.thickness, layer.young_modulus, layer.poisson_ratio)
-            for layer in (body.coating if body else ())
-        ]
-        for body in (one, two)
+        [(layer.thickness, layer.young_modulus, layer.poisson_ratio) for layer in body.coating]
+        if body
+        else []
+        for body in bodies
     ]
-    return CoatedPair.of_layers([below[:2], below[2:]], coatings)
+    if any(coatings):
+        return CoatedPair.of_layers(below, coatings)
+    return ElasticPair.from_materials(*below[0], *below[1])
 
 
 class FlexibilityOperator(Handle):

@@ -24,9 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, checked, number, numbers, positive, reals
+from ..arrays import Array, reals
 from ..errors import DeckError
 from . import flat
+from .calls import checked, number, numbers, positive
 
 __all__ = [
     "CriticalPlane",

@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, checked, has_entries, numbers, reals
+from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
 from . import flat
+from .calls import checked, numbers
 from .contact import (
     UNILATERAL,
     Contact,

@@ -21,9 +21,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, broadcast, integer, number, reals, word
+from ..arrays import Array, reals
 from ..errors import DeckError
 from . import flat
+from .calls import broadcast, integer, number, word
 
 __all__ = [
     "Displacement",

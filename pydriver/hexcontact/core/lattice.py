@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, Mask, checked
+from ..arrays import Array, Mask
 from ..errors import DeckError
 from . import flat
+from .calls import checked
 
 
 class Nodes(NamedTuple):

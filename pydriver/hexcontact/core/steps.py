@@ -16,7 +16,7 @@ from .flat import WearSettings as WearSettings
 from .flat import begin_step as begin_step
 from .flat import forget_changes as forget_changes
 from .flat import new_steps as new_steps
-from .friction import ContactState, FrictionalContact
+from .friction import ContactState
 from .handles import Handle
 from .lattice import Lattice
 
@@ -63,33 +63,13 @@ class CyclesOfWear(Handle):
     def restore(
         self, state: ContactState, fields: Sequence[Array], cycles: float, until: float, spent: float
     ) -> None:
-        """Go on from a solved cycle: its fields as of `fields`, and its numbers as of `WearProgress`."""
+        """Go on from a solved cycle: its fields in the order of the core, numbers as of `WearProgress`."""
         between = len(fields) == 5
         values = [*fields, 0.0 * fields[0]][:5]
         flat.restore_wear(self, state, values, cycles, until, spent, between)
 
-    def restore_end(self, place: int, cycles: float, motions: Array, tractions: Array) -> None:
-        """Set the last solution of a load step, and its rates per cycle."""
-        flat.restore_wear_end(self, place, cycles, motions, tractions.reshape(2, 3, -1))
-
-    def advance(self, contact: FrictionalContact) -> WearProgress:
-        """Solve the next load step."""
-        return contact.called(flat.advance_wear, self)
-
-    def carry(self, contact: FrictionalContact, smaller: Lattice) -> None:
-        """Go on with a larger window, at the present load step."""
-        flat.carry_wear(contact, self, smaller.first, [smaller.n_col, smaller.n_row])
-
-    def solution(self, contact: FrictionalContact) -> ContactState:
-        """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
-        return contact.solution(flat.state_of_wear(self))
-
-    def fields(self, lattice: Lattice) -> Array:
-        """Return worn depth, change of it, energy and path of the last cycle, energy of a second jump."""
-        return flat.fields_of_wear(self, lattice.n_col, lattice.n_row)
-
     def ends(self, count: int, lattice: Lattice) -> Iterator[tuple[float, Array, Array]]:
-        """Yield the last solution of each load step as of `restore_end`; negative cycles: none."""
+        """Yield the last solution of each load step: cycle (negative: none), motions, tractions."""
         for place in range(1, count + 1):
             cycles, motions, tractions = flat.wear_end(self, place, lattice.size)
             yield cycles, motions, np.asarray(tractions).reshape(2, 3, *lattice.shape)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, has_entries, integer, reals
+from ..arrays import Array, has_entries, reals
 from ..core import flat, memory
+from ..core.calls import integer
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..variables import LARGEST

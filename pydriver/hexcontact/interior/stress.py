@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, DataArray, Dataset, integer
+from ..arrays import Array, DataArray, Dataset
 from ..core import kernel_cache, memory
+from ..core.calls import integer
 from ..core.contact import pair_of
 from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.friction import FrictionLaw

@@ -23,7 +23,6 @@ from ..interior.stress import TENSOR
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import netcdf
-from .netcdf import is_mesh
 from .result import Result, at_hand
 from .step import is_kept, with_shown
 
@@ -240,7 +239,8 @@ def to_ugrid(
     """
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
-    if target.is_file() and target.stat().st_size and not is_mesh(target):
+    ours = {"content", "hexcontact_version"} <= netcdf_library.attributes(target).keys()
+    if target.is_file() and target.stat().st_size and not ours:
         raise DeckError(f"{target} is there and was not made by hexcontact; delete it or choose another name")
     with replacing(target) as path, netcdf_library.opened(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs

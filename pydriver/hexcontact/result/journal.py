@@ -2,9 +2,9 @@
 
 The header (JSON) has the metadata of the run with the whole deck. A record is an uncompressed zip archive of
 the fields of a step as numpy saves them, and a text (JSON) with all other data. It is written and read
-several times faster than a netCDF file of as many variables. Records of a session have the loads that they
-add to the deck, so that no record grows with the number of steps. Every file has a seal, a digest of its
-content, so that damage is an error.
+several times faster than a netCDF file of as many variables. Records of a session have the loads of their
+segments, so that no record grows with the number of steps. Every file has a seal, a digest of its content, so
+that damage is an error.
 
 ``out.nc.d/lattices`` has the header of the run, and the histories of each finished lattice: ``2_0.json`` is
 level 2, not shifted. The load steps of the present lattice, and of the finest finished one, are journals
@@ -14,14 +14,13 @@ beside them: ``2_0.nc.d``.
 from __future__ import annotations
 
 import contextlib
-import copy
 import dataclasses
 import hashlib
 import json
 import os
 import re
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -41,13 +40,16 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-VERSION = 4
+VERSION = 5
 HEADER = "header.json"
 SUFFIX = ".npz"
 STOPPED = "stopped.txt"  # the reason of an early end
 _LONGEST_REASON = 10_000  # bytes of it
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
+FOLDER = "lattices"  # in the journal
+_EARLIER = "trials.json"  # there, of the layouts 1 to 3
+_LATTICE = rf"\d+_\d+\.json|{re.escape(_EARLIER)}"
 _ABOUT = "about"  # name of the text among the arrays
 _KIND = "a record of a journal"
 LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
@@ -66,23 +68,23 @@ def journal_of(path: Path) -> Path:
 
 @dataclasses.dataclass
 class Header:
-    """Metadata of a run; those of a session have its loads apart, and further records add to these."""
+    """Metadata of a run; the deck of a session has its loads apart, and those of further steps follow."""
 
     metadata: Metadata
     loads: list[str] | None = None  # entries of [[load]] behind the deck; None: all are in it
-    steps: int = 0  # records that were there before
+    steps: int = 0  # finished with these loads
 
-    def follow(self, loads: Sequence[Any]) -> None:
-        """Add the loads of the next record, behind those that remain; their number is its first entry."""
-        assert self.loads is not None
-        self.loads[loads[0] :] = loads[1:]
+    def whole(self, controls: Iterable[Mapping[str, Any]]) -> Metadata:
+        """Return the metadata of a run by the control data of its finished steps.
 
-    def whole(self, steps: int) -> Metadata:
-        """Return the metadata of a run with a number of finished steps."""
+        A further segment has one entry of [[load]], which each of its steps has up to its own end.
+        """
         if self.loads is None:
             return self.metadata
-        deck = "".join([self.metadata.deck, *self.loads])
-        return dataclasses.replace(self.metadata, deck=deck, planned_steps=max(steps, self.steps))
+        known = list(controls)
+        further = {control["segment"]: control["load"] for control in known[self.steps :]}
+        deck = "".join([self.metadata.deck, *self.loads, *further.values()])
+        return dataclasses.replace(self.metadata, deck=deck, planned_steps=max(len(known), self.steps))
 
 
 def write_header(folder: Path, header: Header) -> None:
@@ -128,11 +130,6 @@ def _require_layout(about: Any, path: Path) -> None:
         )
 
 
-def begins_like_sealed(path: Path) -> bool:
-    """Test whether a file begins like a text of a run, which may be damaged."""
-    return beginning(path, 200).startswith(b'{"journal_version": ')
-
-
 def _digest(about: Any) -> str:
     return hashlib.sha256(json.dumps(about).encode()).hexdigest()
 
@@ -151,9 +148,9 @@ class Journal:
         self.folder, self._companions, self._ours = folder, companions, ours
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
-        self._left = [folder / name for name in names if name == STOPPED or _is_temporary(name, folder)]
+        self._left = [folder / name for name in names if _is_left(name, folder)]
         self._headers = [folder / HEADER] if HEADER in names else []
-        self._loads: dict[Path, list[Any]] = {}  # that records add
+        self._controls: dict[Path, Mapping[str, Any]] = {}  # of records that were read
 
     def __len__(self) -> int:
         """Return the number of finished steps."""
@@ -169,7 +166,7 @@ class Journal:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
                 raise DeckError(f"{record} does not belong to the records before it: its run is another")
-            self._loads[record] = about["loads"]
+            self._controls[record] = step.control
             yield step
 
     @cached_property
@@ -180,18 +177,16 @@ class Journal:
             raise DeckError(f"{self.folder} lacks its header, {HEADER}")
         return read_header(self.folder)
 
-    @cached_property
-    def grown(self) -> Header:
-        """The header with the loads that the records of a session add."""
-        header = dataclasses.replace(self.header, loads=copy.copy(self.header.loads))
-        for record in self.records[header.steps :] if header.loads is not None else ():
-            header.follow(self._loads.get(record) or read_about(record)["loads"])
-        return header
-
     @property
     def metadata(self) -> Metadata:
         """Metadata of the run."""
-        return self.grown.whole(len(self))
+        return self.header.whole(map(self._control, self.records))
+
+    def _control(self, record: Path) -> Mapping[str, Any]:
+        """Return the control data of a record, which is read once."""
+        if record not in self._controls:
+            self._controls[record] = read_about(record)["control"]
+        return self._controls[record]
 
     @property
     def run(self) -> str:
@@ -206,7 +201,7 @@ class Journal:
     @property
     def complete(self) -> bool:
         """Whether it has all planned steps."""
-        done = read_about(self.records[-1])["control"].get("done")
+        done = self._control(self.records[-1]).get("done")
         return len(self) == self.metadata.planned_steps or done == 1.0
 
     def result(self, path: Path) -> Result:
@@ -219,8 +214,11 @@ class Journal:
 
     @property
     def is_ours(self) -> bool:
-        """Whether a run has written one of the files."""
-        return any(map(begins_like_record, self.records)) or any(map(begins_like_sealed, self._headers))
+        """Whether one of the files begins as a run writes it; the rest may be damaged."""
+        heads = (beginning(record, 30 + len(_ABOUT)) for record in self.records)
+        if any(head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode() for head in heads):
+            return True
+        return any(beginning(path, 200).startswith(b'{"journal_version": ') for path in self._headers)
 
     @property
     def files(self) -> list[Path]:
@@ -233,24 +231,65 @@ class Journal:
             path.unlink(missing_ok=True)
         self.tidy()
 
+    def clear(self) -> None:
+        """Delete a journal that no run is writing, but no other files in its folder."""
+        self.remove()
+        if names_a_run(lock := self.folder / "lock"):
+            lock.unlink()
+        with contextlib.suppress(OSError):
+            self.folder.rmdir()
+
     def tidy(self) -> None:
         """Delete the reason of an early end, and remains of an interrupted write."""
         for path in Journal(self.folder)._left:
             path.unlink(missing_ok=True)
 
 
-def _is_temporary(name: str, folder: Path) -> bool:
-    """Test whether a run writes one of its files, or its output, under this temporary name."""
+def _is_left(name: str, folder: Path) -> bool:
+    """Test whether a run leaves a file of this name: the reason of its end, a finished lattice, remains."""
     stem = name.removesuffix(_TEMPORARY)
+    if folder.name == FOLDER and re.fullmatch(_LATTICE, stem):
+        return True
     ours = _RECORD.fullmatch(stem) or stem in (HEADER, folder.name.removesuffix(".d"))
-    return stem != name and bool(ours)
+    return name == STOPPED or (stem != name and bool(ours))
+
+
+def journals(folder: Path) -> list[Journal]:
+    """Return all journals in the folder of a journal: itself, that of the lattices, those of each lattice."""
+    below = folder / FOLDER
+    if not below.is_dir():
+        return [Journal(folder)]
+    names = sorted(os.listdir(below))
+    of_each = [below / name for name in names if re.fullmatch(r"\d+_\d+\.nc\.d", name)]
+    return [Journal(at) for at in (folder, below, *of_each)]
+
+
+def remove_all(folder: Path) -> None:
+    """Delete load steps and lattices in the folder of a journal, but not the lock."""
+    own, *others = journals(folder)
+    own.remove()
+    for journal in reversed(others):
+        journal.clear()
+
+
+def foreign_file(folder: Path) -> Path | None:
+    """Return a file named like one of a journal in a folder that no run has written to, or None."""
+    found = journals(folder)
+    if any(journal.is_ours for journal in found[:2]):
+        return None
+    return next((journal.files[0] for journal in found if journal.files and not journal.is_ours), None)
+
+
+def linked_folder(folder: Path) -> Path | None:
+    """Return a folder of lattices that is a link, or None."""
+    return next((journal.folder for journal in journals(folder)[1:] if journal.folder.is_symlink()), None)
 
 
 # --- records ------------------------------------------------------------------------------------------------
 
 
-def write_record(path: Path, run: str, step: Step, loads: Sequence[Any] = ()) -> None:
-    """Write the record of a step of a run, with the `loads` of `Header.follow`."""
+def write_record(path: Path, run: str, step: Step) -> None:
+    """Write the record of a step of a run."""
     fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
     for name, values in fields.items():
         if values.shape != step.lattice.shape:
@@ -261,7 +300,7 @@ def write_record(path: Path, run: str, step: Step, loads: Sequence[Any] = ()) ->
         "journal_version": VERSION,
         "hexcontact_version": __version__,
         **{"run": run, "index": step.index, "lattice": dataclasses.asdict(step.lattice)},
-        **{"history": dict(step.history), "control": dict(step.control), "loads": loads},
+        **{"history": dict(step.history), "control": dict(step.control)},
     }
     text = json.dumps(about, default=np.generic.item).encode()
     arrays = {_ABOUT: np.frombuffer(text, "u1"), **fields}
@@ -325,12 +364,6 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
         return values
 
 
-def begins_like_record(path: Path) -> bool:
-    """Test whether a file begins like a record, which may be damaged."""
-    head = beginning(path, 30 + len(_ABOUT))
-    return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
-
-
 class Stored(Mapping[str, NDArray[Any]]):
     """Fields of a record, each loaded at every access: an output takes one after the other."""
 
@@ -353,12 +386,6 @@ class Stored(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         """Return the number of fields."""
         return len(self._names)
-
-
-_JOURNAL = r"\d+_\d+\.nc\.d"
-_EARLIER = "trials.json"  # of the layouts 1 to 3
-_TEXT = rf"(\d+_\d+\.json|{re.escape(HEADER)}|{re.escape(_EARLIER)})(\.tmp)?"
-FOLDER = "lattices"  # in the journal
 
 
 class Solution(NamedTuple):
@@ -402,7 +429,7 @@ class TrialFolder:
     def solutions(self) -> list[Solution]:
         """The finished lattices; DeckError if a file is damaged or of another run."""
         run, found = self.metadata.run, []
-        for path in (path for path in self._texts() if re.fullmatch(r"\d+_\d+", path.stem)):
+        for path in sorted(self.folder.glob("[0-9]*_[0-9]*.json")):
             about = read_sealed(path)
             self.check(run, about.pop("run"))
             with reading(path, "a finished lattice"):
@@ -414,9 +441,9 @@ class TrialFolder:
         path = self.path(solution.level, solution.copy).with_suffix(".json")
         write_sealed(path, {"run": self.metadata.run, **solution._asdict()})
         if solution.copy:
-            _clear(Journal(journal_of(self.path(solution.level, solution.copy))))
+            Journal(journal_of(self.path(solution.level, solution.copy))).clear()
         elif solution.level:
-            _clear(Journal(journal_of(self.path(solution.level - 1))))
+            Journal(journal_of(self.path(solution.level - 1))).clear()
 
     def _latest(self) -> tuple[int, Journal]:
         """Return the level of the finest finished lattice, else 0, and its load steps."""
@@ -451,66 +478,3 @@ class TrialFolder:
             f"refinement is not finished; these are the steps on lattice {level + 1}"
         )
         return result
-
-    @property
-    def is_ours(self) -> bool:
-        """Test whether a run has written the header."""
-        return begins_like_sealed(self.folder / HEADER)
-
-    def foreign(self) -> Iterator[Path]:
-        """Yield files named like those of a run, in a folder without a header."""
-        yield from self._texts()
-        yield from (journal.files[0] for journal in self._journals() if journal.files and not journal.is_ours)
-
-    def _named(self, pattern: str) -> list[Path]:
-        """Return the entries of the folder whose names match a pattern."""
-        names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
-        return [self.folder / name for name in names if re.fullmatch(pattern, name)]
-
-    def _texts(self) -> list[Path]:
-        """Return the header, the finished lattices, and remains of an interrupted write."""
-        return self._named(_TEXT)
-
-    def _journals(self) -> list[Journal]:
-        """Return the load steps of all lattices."""
-        return [Journal(folder) for folder in self._named(_JOURNAL)]
-
-    def remove(self) -> None:
-        """Delete the files of runs, and no others."""
-        for journal in self._journals():
-            _clear(journal)
-        for path in self._texts():
-            path.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # it is missing, or has other files
-            self.folder.rmdir()
-
-
-def _clear(journal: Journal) -> None:
-    """Delete a journal that no run is writing."""
-    journal.remove()
-    if names_a_run(lock := journal.folder / "lock"):
-        lock.unlink()
-    with contextlib.suppress(OSError):
-        journal.folder.rmdir()
-
-
-def remove_all(folder: Path) -> None:
-    """Delete load steps and lattices in the folder of a journal, but not the lock."""
-    Journal(folder).remove()
-    if (folder / FOLDER).is_dir():
-        TrialFolder(folder).remove()
-
-
-def foreign_file(folder: Path) -> Path | None:
-    """Return a file named like one of a journal in a folder that no run has written to, or None."""
-    journal, trials = Journal(folder), TrialFolder(folder)
-    if journal.is_ours or trials.is_ours:
-        return None
-    return next(iter([*journal.files, *trials.foreign()]), None)
-
-
-def linked_folder(folder: Path) -> Path | None:
-    """Return a folder of lattices that is a link, or None."""
-    trials = TrialFolder(folder)
-    folders = [trials.folder, *(journal.folder for journal in trials._journals())]
-    return next((path for path in folders if path.is_symlink()), None)

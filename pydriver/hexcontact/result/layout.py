@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import datetime
 import uuid
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import Dataset, integer
+from ..arrays import Dataset
+from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
@@ -317,25 +318,11 @@ _GIVEN = {
 }
 
 
-class Quantities(Mapping[str, Variable]):
-    """The quantities of a result by name; printed, a table."""
+class Quantities(dict[str, Variable]):
+    """Units, long_name, dims and more of the quantities of a result by name; printed, a table."""
 
-    def __init__(self, names: list[str]) -> None:
-        self._names = [name for name in VARIABLES if name in names]
-
-    def __getitem__(self, name: str) -> Variable:
-        """Return units, long_name, dims and more of a quantity."""
-        if name not in self._names:
-            raise KeyError(f"the result has no {name}{did_you_mean(name, self._names)}")
-        return VARIABLES[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        """Return the number of quantities."""
-        return len(self._names)
+    def __missing__(self, name: str) -> Variable:
+        raise KeyError(f"the result has no {name}{did_you_mean(name, self)}")
 
     def _rows(self) -> list[tuple[str, str, str, str]]:
         return [

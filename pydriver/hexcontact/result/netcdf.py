@@ -14,7 +14,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ from ..arrays import Dataset
 from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
+from ..deck.kinds import SMALLEST
 from ..errors import DeckError
 from ..files import reading
 from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
@@ -36,7 +37,6 @@ from ..variables import (
     RESIDUALS,
     SCHEMA_VERSION,
     SHEAR_LIMIT,
-    TRACTIONS,
     VARIABLES,
     names_where,
 )
@@ -56,90 +56,57 @@ _CHANGED = r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)"
 _ALWAYS = names_where(lambda v: v.required == "always")
 _WITH_FRICTION = names_where(lambda v: bool(v.required))
 _NOISE = 1e-3  # of energies beside the normal load times the contact radius
-_NO_STEP = "{} holds numbers that no load step has"
 
 
-Fits = Callable[[Any], bool]  # test of a value
-
-
-def _is_number(value: Any) -> bool:
-    return np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf" and not math.isnan(float(value))
-
-
-def _is_positive(value: Any) -> bool:
-    return _is_number(value) and 0 < value < math.inf
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _one_of(*words: str) -> Fits:
-    return lambda value: isinstance(value, str) and value in words
-
-
-def _numbers(count: int) -> Fits:
-    return lambda value: np.shape(value) == (count,) and bool(np.isfinite(value).all())
-
-
-_HALF_SPACES: dict[str, Fits] = {  # that bodies with coatings do not have
-    "effective_modulus": _is_positive,
-    "dundurs_beta": _is_number,
-    "tangential_compliance_ratio": _is_number,
+_POSITIVE, _NOT_NEGATIVE, _BELOW_PI = (SMALLEST, LARGEST), (0.0, LARGEST), math.nextafter(math.pi, 0.0)
+# What attributes are: text, some of a few words, so many finite numbers, or a number between two bounds.
+_HALF_SPACES: dict[str, Any] = {  # that bodies with coatings do not have
+    **{"effective_modulus": _POSITIVE, "dundurs_beta": (-LARGEST, LARGEST)},
+    "tangential_compliance_ratio": (-LARGEST, LARGEST),
 }
-_PARAMETERS: dict[str, Fits] = {  # of the case: all of them or, in tests, none
+_PARAMETERS = {  # of the case: all of them or, in tests, none
     **_HALF_SPACES,
-    "friction_coefficient": lambda value: np.ndim(value) == 0 and not float(value) < 0,  # NaN: another law
-    "algorithm": _one_of("frictionless", "static", "incremental"),
-    "coupling": _one_of("full", "goodman"),
-    "tolerance": _is_positive,
+    "friction_coefficient": (0.0, math.inf),
+    "algorithm": ("frictionless", "static", "incremental"),
+    "coupling": ("full", "goodman"),
+    "tolerance": _POSITIVE,
 }
-_ATTRIBUTES: dict[str, Fits] = {
-    **dict.fromkeys(("title", "deck", "source", "history", "created", "run"), _is_text),
-    **dict.fromkeys(("output_fields", "hexcontact_version"), _is_text),
-    "output_every": _is_positive,
-    "planned_steps": lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: not known yet
-    "complete": _is_number,
-    "lattice_spacing": _is_positive,
-    "lattice_basis": _numbers(4),
-    "lattice_origin": _numbers(2),
+_ATTRIBUTES: dict[str, Any] = {
+    **dict.fromkeys(("title", "deck", "source", "history", "created", "run"), str),
+    **dict.fromkeys(("output_fields", "hexcontact_version"), str),
+    **{"output_every": _POSITIVE, "planned_steps": _NOT_NEGATIVE, "complete": (-LARGEST, LARGEST)},
+    **{"lattice_spacing": _POSITIVE, "lattice_basis": 4, "lattice_origin": 2},
 }
-_LATER = {
-    "lattice_cell_ratio": _is_positive,
-    "lattice_direction": lambda value: _is_number(value) and abs(value) <= math.pi,
-    "lattice_periodic": lambda value: value in (0, 1),
-    "lattice_cell_angle": lambda value: _is_number(value) and 0 < value < math.pi,
-    INTERFACE[0]: _is_positive,
-    INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
-    INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
-    **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance", "wear_tolerance"), _is_positive),
-    "entry": _one_of("implicit", "interpolated"),
-    "bulk_state": _one_of(*BULK_STATES),
-    "coating": _is_text,
-    "coating_images": _is_positive,
-    "coating_fit_error": lambda value: _is_number(value) and 0 <= value < 1,
-    **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
+_LATER: dict[str, Any] = {  # that some files have
+    "lattice_cell_ratio": _POSITIVE,
+    "lattice_direction": (-math.pi, math.pi),
+    "lattice_periodic": (0, 1),
+    "lattice_cell_angle": (SMALLEST, _BELOW_PI),
+    **dict(zip(INTERFACE, (_POSITIVE, (1.0, LARGEST), _NOT_NEGATIVE), strict=True)),
+    **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance", "wear_tolerance", "coating_images"), _POSITIVE),
+    **{"entry": ("implicit", "interpolated"), "bulk_state": BULK_STATES},
+    "coating_fit_error": (0.0, math.nextafter(1.0, 0.0)),
+    **dict.fromkeys(("coating", "friction_law", "machine", "stopped"), str),
 }
+
+
+def _fits(name: str, value: Any, rule: Any) -> bool:
+    """Test whether an attribute is what a rule of the tables says."""
+    if rule is str:
+        return isinstance(value, str)
+    if isinstance(rule, int):
+        return np.shape(value) == (rule,) and bool(np.isfinite(value).all())
+    if isinstance(rule[0], str):
+        return isinstance(value, str) and value in rule
+    if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
+        return False
+    another_law = name == "friction_coefficient" and math.isnan(value)
+    return another_law or bool(rule[0] <= value <= rule[1])
 
 
 def fault_of_result(dataset: Dataset) -> str:
     """Return a fault of the dataset of a result file, whose fields may be unread; empty if there is none."""
-    attributes = {str(name): value for name, value in dataset.attrs.items()}
-    if fault := _fault_of_attributes(attributes):
-        return fault
-    for name, known in VARIABLES.items():
-        if name not in dataset.variables:
-            continue
-        found = dataset.variables[name]
-        text = known.dtype == "str"
-        if found.dtype.kind not in "OSU" if text else found.dtype != np.dtype(known.dtype):
-            return f"{name} holds values of another kind ({found.dtype})"
-    if "algorithm" in attributes:
-        frictional = attributes["algorithm"] != "frictionless"
-        missing = set(_WITH_FRICTION if frictional else _ALWAYS) - dataset.variables.keys()
-        if missing:
-            return f"it has no {min(missing, key=_WITH_FRICTION.index)}"
-    return _fault_of_coordinates(dataset) or _fault_of_histories(dataset) or _fault_of_fields(dataset)
+    return next(_faults(dataset), "")
 
 
 def fault_of_dimensions(columns: Mapping[str, netCDF4.Variable]) -> str:
@@ -159,119 +126,84 @@ def fault_of_dimensions(columns: Mapping[str, netCDF4.Variable]) -> str:
     return ""
 
 
-def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
+def _faults(dataset: Dataset) -> Iterator[str]:
+    """Yield faults of attributes, kinds, coordinates, numbers by step, the deck, and fields by step."""
+    attributes = {str(name): value for name, value in dataset.attrs.items()}
     needed = _ATTRIBUTES | (_PARAMETERS if _PARAMETERS.keys() & attributes.keys() else {})
     if "coating" in attributes:
-        needed = {name: fits for name, fits in needed.items() if name not in _HALF_SPACES}
-    for name, fits in (needed | {name: fits for name, fits in _LATER.items() if name in attributes}).items():
+        needed = {name: rule for name, rule in needed.items() if name not in _HALF_SPACES}
+    for name, rule in (needed | {name: rule for name, rule in _LATER.items() if name in attributes}).items():
         if name not in attributes:
-            return f"it has no attribute {name}"
-        if not fits(attributes[name]):
-            return f"its attribute {name} is not what it should be"
-    return ""
-
-
-def _fault_of_coordinates(dataset: Dataset) -> str:
-    """Return a fault of steps, rows and columns, which count one by one."""
-    if dataset["step"].values[0] != 1:
-        return "its steps do not begin with 1"
+            yield f"it has no attribute {name}"
+        elif not _fits(name, attributes[name], rule):
+            yield f"its attribute {name} is not what it should be"
+    for name in (name for name in VARIABLES if name in dataset.variables):
+        found, wanted = dataset.variables[name].dtype, VARIABLES[name].dtype
+        if found.kind not in "OSU" if wanted == "str" else found != np.dtype(wanted):
+            yield f"{name} holds values of another kind ({found})"
+    if "algorithm" in attributes:
+        required = _ALWAYS if attributes["algorithm"] == "frictionless" else _WITH_FRICTION
+        yield from (f"it has no {name}" for name in required if name not in dataset.variables)
+    numbers = dataset["step"].values
+    if numbers[0] != 1:
+        yield "its steps do not begin with 1"
     for name in ("step", "row", "col"):
         if (np.diff(dataset[name].values.astype(float)) != 1).any():
-            return f"its coordinate {name} does not count one by one"
+            yield f"its coordinate {name} does not count one by one"
     lattice = lattice_of(dataset)
     for name, place in (("x", lattice.x), ("y", lattice.y)):
         if not (abs(dataset[name].values - place) < _CLOSE * lattice.spacing).all():
-            return f"its coordinate {name} is not that of the lattice"
-    return ""
-
-
-def _fault_of_histories(dataset: Dataset) -> str:
-    """Return a fault of the numbers by step; empty if there is none."""
+            yield f"its coordinate {name} is not that of the lattice"
     known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
-    history = {name: dataset[name].values for name in known}
-    for name in known:
-        # without stick there is no center of it
-        always = VARIABLES[name].required and not name.startswith("stick_center")
-        if always and np.isnan(history[name]).any():
-            return _NO_STEP.format(name)
-    lattice = lattice_of(dataset)
-    window = lattice.size * lattice.cell_area
-    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]), window)
-
-
-def _fault_of_numbers(
-    history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str, window: float
-) -> str:
-    """Return a fault of values by step; a resumed run may have several tolerances."""
-    given = [parameters.get("tolerance", 1.0), parameters.get("cycle_tolerance", 0.0)]
-    tolerances = [*given, *map(float, chain(*re.findall(_CHANGED, story)))]
-    cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
-    for name, values in history.items():
-        low, high = _bounds(name, history, window)
-        if name in RESIDUALS.values():
-            high = max(tolerances) * _ROUNDED
-            if name == RESIDUALS["R_t"]:  # parts of a step are solved from one to the next
-                values = np.where(cut, np.minimum(values, high), values)
-        if (np.less(values, low) | np.greater(values, high)).any():
-            return _NO_STEP.format(name)
-    return ""
-
-
-def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, Any]:
-    """Return the smallest and the largest possible value by step."""
-    known = VARIABLES[name]
-    if known.dtype != "f8":
-        return max(NOT_KEPT, known.least), max(known.flags, default=LARGEST)
-    low: Any = known.least
-    high: Any = known.most
-    beside, power = known.scale
-    if low > -LARGEST and beside:
-        scale = np.abs(history.get(beside, 0.0)) * history.get("contact_radius", 0.0) ** power
-        low = np.where(np.greater(scale, 0.0), low - _NOISE * scale, -LARGEST)
-    if isinstance(high, str):
-        high = np.multiply({**history, "window": window}.get(high, LARGEST), 1 + _CLOSE)
-    return low, high
-
-
-def _fault_of_fields(dataset: Dataset) -> str:
-    """Return a fault of the deck, or of the fields, which are read step by step; empty if there is none."""
+    yield from _faults_of_numbers({name: dataset[name].values for name in known}, attributes, lattice)
     try:
-        tomllib.loads(str(dataset.attrs["deck"]))
+        tomllib.loads(attributes["deck"])
     except tomllib.TOMLDecodeError as error:
-        return f"its deck is no TOML: {error}"
-    lattice = lattice_of(dataset)
-    numbers, every = dataset["step"].values, int(dataset.attrs["output_every"])
+        yield f"its deck is no TOML: {error}"
     for place, number in enumerate(numbers):
         step = dataset.isel(step=place)
         fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
         history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
-        kept = number % every == 0 or number == numbers[-1]
-        fault = _fault_of_values(fields, history, lattice.cell_area, kept)
-        if fault := fault or (_fault_of_loads(fields, history, lattice) if kept else ""):
-            return f"{fault} in step {number}"
-    return ""
+        kept = number % int(attributes["output_every"]) == 0 or number == numbers[-1]
+        for fault in _faults_of_fields(fields, history, lattice, kept):
+            yield f"{fault} in step {number}"
 
 
-def _fault_of_loads(fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], lattice: Lattice) -> str:
-    """Return a load that is not the resultant of the tractions at the nodes; empty if there is none."""
-    p, q_x, q_y = (fields.get(name) for name in TRACTIONS)
-    parts = {} if p is None else {"normal_load": p}
-    if q_x is not None and q_y is not None:
-        parts |= {"tangential_load_x": q_x, "tangential_load_y": q_y}
-        parts["torque"] = np.array([lattice.x * q_y, -lattice.y * q_x])
-    for name, values in parts.items():
-        size = abs(values).sum() * lattice.cell_area
-        if name in history and abs(values.sum() * lattice.cell_area - history[name]) > _CLOSE * size:
-            return f"{name} is not the resultant of the tractions"
-    return ""
+def _faults_of_numbers(
+    history: Mapping[str, Any], attributes: Mapping[str, Any], lattice: Lattice
+) -> Iterator[str]:
+    """Yield quantities with values by step beyond their bounds; a resumed run may have several tolerances."""
+    given = [attributes.get("tolerance", 1.0), attributes.get("cycle_tolerance", 0.0)]
+    tolerances = [*given, *map(float, chain(*re.findall(_CHANGED, str(attributes.get("history", "")))))]
+    cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
+    largest = {**history, "window": lattice.size * lattice.cell_area}
+    for name, values in history.items():
+        known = VARIABLES[name]
+        low: Any = known.least
+        high: Any = largest.get(known.most, LARGEST) if isinstance(known.most, str) else known.most
+        beside, power = known.scale
+        if known.dtype != "f8":
+            low, high = max(NOT_KEPT, low), max(known.flags, default=LARGEST)
+        elif low > -LARGEST and beside:
+            scale = np.abs(history.get(beside, 0.0)) * history.get("contact_radius", 0.0) ** power
+            low = np.where(np.greater(scale, 0.0), low - _NOISE * scale, -LARGEST)
+        if name in RESIDUALS.values():
+            high = max(tolerances) * _ROUNDED
+            if name == RESIDUALS["R_t"]:  # parts of a step are solved from one to the next
+                values = np.where(cut, np.minimum(values, high), values)
+        wrong = np.less(values, low) | np.greater(values, np.multiply(high, 1 + _CLOSE))
+        # without stick there is no center of it
+        always = known.required and not name.startswith("stick_center")
+        if np.any(wrong | np.isnan(values) if always else wrong):
+            yield f"{name} holds numbers that no load step has"
 
 
-def _fault_of_values(
-    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], cell_area: float, kept: bool = True
-) -> str:
-    """Return a fault of nodal values, which have bounds and fit the history."""
-    zone, pressure = fields.get("zone"), fields.get("pressure")
-    contact = zone > 0 if zone is not None else pressure > 0 if pressure is not None else None
+def _faults_of_fields(
+    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], lattice: Lattice, kept: bool
+) -> Iterator[str]:
+    """Yield faults of the nodal values of a step, which have bounds and fit the history."""
+    zone, p = fields.get("zone"), fields.get("pressure")
+    contact = zone > 0 if zone is not None else p > 0 if p is not None else None
     for name, values in fields.items():
         known = VARIABLES[name]
         if not kept and known.is_field:
@@ -284,16 +216,28 @@ def _fault_of_values(
                 wrong &= contact is not None and contact
             wrong |= values < known.least
         if wrong.any():
-            return f"{name} holds numbers that no node has"
-    if pressure is not None and kept and "max_pressure" in history:
-        largest = history["max_pressure"]  # infinite at an end of a surface
-        if math.isfinite(largest) and not math.isclose(pressure.max(), largest, rel_tol=_CLOSE):
-            return "pressure does not fit to max_pressure"
-    if zone is not None and kept and "contact_area" in history:
-        cells = history["contact_area"] / cell_area
-        if abs(np.count_nonzero(zone > 0) - cells) > _CLOSE * (1 + cells):
-            return "zone does not fit to contact_area"
-    return ""
+            yield f"{name} holds numbers that no node has"
+    if not kept:
+        return
+    q_x, q_y = fields.get("traction_x"), fields.get("traction_y")
+    # quantity of the history, its value by the fields, what rounding errors are relative to, and its fault
+    own: list[tuple[str, float, float, str]] = []
+    if p is not None:
+        own.append(("max_pressure", p.max(), p.max(), "pressure does not fit to max_pressure"))
+    if zone is not None:
+        cells = lattice.cell_area * np.count_nonzero(zone > 0)
+        own.append(("contact_area", cells, cells + lattice.cell_area, "zone does not fit to contact_area"))
+    loads = {} if p is None else {"normal_load": p}
+    if q_x is not None and q_y is not None:
+        torque = np.array([lattice.x * q_y, -lattice.y * q_x])
+        loads |= {"tangential_load_x": q_x, "tangential_load_y": q_y, "torque": torque}
+    for name, values in loads.items():
+        load, size = (lattice.cell_area * float(each.sum()) for each in (values, abs(values)))
+        own.append((name, load, size, f"{name} is not the resultant of the tractions"))
+    for name, value, size, fault in own:
+        # the largest pressure is infinite at a sharp end
+        if name in history and math.inf > abs(value - history[name]) > _CLOSE * size:
+            yield fault
 
 
 NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
@@ -400,27 +344,26 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
         with LOCK:
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
-            empty = dict.fromkeys("xy", np.empty(0))  # written in bands
-            given = [
-                _text(file, name, values, layout)
-                if VARIABLES[name].dtype == "str"
-                else (_column(file, name, layout), values)
-                for name, values in (layout.axes() | empty | layout.histories() | layout.trials).items()
-            ]
-            columns = {name: _column(file, name, layout) for name in layout.fields}
+            given = layout.axes() | layout.histories() | layout.trials
+            for name in (name for name in given if VARIABLES[name].dtype == "str"):
+                # characters, not netCDF strings, on which HDF5 crashes if a file is open more than once
+                texts = np.array([text.encode() for text in given[name]])
+                given[name] = texts.view("S1").reshape(len(texts), -1)
+                file.createDimension(f"{name}_length", given[name].shape[1])
+            for name in (*COORDINATES, *layout.variables):
+                _column(file, name, layout)
             file.setncatts(layout.attributes(complete))
             # chunks are written once; the default is 64 MB a variable
             for column in file.variables.values():
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)
-            for column, values in given:
-                if column.name not in empty:
-                    column[...] = values
+            for name, values in given.items():
+                file[name][...] = values
             for first, band in _bands(layout.window, _CHUNK):
                 for name in "xy":
                     file[name][first : first + band.n_row] = getattr(band, name)
             write_mesh(file, layout.window)
-        layout.fill(columns, steps, LOCK)
+        layout.fill({name: file[name] for name in layout.fields}, steps, LOCK)
 
 
 @contextlib.contextmanager
@@ -442,7 +385,12 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:
     """Create the variable `name` with its attributes."""
     variable = VARIABLES[name]
-    options: dict[str, Any] = {}
+    attributes, options = layout.attributes_of(name), dict[str, Any]()
+    if variable.dtype == "str":
+        attributes["_Encoding"] = "utf-8"
+        column = add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
+        column.set_auto_chartostring(False)
+        return column
     if variable.dims[-2:] == ("row", "col"):
         block = {"step": layout.block, "row": _CHUNK, "col": _CHUNK}
         sizes = [min(block[dim], layout.sizes[dim]) for dim in variable.dims]
@@ -450,26 +398,9 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
         options["fletcher32"] = True  # damage is an error
         if variable.dtype == "f8":
             options["fill_value"] = MISSING[name]
-    attributes = layout.attributes_of(name)
     if options and name not in ("x", "y"):
         attributes["coordinates"] = "x y"
     return add_column(file, name, variable.dtype, variable.dims, attributes, **options)
-
-
-def _text(
-    file: netCDF4.Dataset, name: str, texts: NDArray[Any], layout: Layout
-) -> tuple[netCDF4.Variable, NDArray[Any]]:
-    """Create the text variable `name`, and return it with its characters.
-
-    Characters, not netCDF strings, on which HDF5 crashes if a file is open more than once.
-    """
-    variable = VARIABLES[name]
-    characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
-    file.createDimension(f"{name}_length", characters.shape[1])
-    attributes = {**layout.attributes_of(name), "_Encoding": "utf-8"}
-    column = add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
-    column.set_auto_chartostring(False)
-    return column, characters
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -504,11 +435,6 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
                 f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
                 "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
             )
-
-
-def is_mesh(path: Path) -> bool:
-    """Test whether a file has the fields of a result on a mesh, as `hexcontact.result.export` writes it."""
-    return {"content", "hexcontact_version"} <= attributes(path).keys()
 
 
 def stress_files(deck: str, output: Path) -> dict[str, Path]:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..analytic.hertz_gap import friction_of
-from ..arrays import Array, DataArray, DataFrame, Dataset, has_entries, integer, number
+from ..arrays import Array, DataArray, DataFrame, Dataset, has_entries
+from ..core.calls import integer, number
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stress, cycle_of
 from ..deck.faults import NOWHERE
@@ -425,7 +426,7 @@ class Result:
     @property
     def quantities(self) -> Quantities:
         """Names, units and meanings of all quantities; printed, a table."""
-        return Quantities([str(name) for name in self.dataset.variables])
+        return Quantities({name: v for name, v in VARIABLES.items() if name in self.dataset.variables})
 
     def to_dataframe(self, *names: str, step: int | None = None) -> DataFrame:
         """Return quantities (SI) as a table; ``attrs["units"]`` of it has their units.

@@ -90,15 +90,15 @@ class Store:
     @property
     def metadata(self) -> Metadata:
         """Metadata of the run; set ones are written with the next step."""
-        return self._header.whole(len(self.heads))
+        return self._header.whole(step.control for step in self.heads)
 
     @metadata.setter
     def metadata(self, metadata: Metadata) -> None:
-        self.describe(metadata)
+        self.describe(records.Header(metadata))
 
-    def describe(self, metadata: Metadata, loads: list[str] | None = None) -> None:
-        """Set the metadata, of a session with its loads apart, which `append` may add to."""
-        self._header, self._described = records.Header(metadata, loads, len(self.heads)), False
+    def describe(self, header: records.Header) -> None:
+        """Set the metadata; of a session with its loads apart."""
+        self._header, self._described = header, False
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
@@ -186,7 +186,7 @@ class Store:
                 f"without it and those after it, hexcontact resume continues after step {len(self.heads)}"
             )
             raise
-        self._header, self._described = journal.grown, True
+        self._header, self._described = journal.header, True
         with reading(self.folder, "a journal"):
             Layout(self.metadata, self.heads)  # fails if the steps do not belong together
         self._refuse_newer(not ours, journal.records[0])
@@ -319,8 +319,8 @@ class Store:
         with self._replacing(self.path) as path:
             write(path, layout, steps, complete)
 
-    def append(self, step: Step, loads: Sequence[Any] = ()) -> None:
-        """Record a finished step on the disk, with the `loads` of a session as of `Header.follow`."""
+    def append(self, step: Step) -> None:
+        """Record a finished step on the disk."""
         with self._mutex:
             self._require_open()
             if step.number != len(self.heads) + 1:
@@ -331,14 +331,12 @@ class Store:
                     if not self._described:
                         records.write_header(self.folder, self._header)
                     with self._replacing(record) as path:
-                        records.write_record(path, self._header.metadata.run, step, loads)
+                        records.write_record(path, self._header.metadata.run, step)
             except BaseException:
                 if not self.heads:
                     (self.folder / records.HEADER).unlink(missing_ok=True)
                 raise
             self._described = True
-            if loads:
-                self._header.follow(loads)
             if step.companion and "until" in step.control and step.number > 2:
                 self._lighten(self.folder / f"{step.number - 2:06d}{records.SUFFIX}")
             self.heads.append(step.head)
@@ -361,7 +359,7 @@ class Store:
         with self.writing("the journal"):
             about, before = records.read_record(record)
             with self._replacing(record) as path:
-                records.write_record(path, about["run"], before, about["loads"])
+                records.write_record(path, about["run"], before)
 
     def finish(
         self,

@@ -39,9 +39,7 @@ class GivenPath:
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
             state = self.window.carried(state, smaller)
         if not reached.converged:
-            from . import nonconvergence
-
-            raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
+            raise self.window.failure(reached, target, values)
         step = self.window.step(target, reached, state, started)
         del state  # its memory goes before the step is written
         yield step, reached
@@ -133,12 +131,16 @@ class AdaptivePath(GivenPath):
             middle = 0.5 * (self._steps.start + self._steps.end)
             parts = [self._numbered(target.until(part)) for part in (middle, self._steps.end)]
             driven = [(part, part.values(begun)) for part in parts]
-            self._steps, reached, whole = self.window.attempt(self._steps, state, self._whole, driven)
+            self._steps, reached, whole = self.window.contact.attempt(
+                self._steps,
+                [motion.control for motion in target.targets],
+                [[*values, *self.case.bulk(part.bulk)[1]] for part, values in driven],
+                self.window.contact.virgin() if state is None else state,
+                self._whole,
+                **self.window.how,
+            )
             if self._steps.verdict == core.FAILED:
-                from . import nonconvergence
-
-                failed = driven[self._steps.reached != middle]
-                raise nonconvergence.error(self.case, self.window.lattice, reached, *failed)
+                raise self.window.failure(reached, *driven[self._steps.reached != middle])
             if self._steps.verdict == core.OUTGROWN:
                 smaller = self.window.lattice
                 self.window = self.window.grown(reached, self._numbered(target))

@@ -69,7 +69,11 @@ class Log(Listener):
         shown = worth_showing([history])
         values |= {label_of(name).replace(" ", "_"): float(history[name]) for name in shown}
         values["p_max"] = float(history["max_pressure"])
-        values |= _zones(step)
+        zone = step.fields["zone"]
+        values["contact"] = contact = int((zone > 0).sum())
+        if "stick_area" in history:
+            values["stick"] = stick = int((zone == 1).sum())
+            values["slip"] = contact - stick
         values |= {sign: _rounded(history[name]) for sign, name in RESIDUALS.items() if name in history}
         values["iterations"] = history["sweeps"]
         values["halvings"] = history.get("cuts", 0)
@@ -91,15 +95,6 @@ class Log(Listener):
 
 def _rounded(value: float | int | str) -> float:
     return float(f"{float(value):.3g}")
-
-
-def _zones(step: Step) -> dict[str, int]:
-    """Count the nodes in contact, and with friction those that stick and those that slip."""
-    zone = step.fields["zone"]
-    contact, stick = int((zone > 0).sum()), int((zone == 1).sum())
-    if "stick_area" not in step.history:
-        return {"contact": contact}
-    return {"contact": contact, "stick": stick, "slip": contact - stick}
 
 
 # --- destinations -----------------------------------------------------------------------------------------

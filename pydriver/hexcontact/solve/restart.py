@@ -90,7 +90,7 @@ def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
     """Write the missing stresses of a finished run, which was killed before it wrote them."""
     output = output_of(Path(path))
     if output.is_file():
-        list(write_stresses(output, case))
+        write_stresses(output, case)
 
 
 def was_begun(path: Path, case: Problem) -> bool:

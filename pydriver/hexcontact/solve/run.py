@@ -114,8 +114,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     """
     solve_into(case, store, listener, before)
     if store.finished and (case.deck.stress or case.deck.fatigue):
-        for path in write_stresses(store.path, case, listener):
-            listener.said("written", file=path)
+        write_stresses(store.path, case, listener)
 
 
 def solve_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:
@@ -155,16 +154,15 @@ def _record_steps(case: Problem, store: Store, listener: Listener, before: Seque
             raise
 
 
-def write_stresses(
-    output: Path, case: Problem | None = None, listener: Listener | None = None
-) -> Iterator[Path]:
-    """Write the missing tables [[stress]] and [[fatigue]] of the deck of a result, and yield the files.
+def write_stresses(output: Path, case: Problem | None = None, listener: Listener | None = None) -> list[Path]:
+    """Write the missing tables [[stress]] and [[fatigue]] of the deck of a result; return the files.
 
     The case, by default that of the deck, is solved on coarser lattices where a table asks for errors.
     """
     missing = missing_stresses(output)
     if not missing:
-        return
+        return []
+    listener = listener or Log()
     from ..interior.files import tables_of, write_netcdf
     from ..interior.stress import with_errors
     from ..result.export import kept_steps
@@ -175,14 +173,15 @@ def write_stresses(
         refined = "trial_level" in result.dataset
         wanted = [name for name, t in tables_of(result.deck).items() if refined or t.estimate_error]
         asked = [name for name in missing if name in wanted]
-        others = list(_on_coarser(result, case, asked, listener or Log())) if asked else []
+        others = list(_on_coarser(result, case, asked, listener)) if asked else []
         for name, found in at_hand(result, kept_steps(result), [*missing], anew=True):
             if name in wanted:
                 with_errors(found, result.lattice.spacing, [(h, tables[name]) for h, tables in others])
             require_free([missing[name]], overwrite=True)
-            yield write_netcdf(found, missing[name])
+            listener.said("written", file=write_netcdf(found, missing[name]))
     finally:
         result.close()
+    return [*missing.values()]
 
 
 def _on_coarser(

@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import functools
 import threading
+import tomllib
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +23,8 @@ from ..errors import DeckError
 from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
 from ..problem.problem import Problem
-from ..result.layout import Metadata, assemble
+from ..result.journal import Header
+from ..result.layout import assemble
 from ..result.step import Step
 from ..result.store import Store, open_result
 from . import steps as solving
@@ -98,10 +100,9 @@ class Session:
         self._steps: list[Step] = []  # with an output only the last has its fields
         self._solving: Iterator[Step] | None = None  # yields the next load steps; None after a failure
         self._queue: deque[LoadStep] = deque()  # of `advance`
-        self._by_hand = False
+        self._by_hand: Header | None = None  # once `advance` has applied loads
         self._log = Log()
         self._log.begun(case.title, case.planned_steps)
-        self._loads: list[dict[str, Any]] = []  # entries of [[load]] that `advance` applied
         self._resting = _AT_REST  # those that were zero in all steps
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
@@ -141,14 +142,15 @@ class Session:
 
         _ = self.step
         if self._store is None:
-            about = self._about_loads(self._loads) if self._by_hand else self._about
+            header = self._by_hand or Header(self._about)
+            about = header.whole(step.control for step in self._steps)
             return Result(functools.partial(assemble, about, self.steps, self._whole))
         return open_result(self._store.path)
 
     @property
     def _whole(self) -> bool:
         """Whether all load steps are solved."""
-        return bool(self._steps) and (self._by_hand or self._steps[-1].load_fraction >= 1.0)
+        return bool(self._steps) and (self._by_hand is not None or self._steps[-1].load_fraction >= 1.0)
 
     # --- steps ----------------------------------------------------------------------------------------------
 
@@ -222,15 +224,14 @@ class Session:
         if self.case.rolls:
             raise DeckError("rolling: expected all loads of rolling bodies in [[load]], and none by hand")
         entry = with_radians(plain(given | {"label": label or None}))
-        before = self._loads
-        if not self._by_hand:  # iteration applied the loads of the case, or one for each solved step
-            as_given = self._whole and not self.case.adaptive
-            before = list(self.case.deck_tables["load"]) if as_given else self._resolved(self._steps)
-        history = self._unrolled(before, entry)
-        if not self._by_hand:
-            self._by_hand, self._loads, self._solving = True, before, None
+        # iteration applied the loads of the case, or one for each solved step
+        as_given = self._whole and not self.case.adaptive
+        header = self._by_hand or self._described(self.case.deck_tables["load"] if as_given else None)
+        history = self._unrolled(header, entry)
+        if self._by_hand is None:
+            self._by_hand, self._solving = header, None
             if self._store is not None:
-                self._store.describe(self._about_loads([]), list(map(load_as_toml, before)))
+                self._store.describe(header)
             self._log.begun(self.case.title, 0)
         self._driven.load_steps = history.steps
         segment = int(self._steps[-1].history["segment"]) if self._steps else 0
@@ -240,14 +241,11 @@ class Session:
             if self._solving is None:
                 queued = iter(self._queue.popleft, None)
                 self._solving = solving.steps(self._driven, False, self._steps, queued, self._log)
-            last = len(self._steps) + 1 == done + steps
             try:
-                self._next_step(done, entry if last else None)
+                self._next_step(entry, len(self._steps) + 1 - done, steps)
             except BaseException:
                 self._queue.clear()
-                self._loads += self._resolved(self._steps[done:])
                 raise
-        self._loads.append(entry)
         self._history = history
         return self.step
 
@@ -263,21 +261,26 @@ class Session:
         self._solving, self._resting = None, _AT_REST
         for step in self._steps:
             self._resting = self._resting_in(step)
-        if self._by_hand:
-            self._loads, self._history = self._resolved(self._steps), None
+        if self._by_hand is not None:
+            self._history = None
+            if len(self._steps) < self._by_hand.steps:
+                self._by_hand = self._described()
 
-    def _next_step(self, done: int = 0, load: dict[str, Any] | None = None) -> Step:
+    def _next_step(self, entry: dict[str, Any] | None = None, part: int = 1, parts: int = 1) -> Step:
         """Solve the next load step and record it; after a failure the last finished step is the start again.
 
-        `advance` was called after `done` steps; `load` is its entry of [[load]] after its last step, else
-        there is one by step.
+        The step is a part of those of an `entry` of [[load]] of `advance`.
         """
         assert self._solving is not None
         try:
             step = next(self._solving)
             resting = self._resting_in(step)
+            if entry is not None:
+                load = entry if part == parts else self._applied(step, resting) | {"steps": part}
+                control = {"segment": step.history["segment"], "load": load_as_toml(load)}
+                step = dataclasses.replace(step, control={**step.control, **control})
             if self._store is not None:
-                self._store.append(step, self._added(step, done, load) if self._by_hand else ())
+                self._store.append(step)
                 self._steps[-1:] = [before.head for before in self._steps[-1:]]
             self._resting = resting
         except BaseException:
@@ -297,46 +300,32 @@ class Session:
         """Return the loads and motions that were zero in all steps, also in this one."""
         return frozenset(name for name in self._resting if step.prescribed.get(name) == 0.0)
 
-    def _resolved(self, steps: Sequence[Step]) -> list[dict[str, Any]]:
-        """Return an entry of [[load]] for each step."""
-        resting = self._resting
-        for step in steps:
-            resting = resting & self._resting_in(step)
-        return [
-            with_radians(
-                {name: value for name, value in step.prescribed.items() if name not in resting}
-                | ({"label": step.history["label"]} if step.history.get("label") else {})
-            )
-            for step in steps
-        ]
+    def _applied(self, step: Step, resting: frozenset[str]) -> dict[str, Any]:
+        """Return the entry of [[load]] that leads to a step."""
+        label = {"label": step.history["label"]} if step.history.get("label") else {}
+        loads = {name: value for name, value in step.prescribed.items() if name not in resting}
+        entry: dict[str, Any] = with_radians(loads | label)
+        return entry
 
-    def _added(self, step: Step, done: int, load: dict[str, Any] | None) -> tuple[int | str, ...]:
-        """Return how many loads of the deck remain in the record of a step, and those that it adds."""
-        kept = len(self._loads)
-        if load is not None:
-            loads = [load]
-        elif self._resting_in(step) == self._resting:
-            kept, loads = kept + len(self._steps) - done, self._resolved([step])
-        else:  # entries of earlier steps name the loads that are no longer zero
-            loads = self._resolved([*self._steps[done:], step])
-        return kept, *map(load_as_toml, loads)
-
-    def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> History:
+    def _unrolled(self, header: Header, entry: dict[str, Any]) -> History:
         """Return the history with a new entry; DeckError for a wrong one."""
         new = Load.parse(entry, NOWHERE)
         history, self._history = self._history, None  # until all steps of the entry are solved
         if history is None:
             mu = self.case.friction_coefficient if self.case.frictional else None
             history = History(mu, self.case.deck.bulk, self.case.period)
-            for load in before:
+            deck = header.whole(step.control for step in self._steps).deck
+            for load in tomllib.loads(deck).get("load", ()):
                 history.append(Load.model_validate(load))
         history.append(new)
         if problems := history.problems:
             raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], NOWHERE)
         return history
 
-    def _about_loads(self, loads: Sequence[dict[str, Any]]) -> Metadata:
-        """Return the metadata of the result with a deck of these loads, as many as the finished steps."""
+    def _described(self, loads: Sequence[dict[str, Any]] | None = None) -> Header:
+        """Return the metadata of the finished steps with a deck of some loads, by default one for each."""
+        if loads is None:
+            loads = [self._applied(step, self._resting) for step in self._steps]
         tables = self.case.deck_tables
         lattice = self._steps[-1].lattice if self._steps else self.case.lattice
         # the same nodes, whatever the largest load is
@@ -353,8 +342,8 @@ class Session:
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
         # on this lattice only
         others = {key: table for key, table in tables.items() if key not in ("accuracy", "load")}
-        deck = "".join([as_toml({**others, "grid": grid}), *map(load_as_toml, loads)])
-        return dataclasses.replace(self._about, deck=deck, planned_steps=len(self._steps))
+        about = dataclasses.replace(self._about, deck=as_toml({**others, "grid": grid}))
+        return Header(about, list(map(load_as_toml, loads)), len(self._steps))
 
     # --- end ------------------------------------------------------------------------------------------------
 

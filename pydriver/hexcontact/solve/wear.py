@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core import flat
 from ..core import steps as core
 from ..core.friction import CONTROLS, ContactState
 from ..errors import DeckError, PathWarning
@@ -64,7 +65,7 @@ class WearPath(GivenPath):
         cycles = self._begun(state)
         while done < self._wear.cycles:
             now = self._solved(cycles)
-            before, state = state, cycles.solution(self.window.contact)
+            before, state = state, self._reached(cycles)
             yield self._recorded(cycles, now, state, before, started)
             started, done = time.perf_counter(), now.cycles
 
@@ -94,14 +95,15 @@ class WearPath(GivenPath):
                 if name.startswith(_END):
                     place = int(name.removeprefix(_END))
                     solved, motions = (last.control[f"end_{kind}"][place] for kind in ("cycles", "numbers"))
-                    cycles.restore_end(place + 1, solved, np.array(motions), np.array(tractions))
+                    end = np.array(motions), np.array(tractions).reshape(2, 3, -1)
+                    flat.restore_wear_end(cycles, place + 1, solved, *end)
         return cycles
 
     def _solved(self, cycles: core.CyclesOfWear) -> core.WearProgress:
         """Solve a cycle load step by load step, on a window that grows with the contact."""
         while True:
             try:
-                now = cycles.advance(self.window.contact)
+                now = self.window.contact.called(flat.advance_wear, cycles)
             except DeckError as error:
                 raise DeckError(f'wear.cycle = "{self._wear.cycle}": {error}') from None
             if now.verdict == core.PENDING:
@@ -109,20 +111,22 @@ class WearPath(GivenPath):
             if now.verdict not in (core.FAILED, core.OUTGROWN):
                 break
             target = dataclasses.replace(self._targets[now.place - 1], index=self._number)
-            reached = cycles.solution(self.window.contact)
+            reached = self._reached(cycles)
             if now.verdict == core.FAILED:
-                from . import nonconvergence
-
                 values = now.driven_z, now.driven_x, now.driven_y, now.driven_twist
-                raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
+                raise self.window.failure(reached, target, values)
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
-            cycles.carry(self.window.contact, smaller)
+            flat.carry_wear(self.window.contact, cycles, smaller.first, smaller.extent)
         found = {"unworn_cycles": now.unworn, "unworn_cycle_change": now.left}
         if now.cycles == 0.0 and now.left > self._wear.tolerance:
             words = unclosed_cycle(found, self._wear.tolerance)
             self.window.listener.said("unclosed", level=logging.WARNING, warning=words)
             warnings.warn(words, PathWarning, stacklevel=2)
         return now
+
+    def _reached(self, cycles: core.CyclesOfWear) -> ContactState:
+        """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
+        return self.window.contact.solution(flat.state_of_wear(cycles))
 
     def _recorded(
         self,
@@ -133,7 +137,7 @@ class WearPath(GivenPath):
         started: float,
     ) -> Step:
         """Return a cycle as a load step, with the restart data of the next one."""
-        depth, change, energy, path, ahead = cycles.fields(self.window.lattice)
+        depth, change, energy, path, ahead = flat.fields_of_wear(cycles, *self.window.lattice.extent)
         self.window.worn = depth
         last = self._targets[0]
         target = dataclasses.replace(last, index=self._number, segment=last.segment + 1, label=LABEL)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -15,8 +15,7 @@ from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, p
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
 from ..core.measures import is_unbounded, measures
-from ..core.steps import AdaptiveSteps
-from ..errors import DeckError
+from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
@@ -91,6 +90,14 @@ class Window:
         larger = self.lattice.grown(solution.zone > 0)
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return type(self)(self.case, larger, self.steps_held, self.listener)
+
+    def failure(
+        self, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+    ) -> ConvergenceError:
+        """Return the error of a step that did not converge."""
+        from . import nonconvergence
+
+        return nonconvergence.error(self.case, self.lattice, solution, target, values)
 
     def step(self, target: LoadStep, solution: NormalSolution, before: Any, started: float) -> Step:
         """Return a finished step from the states at its end and beginning; its time counts from `started`."""
@@ -221,28 +228,11 @@ class FrictionWindow(Window):
             bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
             rolling=None if target.roll is None else Rolling(target.roll.direction, target.roll.steady),
-            **self._how,
-        )
-
-    def attempt(
-        self,
-        steps: AdaptiveSteps,
-        before: ContactState | None,
-        whole: ContactState | None,
-        parts: Sequence[tuple[LoadStep, tuple[float, ...]]],
-    ) -> tuple[AdaptiveSteps, ContactState | None, ContactState | None]:
-        """Attempt an adaptive load step, whose parts are the load steps to its middle and to its end."""
-        return self.contact.attempt(
-            steps,
-            [motion.control for motion in parts[-1][0].targets],
-            [[*values, *self.case.bulk(part.bulk)[1]] for part, values in parts],
-            self.contact.virgin() if before is None else before,
-            whole,
-            **self._how,
+            **self.how,
         )
 
     @property
-    def _how(self) -> dict[str, Any]:
+    def how(self) -> dict[str, Any]:
         """Entry of nodes and tolerance of the solver."""
         solver = self.case.solver
         entry = "interpolated" if solver.entry == "interpolated" else "implicit"

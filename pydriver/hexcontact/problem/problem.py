@@ -241,9 +241,9 @@ class Problem:
     def initial_gap(self, lattice: Lattice, step: LoadStep | None = None) -> tuple[Array, Mask]:
         """Return the gap before loading over the nodes of a window, and where the bodies can touch.
 
-        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch. It is that
-        of a load step, if surfaces move with their bodies. DeckError if a gap given in Python does not fit the
-        window or is NaN somewhere.
+        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch; it is
+        that of a load step if surfaces move. DeckError if a gap given in Python does not fit the window or is
+        NaN somewhere.
         """
         gap = self._gap_in(step).over(lattice)
         return gap, np.isfinite(gap)

@@ -1,6 +1,6 @@
 !> A load step of rolling bodies: one spacing, or the steady state.
 !>
-!> Equations: docs/theory/rolling.md, (K2) to (K4), (K6), (K8).
+!> Equations: docs/theory/rolling.md, (K2) to (K4), (K6), (K7).
 module hc_rolled_step
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -102,7 +102,7 @@ contains
     else
       stored = shear_energy(problem, state) - shear_energy(problem, before)
     end if
-    ! (K8); with a spin the power at the nodes differs from that half a spacing ahead
+    ! (K7); with a spin the power at the nodes differs from that half a spacing ahead
     associate (taken => dot_product(state%load(along_x:about_z), state%motion(along_x:about_z)), &
                by => norm2(rolling%spacing(problem%lattice)))
       state%creep_power_error = abs(taken - spent - stored)/by + abs(state%creep_power - taken/by)

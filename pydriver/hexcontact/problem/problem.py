@@ -249,7 +249,7 @@ class Problem:
         return gap, np.isfinite(gap)
 
     def _gap_in(self, step: LoadStep | None) -> PlaneField:
-        """Return the gap of a load step: docs/theory/rolling.md, (K7)."""
+        """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:
             return self._gap
         return PlaneField(self.surfaces.moved(-np.array(step.roll.way) @ self.lattice.basis), GAP)

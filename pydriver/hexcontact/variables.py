@@ -200,6 +200,9 @@ VARIABLES: dict[str, Variable] = {
         "J/m", "creep forces times creepages, and torque times spin, with the sign of a loss, by distance",
         title="Frictional power", scale=("normal_load", 0), summary=9, core="rolling",
     ),
+    "creep_power_error": _work(
+        "J/m", "power that the lattice adds to creep_power, of similar bodies", core="rolling", **_FROM_0
+    ),
     "slip_power": _work(
         "J/m", "energy that friction takes by rolled distance",
         title="Frictional power", summary=10, core="rolling",

@@ -283,6 +283,8 @@ contains
       call check(error, state%creep_power, 0.3_wp*state%load(2), 1.0e-12_wp, '-Q.xi')
       if (allocated(error)) return
       rest(k) = 1.0_wp - state%slip_power/state%creep_power
+      call check(error, state%creep_power_error, state%creep_power - state%slip_power, 1.0e-6_wp, 'error bar')
+      if (allocated(error)) return
       associate (lattice => contact%problem%lattice, behind => state%dissipation_density(2, :))
         call check(error, sum(behind)*lattice%cell_area()/lattice%spacing(), state%slip_power, 1.0e-12_wp, 'behind the contact')
       end associate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,12 @@ import numpy as np
 import pytest
 
 from hexcontact import Case, DeckError, open_result, plotting, resume
+from hexcontact.cli.printed import Summary
 from hexcontact.core.contact import ElasticPair, FlexibilityOperator
 from hexcontact.core.friction import FrictionalContact, Rolling
 from hexcontact.core.lattice import Lattice
+from hexcontact.problem import plausibility
+from hexcontact.result.history_words import remarks, step_rows
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 F, D = "force", "displacement"
@@ -239,12 +243,15 @@ def test_coefficients_of_the_linear_theory(ratio: float) -> None:
 
 
 def strip(
-    spacings: int, length: float, friction: float, beta: float = 0.0
+    spacings: int, length: float, friction: float, beta: float = 0.0, behind: float = 1.0
 ) -> tuple[FrictionalContact, Lattice, float]:
-    """Return a roller with p0 = a = E* = 1, nodes at the edges, cells 1:32; and its normal load."""
+    """Return a roller with p0 = a = E* = 1, cells 1:32, and its normal load.
+
+    The first node in contact is `behind` spacings behind the front; 1: there are nodes at both edges.
+    """
     ratio, h = 32, 1.0 / spacings
     rows, cols = round(length / 2 / (h * ratio)), round(1.15 * spacings)
-    origin = (h / 2 if beta else 0.0, 0.0)
+    origin = (h / 2 if beta else (1.0 - behind) * h, 0.0)
     lattice = Lattice(h, -rows - 2, -cols, 2 * rows + 5, 2 * cols + 1, origin, ratio, math.pi / 2)
     inside = np.abs(lattice.y) <= length / 2
     pressed = np.where(inside, np.sqrt(np.maximum(1.0 - lattice.x**2, 0.0)), 0.0)
@@ -274,6 +281,13 @@ def test_middle_of_a_roller_is_as_carter_has_it(creepage: float) -> None:
     state = contact.advance(contact.virgin(), [F, D, D, D], [load, creepage, 0, 0], rolling=STEADY)
     assert state.converged
     assert in_the_middle(lattice, state) == pytest.approx(1.0 - (1.0 - abs(creepage) / 2) ** 2, rel=3e-3)
+
+
+@pytest.mark.parametrize(("behind", "expected"), [(1.0, -0.0015), (0.5, 0.0073)])
+def test_error_by_the_place_of_the_front_between_nodes(behind: float, expected: float) -> None:
+    contact, lattice, load = strip(25, 40.0, 1.0, behind=behind)
+    state = contact.advance(contact.virgin(), [F, D, D, D], [load, -0.6, 0, 0], rolling=STEADY)
+    assert in_the_middle(lattice, state) / 0.51 - 1.0 == pytest.approx(expected, abs=3e-4)
 
 
 @pytest.mark.parametrize(("friction", "reference", "within"), [(0.002, 1.8202, 5e-3), (0.2, 1.2860, 1e-2)])
@@ -486,3 +500,64 @@ def test_surfaces_that_cannot_move_are_refused(loads: list[Any], shape: dict[str
     deck["body"]["1"]["surface"] = [deck["body"]["1"]["surface"], shape]
     with pytest.raises(DeckError, match=words):
         Case.from_dict(deck)
+
+
+# --- power and wear -----------------------------------------------------------------------------------------
+
+
+def test_power_of_creep_forces_has_the_dissipation_of_the_lattice_as_error_bar(capsys: Any) -> None:
+    loads = {"tangential_load_x": 15.0}, {"rolling": 3e-4, "tangential_load_x": 15.0}, {"rolling": "steady"}
+    result = Case.from_dict(ball(*loads)).run()
+    rolled = result.history[2:]
+    power, slip, error = (rolled[name] for name in ("creep_power", "slip_power", "creep_power_error"))
+    # on the way to the steady state elastic energy is stored, too: the bar is less than the difference
+    assert (error > 0.0).all()
+    assert error.iloc[1] < 0.5 * (power - slip).iloc[1]
+    assert error.iloc[-1] == pytest.approx(power.iloc[-1] - slip.iloc[-1], rel=1e-6)
+    fine = Case.from_dict(ball(loads[2] | loads[0], grid={"nodes_in_radius": 24})).run().history.iloc[-1]
+    assert abs(power.iloc[-1] - fine["creep_power"]) < error.iloc[-1]
+    assert fine["creep_power_error"] < 0.5 * error.iloc[-1]
+    spun = last(ball({"rolling": "steady", "creepage_y": 1e-3, "spin": 10.0}))
+    assert abs(spun["creep_power"] - spun["slip_power"]) <= spun["creep_power_error"] * (1 + 1e-6)
+    Summary.of_result(result).print()
+    shown = capsys.readouterr().out
+    assert "frictional power" in shown
+    assert "steady" in shown
+    assert re.search(r"creep power +\S+ mJ/m ± \d+", shown)
+    assert "uncertain" not in shown
+
+
+def test_steady_rolling_has_no_note_on_the_dissipated_energy() -> None:
+    deck = ball({"rolling": "steady", "creepage_x": -0.001})
+    deck["body"]["2"] = {"young_modulus": 70e9, "poisson_ratio": 0.33}
+    result = Case.from_dict(deck).run()
+    assert "creep_power_error" not in result
+    rows = dict(step_rows(result.history.iloc[-1].to_dict()))
+    assert "size of load steps" not in rows
+    said = remarks(result.history.to_dict("records"), result.dataset.attrs)
+    assert "dissipated energy" not in " ".join(said)
+    assert not any("dissipated" in sentence for sentence in plausibility.warnings(Case.from_dict(deck)))
+
+
+def test_wear_of_a_pass_holds_the_volume_by_distance() -> None:
+    loads = {"rolling": 1.2e-3, "tangential_load_x": 15.0, "creepage_y": 2e-4}, {"rolling": "steady"}
+    result = Case.from_dict(ball(*loads)).run()
+    across = result.lattice.cell_area / result.lattice.spacing
+    for steps in ([-2], [-1]):
+        worn = result.wear(1e-13, steps=steps)
+        # behind the contact a row has the depth of one pass
+        track = float(worn["worn_depth"][:, 1].sum()) * across
+        assert track == pytest.approx(float(worn["wear_by_distance"]), rel=1e-3), steps
+        assert 0.0 < float(worn["wear_by_distance_error"]) < 0.5 * track
+        assert float(worn["worn_depth"].max()) == pytest.approx(
+            float(worn["worn_depth"][:, 1].max()), rel=1e-3
+        )
+    # depth is k p |ds|, gathered along a row
+    step = result.step(-1)
+    slipped = np.where(step["zone"] == 2, np.hypot(step["slip_increment_x"], step["slip_increment_y"]), 0.0)
+    depth = 1e-13 * (step["pressure"].values * slipped)
+    np.testing.assert_allclose(
+        worn["worn_depth"][:, 1], depth.sum(axis=1), atol=1e-6 * depth.sum(axis=1).max()
+    )
+    with pytest.raises(DeckError, match="expected a load step in which the bodies roll"):
+        result.wear(1e-13, steps=[1])

@@ -79,6 +79,7 @@ def test_columns_of_the_table() -> None:
         *("traction_x", "traction_y", "relative_displacement_x", "relative_displacement_y"),
         *("slip_increment_x", "slip_increment_y", "accumulated_slip", "dissipation_density"),
         *("worn_depth", "worn_depth_step_change", "cycle_dissipation_density", "cycle_slip_amplitude"),
+        "moved_gap",
     }
     assert SUMMARY[:2] == ("max_pressure", "max_traction")
     assert {"sweeps", "seconds", "label", *RESIDUALS.values()}.isdisjoint(ESTIMATED)

@@ -163,6 +163,7 @@ class ContactState(NormalSolution):
     creepage_y: float = 0.0
     spin: float = 0.0
     creep_power: float = 0.0
+    creep_power_error: float = 0.0
     slip_power: float = 0.0
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__

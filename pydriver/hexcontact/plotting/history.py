@@ -21,7 +21,7 @@ from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
 from ..text import quantity, scaled, worded
-from ..variables import CREEPAGES, PANELS, SUMMARY, VARIABLES, label_of, names_where, spelled
+from ..variables import CREEPAGES, PANELS, ROLLED, SUMMARY, VARIABLES, label_of, names_where, spelled
 from . import style
 from .registry import SEVERAL_RUNS, figure
 
@@ -30,6 +30,7 @@ _UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
 _JUMP = 1e-3  # of another creepage over the range of a curve, where it ends
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
+_BOUNDS["creep_power"] = "creep_power_error"
 
 
 def _known(dataset: Dataset) -> list[str]:
@@ -437,14 +438,23 @@ _LEGEND = 8  # curves, more of which get a scale of colors
 
 
 def _varying(study: Dataset) -> list[str]:
-    """Return the quantities of a summary that differ between the cases."""
+    """Return the quantities of a summary, or of rolling, that differ between cases and are no parameter."""
+    power = "creep_power" if "creep_power_error" in study else "slip_power"
+    creep = (*(load for load, _ in ROLLED.values()), *CREEPAGES, power)
     found = []
-    for name in ("approach", *SUMMARY):
+    for name in creep if CREEPAGES[0] in study else ("approach", *SUMMARY):
         values = study[name].values if name in study else np.array([])
         finite = values[np.isfinite(values)]
-        if finite.size and np.ptp(finite) > 1e-6 * np.abs(finite).max():
+        least = 1e-6 * np.abs(finite).max(initial=0.0)
+        if finite.size and np.ptp(finite) > least and not _prescribed(study, name, least):
             found.append(name)
     return found
+
+
+def _prescribed(study: Dataset, name: str, least: float) -> bool:
+    """Test whether a quantity has the values of a parameter."""
+    numbers = [study[one] for one in parameters_of(study) if study[one].dtype.kind == "f"]
+    return any(bool(abs(study[name] - one).max() <= least) for one in numbers)
 
 
 @figure("study", "quantities of the cases over a parameter", needs="a study")

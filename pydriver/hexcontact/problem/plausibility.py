@@ -371,16 +371,14 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
 
     These are the error of the dissipated energy by loads that turn, None without slip or such steps, and the
     largest Q/mu P of tangential loads that return, None if none is known to. Q/mu P is that of a wide ring if
-    shear is due to pressing alone, and 0 without shear.
+    shear is due to pressing alone, and 0 without shear and of rolling bodies, whose slip is no ring.
     """
-    if not case.frictional or math.isinf(case.friction_coefficient):
+    if not case.frictional or math.isinf(case.friction_coefficient) or case.rolls:
         return 0.0, None, None
     largest = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
     slipping = max(largest, _NOTICED) if largest else 0.8 * (abs(case.pair.beta) > _ALIKE)
     targets = [(step.x, step.y, step.twist) for step in case.load_steps]
-    if case.rolls or any(
-        len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)
-    ):
+    if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
         return slipping, None, None
     values = np.array([[target.value for target in motions] for motions in targets])
     scale = np.abs(values).max(axis=0)

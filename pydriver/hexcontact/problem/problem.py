@@ -241,15 +241,15 @@ class Problem:
     def initial_gap(self, lattice: Lattice, step: LoadStep | None = None) -> tuple[Array, Mask]:
         """Return the gap before loading over the nodes of a window, and where the bodies can touch.
 
-        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch. It is that
-        of a load step, if surfaces move with their bodies. DeckError if a gap given in Python does not fit the
-        window or is NaN somewhere.
+        The gap (m) counts from first touch, and is inf where nothing can touch, as outside a punch; it is
+        that of a load step if surfaces move. DeckError if a gap given in Python does not fit the window or is
+        NaN somewhere.
         """
         gap = self._gap_in(step).over(lattice)
         return gap, np.isfinite(gap)
 
     def _gap_in(self, step: LoadStep | None) -> PlaneField:
-        """Return the gap of a load step: docs/theory/rolling.md, (K7)."""
+        """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:
             return self._gap
         return PlaneField(self.surfaces.moved(-np.array(step.roll.way) @ self.lattice.basis), GAP)

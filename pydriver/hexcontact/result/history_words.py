@@ -149,8 +149,11 @@ def step_error_share(history: History) -> float | None:
 
 
 def path_error_share(history: History) -> float:
-    """Return the bound on the error of the dissipated energy due to load steps, over that energy."""
-    spent = float(history.get("dissipated_energy", 0.0))
+    """Return the bound on the error of the dissipated energy due to load steps, over that energy.
+
+    It is 0 of rolling bodies, whose steps are spacings: the error is that of the lattice.
+    """
+    spent = 0.0 if rolls(history) else float(history.get("dissipated_energy", 0.0))
     noise = _NOTICED * _scale("dissipated_energy", history) if spent else 0.0
     return float(history.get("dissipated_energy_path_error", 0.0)) / spent if spent > noise else 0.0
 
@@ -217,7 +220,7 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
         if name == "contact_radius"
         else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
         for name in SUMMARY
-        if name in history
+        if name in history and not (name == "dissipated_energy" and rolls(history) and not history[name])
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
@@ -382,6 +385,8 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
     parts, loops = segments(histories), cycles(histories)
     if len(parts) < 2 or not is_frictional(histories[-1]):
         return headers, []
+    if rolls(histories[-1]):
+        return _power_table(histories, parts[-most:])
     named = [(f"segment {row['segment']}", _worn_label(row, histories), row) for row in parts[-most:]]
     named += [(f"cycle {row['cycle']}", row["loading"], row) for row in loops[-most:]]
     shown, rows = 5 if loops else 4, []
@@ -391,6 +396,22 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
         steps = f"{row['first_step']} to {row['last_step']}"
         rows.append((name, words, steps, quantity(row["dissipated_energy"], "J"), area)[:shown])
     return headers[:shown], rows
+
+
+def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]]) -> tuple[Row, list[Row]]:
+    """Return headers and rows of segments of rolling bodies: energy, way, and power at their ends."""
+    rows: list[Row] = []
+    for row in parts:
+        before, last = ({}, *histories)[row["first_step"] - 1], histories[row["last_step"] - 1]
+        name = "creep_power" if "creep_power_error" in last else "slip_power"
+        end, start = (float(one.get("rolled_distance", math.nan)) for one in (last, before))
+        way = end - (0.0 if math.isnan(start) else start)
+        rolled, energy = quantity(way, "m") if way else "steady", quantity(row["dissipated_energy"], "J")
+        power = quantity(last[name], VARIABLES[name].units) + error_of(name, last)
+        steps = f"{row['first_step']} to {row['last_step']}"
+        shown = ("", energy, "") if math.isnan(way) else (rolled, energy if way else "", power)
+        rows.append((f"segment {row['segment']}", str(row["label"]), steps, *shown))
+    return ("", "label", "steps", "rolled", "dissipated energy", "frictional power"), rows
 
 
 def _of_wear(history: History) -> bool:

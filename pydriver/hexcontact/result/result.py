@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, overload
@@ -21,7 +22,7 @@ from ..interior.fields import region
 from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
 from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions, with_places
 from ..text import did_you_mean, text_table
-from ..variables import CREEPAGES, FIELDS, TRACTIONS, VARIABLES
+from ..variables import CREEPAGES, FIELDS, SHEAR_LIMIT, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .layout import Quantities, history_of, lattice_of, step_of
 from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
@@ -267,13 +268,37 @@ class Result:
         `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
         ``cycle_dissipation_density`` and ``cycle_slip_amplitude`` (a quarter of the slip path) are over the
         nodes, ``wear_volume`` of all. Raises DeckError without friction, such a cycle, or its fields.
+
+        Of rolling bodies `steps` is one load step, ``[-1]`` the last. ``worn_depth`` is that of the
+        material at the node, on its way through the contact; behind it that of one pass.
+        ``wear_by_distance`` (m3/m) is the volume by rolled distance, ``wear_by_distance_error`` (of similar
+        bodies) what the lattice leaves out.
         """
         number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
         if "dissipation_density" not in self:
             raise DeckError("nothing wears without friction: the result has no dissipation_density")
+        if CREEPAGES[0] in self and steps is not None and len(steps) == 1:
+            return self._worn_by_pass(coefficient, self.step(integer(steps[0], "steps")))
         cycle = map(self._nodal, self.cycle_steps(segment, steps))
         given = (chosen_fields(WEARING, one.fields, one.number) for one in cycle)
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
+
+    def _worn_by_pass(self, coefficient: float, step: Dataset) -> Dataset:
+        """Return what rolling wears, by the energy of Coulomb friction."""
+        mu = friction_of(self.dataset.attrs)
+        if not 0.0 < mu < math.inf or SHEAR_LIMIT in self.dataset.attrs:
+            raise DeckError("wear of rolling bodies: expected one finite friction.coefficient above 0")
+        if not np.isfinite(step["rolled_distance"]):
+            raise DeckError(f"steps = [{step['step'].item()}]: expected a load step in which the bodies roll")
+        by_energy, names = coefficient / mu, ("slip_power", "creep_power_error")
+        field, one = "dissipation_density", nodal(step, self.lattice)
+        spent = chosen_fields((field,), one.fields, one.number)[field]
+        depth = ("row", "col"), by_energy * spent, {"units": "m"}
+        found = self.dataset[["x", "y"]].assign(worn_depth=depth)
+        rates = zip(("wear_by_distance", "wear_by_distance_error"), names, strict=True)
+        return found.assign(
+            {name: ((), by_energy * float(step[of]), {"units": "m2"}) for name, of in rates if of in step}
+        )
 
     def _nodal(self, step: int) -> NodalStep:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""

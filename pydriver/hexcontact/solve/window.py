@@ -269,6 +269,7 @@ class FrictionWindow(Window):
         history = {**super()._history(solution, before), "dissipated_energy_step": spent}
         left_out = () if self.case.deck.bulk else BULK_STRAIN
         left_out = left_out if self.case.rolls else (*left_out, *CORE["rolling"])
+        left_out = (*left_out, "creep_power_error") if self.case.pair.beta else left_out
         left_out = (*left_out, _PATH_ERROR) if static else left_out
         return {name: value for name, value in history.items() if name not in left_out}
 

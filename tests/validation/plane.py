@@ -18,6 +18,8 @@ from .runs import Array, Mask, State, bodies, press, run
 # A barrel along x, so that the contact is 18 times as long as it is wide.
 LONG = Paraboloid(radius_x=100.0, radius_y=1.0)
 LOAD = 1.0
+LONGER = Paraboloid(radius_x=6000.0, radius_y=1.0)
+"""184 times: pressing shears less than on a plane by the part 2|y|/(πa) of the pressure beyond its ends."""
 
 
 def _middle(state: State) -> Mask:
@@ -25,8 +27,8 @@ def _middle(state: State) -> Mask:
     return np.asarray(np.abs(state.x - 0.25 * state.spacing) < 0.5 * state.spacing)
 
 
-def _hertz(load: float = LOAD) -> analytic.EllipticContact:
-    return analytic.hertz_ellipse(1.0, [[0.01, 0.0], [0.0, 1.0]], normal_load=load)
+def _hertz(load: float = LOAD, barrel: Paraboloid = LONG) -> analytic.EllipticContact:
+    return analytic.hertz_ellipse(1.0, barrel.curvature, normal_load=load)
 
 
 def _resultant(values: Array, state: State) -> float:
@@ -62,8 +64,10 @@ def cattaneo(
             half = _half_width(y, state.stick[middle])
             value, true = half / exact.half_width, exact.stick_half_width(shear) / exact.half_width
             found.add(where, "c/b", "-", value, analytic=true, absolute=0.7 / across)
-            error = float(np.abs(q - exact.traction(y, shear)).max()) / (mu * peak)
-            found.add(where, "max error of q_y/(μ p_0)", "-", error, analytic=0.0, absolute=0.02)
+            errors = (q - exact.traction(y, shear)) / (mu * peak)
+            rms, largest = float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max())
+            found.add(where, "rms error of q_y/(μ p_0)", "-", rms, analytic=0.0, absolute=3e-3)
+            found.add(where, "max error of q_y/(μ p_0)", "-", largest, analytic=0.0, absolute=0.02)
         found.add(f"ν = {nu:g}", "time", "s", made.seconds)
     found.notes.append(
         "Paraboloid with radii 100 m along x and 1 m across, E* = 1 Pa, P = 1 N, μ = 0.3, sheared along y; "
@@ -81,42 +85,46 @@ def _half_width(y: Array, inside: Mask) -> float:
 
 
 def dissimilar(
-    cases: Sequence[tuple[float, float]] = ((-0.189, 0.2), (-0.3, 0.2)), across: int = 20, steps: int = 20
+    cases: Sequence[tuple[float, float]] = ((-0.189, 0.2), (-0.3, 0.2)),
+    across: int = 40,
+    along: int = 80,
+    steps: int = 20,
 ) -> Comparison:
     """Press a long contact of dissimilar bodies, then shear it; stick in the mid-plane."""
     found = Comparison()
     parts = (0.001, 0.3, 0.6)  # of mu P
+    hertz = _hertz(LOAD, LONGER)
     for beta, mu in cases:
         shear = [{"tangential_load_y": part * mu * LOAD} for part in parts]
         made = run(
-            *bodies(beta, 0.25, LONG),
-            spacing=_hertz().semi_minor / across,
+            *bodies(beta, 0.25, LONGER),
+            lattice="rectangular",
+            spacing=(hertz.semi_major / along, hertz.semi_minor / across),
             friction_coefficient=mu,
             coupling="goodman",
             loads=[press(LOAD, steps), *shear],
         )
         where, pressed = f"β = {beta:g}, μ = {mu:g}", made[steps]
-        middle = _middle(pressed)
+        middle = np.abs(pressed.x) < 0.5 * pressed.spacing
         half = _half_width(pressed.y[middle], pressed.contact[middle])
         ratio = _half_width(pressed.y[middle], pressed.stick[middle]) / half
         exact = goodman_stick_ratio_plane(beta, mu)
-        row = math.sqrt(0.75) / across  # distance of the rows of nodes over b
+        row = 1.0 / across  # distance of the rows of nodes over b
         allowed = 1.4 * row
         found.add(where, "pressed: c/b", "-", ratio, analytic=exact, absolute=allowed)
         states = [made[number] for number in range(steps + 1, len(made) + 1)]
         shares = [
-            _resultant(state.traction_y[middle], state) / _resultant(mu * state.pressure[middle], state)
-            for state in states
+            float(state.traction_y[middle].sum() / (mu * state.pressure[middle]).sum()) for state in states
         ]
         strips = sheared_strips(beta, mu, shares)
         for number, (part, state, strip) in enumerate(zip(parts, states, strips, strict=True), steps + 1):
             stick = state.y[middle & state.stick] / half
             low, high = float(stick.min()) - 0.5 * row, float(stick.max()) + 0.5 * row
-            exact_q = np.interp(state.y[middle] / _hertz().semi_minor, strip.y, strip.traction, 0.0, 0.0)
+            exact_q = np.interp(state.y[middle] / hertz.semi_minor, strip.y, strip.traction, 0.0, 0.0)
             scale = mu * float(state.pressure[middle].max())
             error = float(np.sqrt(np.mean((state.traction_y[middle] / scale - exact_q) ** 2)))
             found.add(
-                where, f"Q = {part:g} μP: rms error of q_y/(μ p_0)", "-", error, analytic=0.0, absolute=0.04
+                where, f"Q = {part:g} μP: rms error of q_y/(μ p_0)", "-", error, analytic=0.0, absolute=0.01
             )
             if number == steps + 1:  # slip behind stops, slip ahead goes on
                 found.add(where, f"Q = {part:g} μP: y_min/b", "-", low, analytic=-exact, absolute=allowed)
@@ -132,7 +140,8 @@ def dissimilar(
         "under pressure: |β| K(c/b) = μ K'(c/b). A first small Q stops the slip on the side to which the "
         "traction points, so that stick reaches from -c to the edge. Half a row is added to the outermost "
         "nodes. At larger Q: the plane problem itself, in 400 strips and 100 steps, with the shares Q'/μP' "
-        "of the mid-plane."
+        f"of the mid-plane. The contact is 184 times as long as it is wide, {along} and {across} spacings in "
+        "its half-axes; one 18 times as long differs by 2 % rms at any spacing."
     )
     return found
 
@@ -162,7 +171,7 @@ def sheared_strips(
     spread = math.pi * beta * step * np.sign(apart)
     pressure, traction = np.zeros(count), np.zeros(count)
     states = []
-    halves = np.cbrt(np.arange(1, steps + 1) / steps)  # any growth will do: it is self-similar
+    halves = np.linspace(1.0, 0.05, steps)[::-1]  # the first step alone is not self-similar
     for half, share in [*((float(w), 0.0) for w in halves), *((1.0, share) for share in shares)]:
         before = kernel @ traction - spread @ pressure
         pressure = np.sqrt(np.maximum(half**2 - y**2, 0.0))

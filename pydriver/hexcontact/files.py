@@ -232,6 +232,7 @@ def flush(path: Path) -> None:
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
 _LEAST, _LONGEST = 500, 1000  # bytes of a lock, which ends with blanks
+_JOB = ("SLURM_CLUSTER_NAME", "SLURM_JOB_ID", "SLURM_RESTART_COUNT")
 _TRIES = 1000  # to open a lock that its holder deletes at the same time
 
 
@@ -240,8 +241,9 @@ class Lock:
 
     The operating system holds the lock, and releases it when the process dies.
     File systems differ in whether another machine notices, so the file names process and host:
-    a lock left by another host counts as held, unless a requeued job of Slurm left it. `output` is named in messages; `began` is when the run began
-    that a resumed one continues (s since 1970), see `begun`.
+    a lock left by another host counts as held, unless an earlier attempt of this job of Slurm left it.
+    `output` is named in messages; `began` is when the run began that a resumed one continues (s since 1970),
+    see `begun`.
     """
 
     def __init__(self, path: Path, output: Path, began: float | None = None) -> None:
@@ -280,7 +282,7 @@ class Lock:
             "host": os.uname().nodename,
             "since": time.strftime("%F %T"),
             "time": time.time(),
-            **_job(),
+            "job": [*map(os.environ.get, _JOB)],
         }
         if began is not None and math.isfinite(began):
             text["began"] = began
@@ -303,19 +305,13 @@ class Lock:
         os.close(self._descriptor)
 
 
-def _job() -> dict[str, Any]:
-    """Return the Slurm job of this process and how often it was requeued; nothing without one."""
-    number, cluster = (os.environ.get(f"SLURM_{name}", "") for name in ("JOB_ID", "CLUSTER_NAME"))
-    requeued = os.environ.get("SLURM_RESTART_COUNT", "")
-    if not number:
-        return {}
-    return {"job": f"{number} {cluster}", "requeued": int(requeued) if requeued.isdecimal() else 0}
-
-
 def _is_over(holder: dict[str, Any]) -> bool:
-    """Test whether an earlier attempt of the job of this process wrote the lock: a job runs once at a time."""
-    job, before = _job(), holder.get("requeued")
-    return bool(job) and holder.get("job") == job["job"] and type(before) is int and before < job["requeued"]
+    """Test whether an earlier attempt of this job wrote the lock: a job runs once at a time."""
+    own = [*map(os.environ.get, _JOB)]
+    with contextlib.suppress(LookupError, TypeError, ValueError):
+        cluster, job, restarts = holder["job"]
+        return bool(job) and [cluster, job] == own[:2] and int(restarts or 0) < int(own[2] or 0)
+    return False
 
 
 def holder_of(text: bytes) -> dict[str, Any] | None:

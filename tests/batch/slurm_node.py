@@ -10,7 +10,7 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Self
 
@@ -105,9 +105,9 @@ class SlurmNode:
             words = ("setpriv", "--pdeathsig", "KILL", *words)
             self._daemons.append(subprocess.Popen(words, stdout=log, stderr=log, env=self.environment))
 
-    def _until_there(self, look: object) -> None:
+    def _until_there(self, look: Callable[[], bool]) -> None:
         limit = time.monotonic() + PATIENCE
-        while not look():  # type: ignore[operator]
+        while not look():
             ended = [daemon for daemon in self._daemons if daemon.poll() is not None]
             if ended or time.monotonic() > limit:
                 last = [
@@ -129,8 +129,8 @@ class SlurmNode:
     def wait(self, *, jobs: str = "") -> None:
         """Wait until jobs, or all, have ended.
 
-        A requeued job waits for two minutes. Here it starts as soon as its former script has ended, whose exit
-        code would otherwise end the new attempt.
+        A requeued job waits for two minutes. Here it starts as soon as its former script has ended, whose
+        exit code would otherwise end the new attempt.
         """
 
         def ended() -> bool:

@@ -24,9 +24,8 @@ USELESS = "a build without MPI (build option -Dmpi=enabled)"
 def slurm() -> Iterator[SlurmNode]:
     try:
         node = SlurmNode()
-        node.environment["PATH"] = os.pathsep.join(
-            [str(Path(sys.executable).parent), node.environment["PATH"]]
-        )
+        scripts = str(Path(sys.executable).parent)
+        node.environment["PATH"] = os.pathsep.join([scripts, node.environment["PATH"]])
         with node:
             yield node
     except Absent as reason:
@@ -166,8 +165,6 @@ def test_ranks_share_a_run(slurm: SlurmNode, folder: Path) -> None:
     log = next(folder.glob(f"*-{job}.log")).read_text()
     assert slurm.job(job)["JobState"] == "COMPLETED", log
     directly(folder, "run", str(deck), "--output", "whole.nc")
-    with (
-        xarray.open_dataset(folder / "cattaneo_mindlin.nc") as a,
-        xarray.open_dataset(folder / "whole.nc") as b,
-    ):
-        assert abs(a.pressure - b.pressure).max() < 1e-6 * b.max_pressure.max()
+    files = [folder / "cattaneo_mindlin.nc", folder / "whole.nc"]
+    shared, serial = (xarray.open_dataset(file) for file in files)
+    assert abs(shared.pressure - serial.pressure).max() < 1e-6 * serial.max_pressure.max()

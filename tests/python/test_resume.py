@@ -382,7 +382,7 @@ def test_a_requeued_job_resumes_on_another_node(tmp_path: Path, monkeypatch: pyt
     """The lock of a node that has failed is that of an attempt that is over."""
     out = tmp_path / "out.nc"
     stopped(made(), out, 2)
-    holder = {"process": 1, "host": "node7", "job": "12 alpha", "requeued": 0}
+    holder = {"process": 1, "host": "node7", "job": ["alpha", "12", None]}
     (journal_of(out) / "lock").write_text(json.dumps(holder))
     monkeypatch.setenv("SLURM_JOB_ID", "12")
     monkeypatch.setenv("SLURM_CLUSTER_NAME", "alpha")

@@ -4,6 +4,7 @@ import io
 import itertools
 import logging
 import math
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -437,6 +438,43 @@ def test_limits_of_old_control_groups_count(tmp_path: Path) -> None:
         memory_stat="total_inactive_file 500000\n",
     )
     assert memory.available(tmp_path / "sys", process) == 8_500_000
+
+
+@pytest.mark.parametrize(
+    ("groups", "files", "cores"),
+    [
+        ("0::/batch/job\n", {"batch/job/cpu.max": "max 100000\n"}, 8),
+        ("0::/batch/job\n", {"batch/job/cpu.max": "max 100000\n", "batch/cpu.max": "250000 100000\n"}, 2),
+        ("5:cpu,cpuacct:/job\n", {"cpu/job/cpu.cfs_quota_us": "-1", "cpu/job/cpu.cfs_period_us": "9"}, 8),
+        ("5:cpu,cpuacct:/job\n", {"cpu/job/cpu.cfs_quota_us": "5", "cpu/job/cpu.cfs_period_us": "9"}, 1),
+        ("0::/batch/job\n", {}, 8),
+    ],
+)
+def test_cores_are_those_of_a_quota_of_processor_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, groups: str, files: dict[str, str], cores: int
+) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(8))
+    (tmp_path / "cgroup").write_text(groups)
+    for name, text in files.items():
+        (tmp_path / "sys" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "sys" / name).write_text(text)
+    assert memory.cores(tmp_path / "sys", tmp_path / "cgroup") == cores
+
+
+def test_openmp_heeds_a_quota_of_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(8))
+    monkeypatch.setattr("os.cpu_count", lambda: 8)
+    monkeypatch.setattr(memory, "_quota", lambda *_: 3)
+    monkeypatch.setenv("OMP_NUM_THREADS", "6")
+    memory.limit_threads()
+    assert memory.threads() == 6
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    memory.limit_threads()
+    assert os.environ["OMP_NUM_THREADS"] == "3"
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    monkeypatch.setattr(memory, "_quota", lambda *_: 9)
+    memory.limit_threads()
+    assert "OMP_NUM_THREADS" not in os.environ
 
 
 def test_memory_that_is_there_is_not_refused() -> None:

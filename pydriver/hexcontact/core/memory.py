@@ -20,7 +20,10 @@ _LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
 _NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
 
 
-def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/proc/self/cgroup")) -> int:
+CGROUPS, PROCESS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+
+
+def available(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
     """Return the memory (bytes) that the machine and the limits of this process leave."""
     return min([_left_on_machine(), *_left_in_limits(), *_left_in_groups(cgroups, process)])
 
@@ -43,9 +46,16 @@ def _taken(name: str) -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def cores() -> int:
-    """Return the number of cores of this process."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def cores(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
+    """Return the number of cores that this process is bound to, within the quotas of its control groups."""
+    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(bound, _quota(cgroups, process))
+
+
+def limit_threads() -> None:
+    """Make OpenMP and BLAS, which know no quotas, start no more threads than a quota allows."""
+    if _quota(CGROUPS, PROCESS) < (os.cpu_count() or 1):
+        os.environ.setdefault("OMP_NUM_THREADS", str(cores()))
 
 
 def threads() -> int:
@@ -123,19 +133,44 @@ def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
 def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, bytes]]:
     """Return limit, usage and statistics of each control group, and the key of the file cache in these."""
     found = []
+    for controllers, folder in _folders_of_groups(cgroups, groups):
+        limit, usage, cache = "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file"
+        if not controllers:
+            limit, usage, cache = "memory.max", "memory.current", b"inactive_file"
+        elif "memory" not in controllers:
+            continue
+        found.append((f"{folder}/{limit}", f"{folder}/{usage}", f"{folder}/memory.stat", cache))
+    return found
+
+
+@functools.cache
+def _quota(cgroups: Path, process: Path) -> int:
+    """Return the processor time that the control groups of a process allow, in whole cores, at least one."""
+    least = float(1 << 20)
+    with contextlib.suppress(OSError):
+        for controllers, folder in _folders_of_groups(cgroups, _read(process)):
+            names = ["cpu.cfs_quota_us", "cpu.cfs_period_us"] if controllers else ["cpu.max"]
+            with contextlib.suppress(OSError, ValueError):  # without the controller; "max" is no quota
+                quota, period = (int(number) for name in names for number in _read(folder / name).split())
+                if quota > 0 < period:
+                    least = min(least, quota / period)
+    return max(1, int(least))
+
+
+@functools.cache
+def _folders_of_groups(cgroups: Path, groups: bytes) -> list[tuple[list[str], Path]]:
+    """Return the folders of the control groups of a process, with their controllers (version 2: none)."""
+    found = []
     for line in os.fsdecode(groups).splitlines():
-        _, controllers, group = line.split(":", 2)
-        if controllers == "":
-            root, limit, usage, cache = cgroups, "memory.max", "memory.current", b"inactive_file"
-        elif "memory" in controllers.split(","):
-            root, limit, usage = cgroups / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
-            cache = b"total_inactive_file"
-        else:
+        _, names, group = line.split(":", 2)
+        controllers = names.split(",") if names else []
+        root = next((cgroups / name for name in ("memory", "cpu") if name in controllers), cgroups)
+        if controllers and root == cgroups:
             continue
         # in a container, the own group may be the root and others missing
         own = root / group.lstrip("/")
         for folder in (own, *own.parents):
-            found.append((f"{folder}/{limit}", f"{folder}/{usage}", f"{folder}/memory.stat", cache))
+            found.append((controllers, folder))
             if folder == root:
                 break
     return found

@@ -94,7 +94,7 @@ def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
 
 
 def was_begun(path: Path, case: Problem) -> bool:
-    """Return whether a run of the case left finished steps or a result; DeckError if it is of another case."""
+    """Return whether a run left finished steps or a result; DeckError if they are of another case."""
     if not (path.exists() or Journal(journal_of(path)) or TrialFolder(journal_of(path))):
         return False
     with contextlib.closing(open_result(path)) as found:

@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from hexcontact import DeckError
 from hexcontact.core.lattice import Lattice
-from hexcontact.result.layout import Layout, Metadata, assemble, window_of
+from hexcontact.result.layout import Layout, Metadata, assemble, lattice_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.variables import ESTIMATED, VARIABLES
@@ -63,7 +63,7 @@ def test_every_variable_says_what_it_is() -> None:
 
 def test_a_window_that_grew_pads_the_steps_before() -> None:
     data = assemble(Metadata(), [made_step(0), made_step(1, LARGE)])
-    assert window_of(data.attrs, data["row"].values, data["col"].values) == LARGE
+    assert lattice_of(data) == LARGE
     first, inside = data.sel(step=1), {"row": slice(-2, 2), "col": slice(-3, 2)}
     assert_array_equal(first["pressure"].sel(inside), made_step(0).fields["pressure"])
     rim = np.ones(LARGE.shape, dtype=bool)

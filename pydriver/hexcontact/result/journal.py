@@ -140,12 +140,11 @@ def _digest(about: Any) -> str:
 class Journal:
     """The finished steps of a run, read from the disk one at a time.
 
-    Of large records that this process has written or read before (`ours`), each field is loaded at its use.
-    Restart data are read on request (`companions`).
+    Each field of a large record is loaded at its use, unless restart data are read, too (`companions`).
     """
 
-    def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
-        self.folder, self._companions, self._ours = folder, companions, ours
+    def __init__(self, folder: Path, companions: bool = False) -> None:
+        self.folder, self._companions = folder, companions
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         self._left = [folder / name for name in names if _is_left(name, folder)]
@@ -161,7 +160,7 @@ class Journal:
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            about, step = read_record(record, self._companions, lazy=self._ours)
+            about, step = read_record(record, self._companions, lazy=not self._companions)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
@@ -291,11 +290,6 @@ def linked_folder(folder: Path) -> Path | None:
 def write_record(path: Path, run: str, step: Step) -> None:
     """Write the record of a step of a run."""
     fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
-    for name, values in fields.items():
-        if values.shape != step.lattice.shape:
-            raise ValueError(
-                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
-            )
     about = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,

@@ -33,8 +33,8 @@ _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.item
 _STEPS = 64**2  # nodes of a chunk with several steps
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
-    *("lattice_spacing", "lattice_basis", "lattice_origin", "lattice_cell_ratio", "lattice_cell_angle"),
-    *("lattice_direction", "lattice_periodic"),
+    *("lattice_basis", "lattice_periodic", "lattice_spacing"),
+    *(f"lattice_{name}" for name in Pattern._fields),
     *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
 )
 
@@ -131,10 +131,6 @@ class Layout:
             "row": np.asarray(self.window.rows, dtype="i4"),
             "col": np.asarray(self.window.cols, dtype="i4"),
         }
-
-    def coordinates(self) -> dict[str, NDArray[Any]]:
-        """Return the values of the coordinates."""
-        return self.axes() | {"x": np.asarray(self.window.x), "y": np.asarray(self.window.y)}
 
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Return the global attributes; `complete`: the result has all planned steps."""
@@ -245,20 +241,15 @@ def _union(windows: Sequence[Lattice]) -> Lattice:
     )
 
 
-def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
-    """Return the lattice window of the attributes and index coordinates of a file."""
-    x0, y0 = np.asarray(attributes.get("lattice_origin", (0.0, 0.0)), dtype=float).tolist()
-    cells = (f"lattice_{name}" for name in ("cell_ratio", "cell_angle"))  # older files have none
-    pattern = Pattern((x0, y0), *(float(attributes[name]) for name in cells if name in attributes))
-    spacing = float(attributes["lattice_spacing"])
-    pattern = pattern._replace(direction=float(attributes.get("lattice_direction", 0.0)))
-    found = pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
-    return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
-
-
 def lattice_of(dataset: Dataset) -> Lattice:
     """Return the lattice window of a result."""
-    return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
+    known, rows, cols = dataset.attrs, dataset["row"].values, dataset["col"].values
+    keys = {name: f"lattice_{name}" for name in Pattern._fields}  # of which older files have some
+    cells = {name: np.asarray(known[key], dtype=float).tolist() for name, key in keys.items() if key in known}
+    cells["origin"] = tuple(cells.get("origin", (0.0, 0.0)))
+    spacing, first = float(known["lattice_spacing"]), (int(rows[0]), int(cols[0]))
+    found = Pattern(**cells).window(spacing, *first, len(rows), len(cols))
+    return dataclasses.replace(found, periodic=bool(known.get("lattice_periodic", 0)))
 
 
 def step_of(dataset: Dataset, number: int) -> Dataset:
@@ -297,7 +288,9 @@ def assemble(
         for name in layout.fields
     }
     layout.fill(values, steps)
-    values |= layout.histories() | layout.coordinates() | layout.trials
+    values |= (
+        layout.histories() | layout.axes() | layout.trials | {"x": layout.window.x, "y": layout.window.y}
+    )
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

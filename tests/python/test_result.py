@@ -117,12 +117,14 @@ def test_history_that_a_step_lacks_is_missing() -> None:
     assert list(data["label"].values) == ["press", "shear"]
 
 
-def test_metadata_comes_back_from_the_attributes() -> None:
-    metadata = Metadata(
-        "ä title", "deck = 1\n", ("pressure", "gap"), 3, 7, {"effective_modulus": 1.5e11, "algorithm": "x"}
-    )
-    data = assemble(metadata, [made_step(0)])
-    assert Metadata.from_attributes(data.attrs) == metadata
+def test_metadata_are_attributes() -> None:
+    parameters = {"effective_modulus": 1.5e11, "algorithm": "x"}
+    metadata = Metadata("ä title", "deck = 1\n", ("pressure", "gap"), 3, 7, parameters)
+    known = {**parameters, "title": "ä title", "deck": "deck = 1\n", "run": metadata.run}
+    known |= {"output_fields": "pressure gap", "output_every": 3, "planned_steps": 7}
+    attributes = assemble(metadata, [made_step(0)]).attrs
+    assert {name: attributes[name] for name in known} == known
+    assert attributes["history"] == f"{metadata.created} started by hexcontact {metadata.version}"
 
 
 def test_what_does_not_fit_is_refused() -> None:

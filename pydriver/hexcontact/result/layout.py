@@ -31,12 +31,6 @@ COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
 _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
 _STEPS = 64**2  # nodes of a chunk with several steps
-_ATTRIBUTES = (  # all but those that describe the case
-    *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
-    *("lattice_basis", "lattice_periodic", "lattice_spacing"),
-    *(f"lattice_{name}" for name in Pattern._fields),
-    *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
-)
 
 
 def now() -> str:
@@ -71,22 +65,6 @@ class Metadata:
         require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
         return made(cls, {**values, **tuples})
-
-    @classmethod
-    def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Return the metadata from the attributes of a file; KeyError or ValueError for a fault."""
-        return cls(
-            title=str(attributes["title"]),
-            deck=str(attributes["deck"]),
-            fields=tuple(str(attributes["output_fields"]).split()),
-            every=int(attributes["output_every"]),
-            planned_steps=int(attributes["planned_steps"]),
-            parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
-            run=str(attributes["run"]),
-            created=str(attributes["created"]),
-            version=str(attributes["hexcontact_version"]),
-            resumed=tuple(str(attributes["history"]).splitlines()[1:]),
-        )
 
 
 class Layout:
@@ -159,11 +137,6 @@ class Layout:
             "deck": metadata.deck,
         }
 
-    def keeps(self, position: int) -> bool:
-        """Test whether the output has the fields of the step at `position`."""
-        last = position == len(self.steps) - 1
-        return last or self.steps[position].number % self.metadata.every == 0
-
     @property
     def fields(self) -> list[str]:
         """Names of the quantities with a value at every node."""
@@ -182,7 +155,8 @@ class Layout:
 
     def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
         """Return a field in one step, padded to the whole window."""
-        if self.keeps(position) and name in step.fields:
+        kept = step.number % self.metadata.every == 0 or position == len(self.steps) - 1
+        if kept and name in step.fields:
             return self.padded(name, step)
         variable = self.variables[name]
         return np.full(self.window.shape, MISSING[name], dtype=variable.dtype)

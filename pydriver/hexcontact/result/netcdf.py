@@ -40,7 +40,7 @@ from ..variables import (
     VARIABLES,
     names_where,
 )
-from .layout import COORDINATES, MISSING, Layout, Metadata, history_of, lattice_of
+from .layout import COORDINATES, MISSING, Layout, history_of, lattice_of
 from .step import Step
 
 if TYPE_CHECKING:
@@ -480,7 +480,6 @@ def read_output(path: Path) -> Result:
         if not sealed and (fault := fault_of_result(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
-        _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
         return result
 
 

@@ -38,9 +38,9 @@ def run(
         if plot:  # refuses before the run
             picture_beside(target)
         with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
-            histories, extent = solved(case, store, pipe, deck.stem, messages)
+            extent = solved(case, store, pipe, deck.stem, messages)
         picture = overview(target) if plot else None
-    return messages.conclude(case, histories, extent, target, picture)
+    return messages.conclude(case, store, extent, target, picture)
 
 
 @frame.command("hexcontact resume fretting.nc")
@@ -75,7 +75,7 @@ def resume(
                 picture_beside(again.store.path)
             if again.warning:
                 frame.print_error(f"warning: {again.warning}")
-            histories, extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
+            extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
         else:
             with_tables(restart.output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
@@ -84,4 +84,4 @@ def resume(
     if again is None:
         return messages.was_finished(file, picture)
     notes = [again.warning] * bool(again.warning)
-    return messages.conclude(again.case, histories, extent, path, picture, notes)
+    return messages.conclude(again.case, again.store, extent, path, picture, notes)

@@ -68,22 +68,21 @@ def journal_of(path: Path) -> Path:
 
 @dataclasses.dataclass
 class Header:
-    """Metadata of a run; the deck of a session has its loads apart, and those of further steps follow."""
+    """Metadata of a run; in a session the loads of further steps follow behind the deck."""
 
     metadata: Metadata
-    loads: list[str] | None = None  # entries of [[load]] behind the deck; None: all are in it
-    steps: int = 0  # finished with these loads
+    steps: int | None = None  # whose loads the deck has; None: it has all
 
     def whole(self, controls: Iterable[Mapping[str, Any]]) -> Metadata:
         """Return the metadata of a run by the control data of its finished steps.
 
         A further segment has one entry of [[load]], which each of its steps has up to its own end.
         """
-        if self.loads is None:
+        if self.steps is None:
             return self.metadata
         known = list(controls)
         further = {control["segment"]: control["load"] for control in known[self.steps :]}
-        deck = "".join([self.metadata.deck, *self.loads, *further.values()])
+        deck = "".join([self.metadata.deck, *further.values()])
         return dataclasses.replace(self.metadata, deck=deck, planned_steps=max(len(known), self.steps))
 
 
@@ -97,7 +96,7 @@ def read_header(folder: Path) -> Header:
     path = folder / HEADER
     about = read_sealed(path)
     with reading(path, "the header of a journal"):
-        return Header(Metadata.from_plain(about["metadata"]), about["loads"], about["steps"])
+        return Header(Metadata.from_plain(about["metadata"]), about["steps"])
 
 
 def write_sealed(path: Path, about: Mapping[str, Any]) -> None:
@@ -240,7 +239,7 @@ class Journal:
 
     def tidy(self) -> None:
         """Delete the reason of an early end, and remains of an interrupted write."""
-        for path in Journal(self.folder)._left:
+        for path in self._left:
             path.unlink(missing_ok=True)
 
 

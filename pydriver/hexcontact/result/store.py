@@ -93,7 +93,7 @@ class Store:
         return self._header.whole(step.control for step in self.heads)
 
     def describe(self, header: records.Header) -> None:
-        """Set the metadata, which are written with the next step; of a session with its loads apart."""
+        """Set the metadata, which are written with the next step."""
         self._header, self._described = header, False
 
     @classmethod

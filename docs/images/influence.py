@@ -11,13 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hexcontact.arrays import Array
-from hexcontact.core.influence import (
-    displacement_errors,
-    linear_load_displacement,
-    load_potential,
-    pressure_errors,
-    pyramid_functions,
-)
+from hexcontact.core import flat
+from hexcontact.core.influence import linear_load_displacement, pyramid_functions
 from hexcontact.plotting.registry import styled
 from hexcontact.plotting.style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 
@@ -187,7 +182,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "constant on the cell": {"color": THIRD, "ls": "--"},
     "pyramid": {"color": COMPUTED, "ls": "-"},
 }
-"""Line styles of the shapes of a nodal load."""
+"""Line styles of the shapes of a nodal load, in the order of the core."""
 
 
 @styled
@@ -212,8 +207,8 @@ def load_shapes(nodes_in_radius: int = 10) -> Figure:
 
 def _draw_one_load(axes: Axes) -> None:
     x = np.linspace(-2.5, 2.5, 501)
-    for name, look in LOOKS.items():
-        axes.plot(x, load_potential(name, x, 0.0), **look)
+    for number, look in enumerate(LOOKS.values(), start=1):
+        axes.plot(x, flat.load_potential(number, x, 0.0), **look)
     axes.set(title="displacement of one load", xlabel="$x/l_e$", ylabel="$\\pi E^* u_z / (p\\, l_e)$")
     axes.set(xlim=(-2.5, 2.5), ylim=(0.0, 4.5))
 
@@ -234,8 +229,8 @@ def _draw_pressures(axes: Axes, a: int) -> None:
 
 def _draw_errors(axes: Axes, a: int) -> None:
     x = np.linspace(0.0, 0.9, 721)
-    for name, look in LOOKS.items():
-        error = 100 * displacement_errors(name, a, x * a, 0.0)
+    for number, (name, look) in enumerate(LOOKS.items(), start=1):
+        error = 100 * flat.displacement_errors(number, a, x * a, 0.0)
         infinite = name == "point force"  # at each node: behind the others, and thin
         lw = 0.7 if infinite else matplotlib.rcParams["lines.linewidth"]
         axes.plot(x, error, **look, zorder=2 - infinite, lw=lw)
@@ -246,7 +241,7 @@ def _draw_errors(axes: Axes, a: int) -> None:
 
 def _draw_convergence(axes: Axes) -> None:
     meshes = np.array([5, 10, 20, 40])
-    errors = 100 * np.array([pressure_errors(float(mesh)) for mesh in meshes])
+    errors = 100 * np.array([flat.pressure_errors(float(mesh)) for mesh in meshes])
     for column, name in enumerate(("constant on the cell", "pyramid")):
         axes.loglog(meshes, errors[:, column], marker="o", ms=3, **LOOKS[name])
         order = -np.polyfit(np.log(meshes), np.log(errors[:, column]), 1)[0]

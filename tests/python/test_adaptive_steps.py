@@ -313,7 +313,7 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
 def test_the_smallest_step_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(friction, "MAX_SWEEPS", 2)
     monkeypatch.setattr(friction, "MAX_CUTS", 0)
-    monkeypatch.setattr(FrictionWindow, "_how", {"entry": "implicit", "tolerance": 1e-18})  # out of reach
+    monkeypatch.setattr(FrictionWindow, "how", {"entry": "implicit", "tolerance": 1e-18})  # out of reach
     case = made({**DISSIMILAR, "loads": [{"normal_load": 10.0}]}, nodes_in_radius=5, step_tolerance=0.5)
     sentence = r"(?s)^step \d+ did not converge.*\nit is 0.1% of its segment"
     with pytest.raises(ConvergenceError, match=sentence):

@@ -169,7 +169,7 @@ def test_a_journal_without_its_first_record_is_refused(out: Path) -> None:
 def test_texts_of_a_long_session_are_read_a_few_times(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that opening, too, takes time in proportion to the steps."""
     with Store(out, Metadata(planned_steps=1)) as file:
-        file.describe(Header(Metadata(), []))
+        file.describe(Header(Metadata(), 0))
         for index in range(20):
             control = {"segment": index // 2, "load": f"# {index}\n"}
             file.append(dataclasses.replace(made_step(index), control=control))

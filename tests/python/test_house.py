@@ -151,7 +151,7 @@ FORMATS: dict[str, dict[str, object]] = {  # by the version that first wrote the
         **{"result": 1, "journal": 5, "study": 1},
         "record": "run index lattice history control",
         "metadata": "title deck fields every planned_steps parameters run created version resumed deck_file",
-        "header": "metadata loads steps",
+        "header": "metadata steps",
         "window": "spacing row_first col_first n_row n_col origin cell_ratio cell_angle direction periodic",
         "solution": "level copy spacing origin nodes histories",
     },

@@ -8,37 +8,43 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexcontact.core.influence import displacement_errors, load_potential, pressure_errors, pyramid_functions
+from hexcontact.core import flat
+from hexcontact.core.influence import pyramid_functions
 
 HEIGHT = np.sqrt(0.75)
 INFLUENCE = runpy.run_path(str(Path(__file__).parents[2] / "docs/images/influence.py"))
 LOOKS = INFLUENCE["LOOKS"]
+NUMBERS = {shape: number for number, shape in enumerate(LOOKS, start=1)}  # of the core
 
 
 def test_load_shapes_hold_the_same_volume() -> None:
     x, y = np.array([300.0, 0.0, -40.0]), np.array([0.0, 200.0, 70.0])
     for shape in LOOKS:
         # the far field is volume/distance, with a relative error of the order of 1/distance^2
-        np.testing.assert_allclose(load_potential(shape, x, y) * np.hypot(x, y), HEIGHT, rtol=1e-4)
+        potential = flat.load_potential(NUMBERS[shape], x, y)
+        np.testing.assert_allclose(potential * np.hypot(x, y), HEIGHT, rtol=1e-4)
     # of the hexagon with the inner radius 1/2 about its middle: 6 * 1/2 * 2 ln(sqrt 3)
     origin = np.zeros(1)
-    assert load_potential("constant on the cell", origin, origin)[0] == pytest.approx(
-        3 * np.log(3), rel=1e-12
+    constant, pyramid = (
+        flat.load_potential(NUMBERS[shape], origin, origin)[0]
+        for shape in ("constant on the cell", "pyramid")
     )
-    assert load_potential("pyramid", origin, origin)[0] == pytest.approx(
-        1.5 * np.sqrt(3) * np.log(3), rel=1e-12
-    )
+    assert constant == pytest.approx(3 * np.log(3), rel=1e-12)
+    assert pyramid == pytest.approx(1.5 * np.sqrt(3) * np.log(3), rel=1e-12)
 
 
 def test_order_of_the_load_shapes() -> None:
-    coarse, fine = np.array(pressure_errors(10.0)), np.array(pressure_errors(40.0))
+    coarse, fine = np.array(flat.pressure_errors(10.0)), np.array(flat.pressure_errors(40.0))
     order = np.log(coarse / fine) / np.log(4.0)
     assert order == pytest.approx([1.0, 2.0], abs=0.15)
 
 
 def test_displacement_error_of_the_load_shapes() -> None:
     x = np.linspace(0.0, 8.0, 33)
-    error = {name: np.abs(displacement_errors(name, 10.0, x + 0.1, 0 * x)).max() for name in LOOKS}
+    error = {
+        name: np.abs(flat.displacement_errors(number, 10.0, x + 0.1, 0 * x)).max()
+        for name, number in NUMBERS.items()
+    }
     assert error["pyramid"] < 2e-3
     assert error["constant on the cell"] < 2e-3
     assert error["point force"] > 2e-2
@@ -78,7 +84,7 @@ def test_figure_of_the_load_shapes_shows_loads_pressures_and_errors() -> None:
     for line, (shape, look) in zip(one.lines, shapes.items(), strict=True):
         x, value = line.get_data()
         assert (len(x), line.get_color()) == (501, look["color"])
-        assert_allclose(value, load_potential(shape, x, 0.0))
+        assert_allclose(value, flat.load_potential(NUMBERS[shape], x, 0.0))
     exact, pyramids = pressure.lines
     x, p = exact.get_data()
     assert_allclose(p, np.sqrt(1.0 - x**2))
@@ -87,14 +93,16 @@ def test_figure_of_the_load_shapes_shows_loads_pressures_and_errors() -> None:
     for line, (shape, look) in zip(error.lines, shapes.items(), strict=False):
         x, value = line.get_data()
         assert (len(x), line.get_color()) == (721, look["color"])
-        assert_allclose(value[::90], 100.0 * displacement_errors(shape, 8, 8.0 * x[::90], 0.0 * x[::90]))
+        assert_allclose(
+            value[::90], 100.0 * flat.displacement_errors(NUMBERS[shape], 8, 8.0 * x[::90], 0.0 * x[::90])
+        )
     assert len(error.lines) == len(shapes) + 1  # and the axis
     for column, line in enumerate(convergence.lines):
         meshes, values = line.get_data()
         assert meshes.tolist() == [5, 10, 20, 40]
         assert_allclose(
             values,
-            [100.0 * pressure_errors(mesh)[column] for mesh in (5.0, 10.0, 20.0, 40.0)],
+            [100.0 * flat.pressure_errors(mesh)[column] for mesh in (5.0, 10.0, 20.0, 40.0)],
         )
     assert len(convergence.lines) == 2
 

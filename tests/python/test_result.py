@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from hexcontact import DeckError
 from hexcontact.core.lattice import Lattice
-from hexcontact.result.layout import Layout, Metadata, assemble, window_of
+from hexcontact.result.layout import Layout, Metadata, assemble, lattice_of
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.variables import ESTIMATED, VARIABLES
@@ -63,7 +63,7 @@ def test_every_variable_says_what_it_is() -> None:
 
 def test_a_window_that_grew_pads_the_steps_before() -> None:
     data = assemble(Metadata(), [made_step(0), made_step(1, LARGE)])
-    assert window_of(data.attrs, data["row"].values, data["col"].values) == LARGE
+    assert lattice_of(data) == LARGE
     first, inside = data.sel(step=1), {"row": slice(-2, 2), "col": slice(-3, 2)}
     assert_array_equal(first["pressure"].sel(inside), made_step(0).fields["pressure"])
     rim = np.ones(LARGE.shape, dtype=bool)
@@ -117,12 +117,14 @@ def test_history_that_a_step_lacks_is_missing() -> None:
     assert list(data["label"].values) == ["press", "shear"]
 
 
-def test_metadata_comes_back_from_the_attributes() -> None:
-    metadata = Metadata(
-        "ä title", "deck = 1\n", ("pressure", "gap"), 3, 7, {"effective_modulus": 1.5e11, "algorithm": "x"}
-    )
-    data = assemble(metadata, [made_step(0)])
-    assert Metadata.from_attributes(data.attrs) == metadata
+def test_metadata_are_attributes() -> None:
+    parameters = {"effective_modulus": 1.5e11, "algorithm": "x"}
+    metadata = Metadata("ä title", "deck = 1\n", ("pressure", "gap"), 3, 7, parameters)
+    known = {**parameters, "title": "ä title", "deck": "deck = 1\n", "run": metadata.run}
+    known |= {"output_fields": "pressure gap", "output_every": 3, "planned_steps": 7}
+    attributes = assemble(metadata, [made_step(0)]).attrs
+    assert {name: attributes[name] for name in known} == known
+    assert attributes["history"] == f"{metadata.created} started by hexcontact {metadata.version}"
 
 
 def test_what_does_not_fit_is_refused() -> None:

@@ -165,14 +165,14 @@ def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
 
 
 def test_fields_of_large_records_are_read_one_by_one(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only those that this process wrote; their checksums are compared."""
+    """Their checksums are compared."""
     monkeypatch.setattr(journal_module, "LARGE", 0)
     described = written(out)
     result = open_result(out)
     assert result.dataset.identical(assemble(described, [made_step(k) for k in range(3)]))
     other = out.with_name("other.nc")
     written(other, count=2)
-    [first, second] = Journal(journal_of(other), ours=True)
+    [first, second] = Journal(journal_of(other))
     assert isinstance(first.fields, Stored) and list(first.fields) == list(made_step(0).fields)
     record = Journal(journal_of(other)).records[1]
     data = bytearray(record.read_bytes())
@@ -182,7 +182,7 @@ def test_fields_of_large_records_are_read_one_by_one(out: Path, monkeypatch: pyt
     place = data.index(made_step(1).pressure.tobytes())
     data[place + 9] ^= 1
     record.write_bytes(data)
-    [_, second] = Journal(journal_of(other), ours=True)
+    [_, second] = Journal(journal_of(other))
     with pytest.raises(DeckError, match="damaged"):
         second.fields["pressure"]
 

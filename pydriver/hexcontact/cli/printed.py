@@ -17,7 +17,6 @@ from ..variables import VARIABLES, label_of, spelled
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..problem.problem import Problem
     from ..result.history_words import Extent
     from ..result.result import Result
 
@@ -57,21 +56,6 @@ class Summary(NamedTuple):
     deck: str  # without it there is no comparison with Hertz
     result: Result | None = None  # if it was read from a file
     extent: Extent | None = None
-
-    @classmethod
-    def of_run(
-        cls,
-        case: Problem,
-        histories: Sequence[History],
-        refined: Result | None,
-        extent: Extent | None = None,
-    ) -> Summary:
-        """Summarize a run; the finest lattice of a refined one, with errors, is read from its result."""
-        from ..problem.preview import parameters_of
-
-        found = histories_of(refined) if refined is not None else histories
-        extent = extent if refined is None else words.extent_of(refined.step(-1))
-        return cls(case.title, found, parameters_of(case), case.deck_text, refined, extent)
 
     @classmethod
     def of_result(cls, result: Result) -> Summary:

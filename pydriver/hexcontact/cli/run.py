@@ -51,9 +51,9 @@ def run(
         if again and restart.was_begun(target, case):
             return _resumed(target, plot, messages, case=case)
         with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
-            histories, extent = solved(case, store, pipe, deck.stem, messages)
+            extent = solved(case, store, pipe, deck.stem, messages)
         picture = overview(target) if plot else None
-    return messages.conclude(case, histories, extent, target, picture)
+    return messages.conclude(case, store, extent, target, picture)
 
 
 @frame.command("hexcontact resume fretting.nc")
@@ -92,7 +92,7 @@ def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> fram
                 picture_beside(again.store.path)
             if again.warning:
                 frame.print_error(f"warning: {again.warning}")
-            histories, extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
+            extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
         else:
             with_tables(restart.output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
@@ -101,4 +101,4 @@ def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> fram
     if again is None:
         return messages.was_finished(file, picture)
     notes = [again.warning] * bool(again.warning)
-    return messages.conclude(again.case, histories, extent, path, picture, notes)
+    return messages.conclude(again.case, again.store, extent, path, picture, notes)

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
+from ..problem.preview import parameters_of
 from ..problem.problem import Problem
 from ..result.history_words import Extent, extent_of
 from ..result.netcdf import missing_stresses
@@ -66,16 +67,21 @@ class Messages:
     def conclude(
         self,
         case: Problem,
-        histories: list[Any],
+        store: Store,
         extent: Extent | None,
         target: Path,
         picture: Path | None,
         warnings: Sequence[str] = (),
     ) -> dict[str, Any] | None:
-        """Print or return the result of a run, with a message on an accuracy that was not reached."""
-        refined = open_result(target) if case.accuracy else None
-        summary = printed.Summary.of_run(case, histories, refined, extent)
-        shortfall = refined.shortfall if refined is not None else ""
+        """Print or return the result of a run, with a message on an accuracy that was not reached.
+
+        The finest lattice of a refined one, with errors, is read from the result.
+        """
+        histories, shortfall = [step.history for step in store.heads], ""
+        summary = printed.Summary(case.title, histories, parameters_of(case), case.deck_text, None, extent)
+        if case.accuracy:
+            refined = open_result(target)
+            summary, shortfall = printed.Summary.of_result(refined), refined.shortfall
         if shortfall:
             print_error(shortfall)
         if self.as_json:
@@ -110,8 +116,8 @@ def solved(
     name: str,
     messages: Messages,
     before: Sequence[Step] = (),
-) -> tuple[list[Any], Extent | None]:
-    """Solve a case into a store; return the histories of all its steps and the extent of the last contact.
+) -> Extent | None:
+    """Solve a case into a store; return the extent of the last contact.
 
     Signals end the process. If the last step is finished, the output is completed first.
     """
@@ -125,12 +131,10 @@ def solved(
         late.append(signaled)
         return False
 
-    histories: list[Any] = [step.history for step in before]
     extent: Extent | None = None
 
     def note(step: Step) -> None:
         nonlocal extent
-        histories.append(step.history)
         extent = extent_of(step)
 
     listener = solving.listeners(case, reporter(messages.silent), note)
@@ -142,7 +146,7 @@ def solved(
                 with_tables(store.path, pipe, messages, listener, late, case)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
-    return histories, extent
+    return extent
 
 
 def with_tables(

@@ -134,27 +134,14 @@ class ElasticPair:
 
 @dataclass(frozen=True)
 class CoatedPair(ElasticPair):
-    """Compliance constants of two bodies of which at least one has a coating.
+    """Compliance constants of two bodies with coatings; the three are those of the outermost materials."""
 
-    The three constants are those of the outermost materials, which short waves of traction see.
-
-    Attributes
-    ----------
-    constants
-        Young's modulus [Pa], Poisson's ratio, and 1 if it is rigid, of both bodies; the numbers of their
-        coatings; thickness [m], Young's modulus [Pa] and Poisson's ratio of each of these, outermost first.
-    coupling
-        Largest tangential displacement by a pressure over the normal one, over all wave lengths.
-    fit_error
-        Largest error of the kernels, which are sums of images, over their largest value.
-    images
-        Number of images.
-    """
-
+    # Young's modulus [Pa], Poisson's ratio, and 1 if it is rigid, of both bodies; the numbers of their
+    # coatings; thickness [m], Young's modulus [Pa] and Poisson's ratio of each of these, outermost first
     constants: tuple[float, ...]
-    coupling: float
-    fit_error: float
-    images: int
+    coupling: float  # largest tangential displacement by a pressure over the normal one
+    fit_error: float  # largest error of the kernels, which are sums of images, over their largest value
+    images: int  # number of them
 
     @classmethod
     def of_layers(
@@ -162,20 +149,7 @@ class CoatedPair(ElasticPair):
         bodies: Sequence[tuple[float | None, float | None]],
         coatings: Sequence[Sequence[tuple[float, float, float]]],
     ) -> CoatedPair:
-        """Return the constants of two bodies, each with its coatings, outermost first.
-
-        Parameters
-        ----------
-        bodies
-            Young's modulus [Pa] and Poisson's ratio below the coatings; ``None`` for both: rigid.
-        coatings
-            Thickness [m], Young's modulus [Pa] and Poisson's ratio of each coating.
-
-        Raises
-        ------
-        DeckError
-            A number out of its range, a rigid surface on another, coatings that images do not describe.
-        """
+        """Return the constants of two bodies (None: rigid), and of their coatings, outermost first."""
         below = [(young or 0.0, poisson or 0.0, float(young is None)) for young, poisson in bodies]
         layers = [layer for coating in coatings for layer in coating]
         constants = tuple(map(float, [*chain(*below), *map(len, coatings), *chain(*layers)]))

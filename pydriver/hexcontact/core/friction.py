@@ -89,18 +89,12 @@ def row_ahead(lattice: Lattice, direction: float) -> list[int]:
 
 @dataclass(frozen=True)
 class Rolling:
-    """The contact travels over both bodies along a row of the lattice.
+    """The contact travels over both bodies along a row of the lattice."""
 
-    Parameters
-    ----------
-    direction
-        Angle of rolling from x [rad].
-    steady
-        Whether the steady state is solved at once; else the contact moves on by one spacing.
-    """
-
-    direction: float = 0.0
-    steady: bool = True
+    direction: float = 0.0  # angle of rolling from x [rad]
+    steady: bool = (
+        True  # whether the steady state is solved at once; else the contact moves on by one spacing
+    )
 
     def ahead(self, lattice: Lattice) -> list[int]:
         """Return columns and rows from a node to the one ahead."""

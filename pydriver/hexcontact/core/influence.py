@@ -48,8 +48,6 @@ Direction = Literal["normal", "x", "y"]
 
 _DEGREES = {"constant": (0, 0), "linear_x": (1, 0), "linear_y": (0, 1), "bilinear": (1, 1)}
 _DIRECTIONS = {"x": 1, "y": 2, "normal": 3}
-LOAD_SHAPES = {"point force": 1, "constant on the cell": 2, "pyramid": 3}
-"""Distributions of the load on a node."""
 
 
 class PyramidKernels(NamedTuple):
@@ -118,7 +116,7 @@ def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k
     >>> round(float(sum(triangle_integral(t, 0.5, 0.5, 1, 0, 0) for t in square)), 6)
     3.525494
     """
-    exponents = {name: _exponent(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
+    exponents = {name: integer(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
     return np.asarray(flat.triangle_integral(_vertices(vertices), *_points(x=x, y=y), **exponents))
 
 
@@ -196,24 +194,6 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
     kernels = pyramid_kernels(x, y)
     k1, kxx, kxy, kx, ky = kernels
     return PyramidFunctions(k1, kx, ky, kx, k1 + nu_0 * kxx, kxy, ky, kxy, k1 + nu_0 * kernels.Kyy)
-
-
-def load_potential(shape: str, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the integral of a load on a node over the distance of points, in spacings."""
-    number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
-    return np.asarray(flat.load_potential(number, *_points(x=x, y=y)))
-
-
-def displacement_errors(shape: str, nodes_in_radius: float, x: ArrayLike, y: ArrayLike) -> Array:
-    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface."""
-    number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
-    return np.asarray(flat.displacement_errors(number, nodes_in_radius, *_points(x=x, y=y)))
-
-
-def pressure_errors(nodes_in_radius: float) -> tuple[float, float]:
-    """Return the largest errors of Hertz's pressure, r < 0.8 a: constant on cells, linear between nodes."""
-    constant, linear = flat.pressure_errors(nodes_in_radius).tolist()
-    return constant, linear
 
 
 # --- below the surface: stress is positive in tension, z points into the body ------------------------------
@@ -337,10 +317,3 @@ def _shaped(values: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
     if array.shape != shape or not np.isfinite(array).all():
         raise DeckError(f"{name}: an array of shape {array.shape}, expected finite numbers of shape {shape}")
     return array
-
-
-def _exponent(value: int, name: str) -> int:
-    """Return an exponent; the core checks its bounds from 0 to 4."""
-    if abs(found := integer(value, name)) > 99:
-        raise DeckError(f"{name} = {found}: an integer from 0 to 4 expected")
-    return found

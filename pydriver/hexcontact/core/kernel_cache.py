@@ -148,7 +148,9 @@ def take_settings() -> None:
         given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE, SHARED)}
         memory, size = (_bytes(given[name] or _DEFAULTS[name], name) for name in (MEMORY, FOLDER_SIZE))
         _settings.bound, _settings.folder_size = memory, size
-        _settings.shared = _yes(given[SHARED], SHARED)
+        if given[SHARED].lower() not in ("", "no", "yes"):
+            raise DeckError(f"{SHARED} = {given[SHARED]!r}: expected yes or no")
+        _settings.shared = given[SHARED].lower() == "yes"
         flat.limit_kernels(memory)
         if given[FOLDER]:
             _settings.folder = Path(given[FOLDER]).expanduser().absolute()
@@ -177,13 +179,6 @@ def _bytes(value: float | str, name: str) -> int:
     if match is None or factor is None or float(match[1]) * factor >= 2**62:
         raise DeckError(f"{name} = {value!r}: expected a number of bytes such as 512 MB")
     return int(float(match[1]) * factor)
-
-
-def _yes(text: str, name: str) -> bool:
-    """Test whether an environment variable is "yes"."""
-    if text.lower() not in ("", "no", "yes"):
-        raise DeckError(f"{name} = {text!r}: expected yes or no")
-    return text.lower() == "yes"
 
 
 # --- the folder ---------------------------------------------------------------------------------------------

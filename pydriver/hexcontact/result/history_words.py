@@ -387,7 +387,10 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
         return headers, []
     if rolls(histories[-1]):
         return _power_table(histories, parts[-most:])
-    named = [(f"segment {row['segment']}", _worn_label(row, histories), row) for row in parts[-most:]]
+    for row in parts:
+        if _of_wear(last := histories[row["last_step"] - 1]):
+            row["label"] += f", {cycle_count(last['wear_cycles'])} cycles"
+    named = [(f"segment {row['segment']}", row["label"], row) for row in parts[-most:]]
     named += [(f"cycle {row['cycle']}", row["loading"], row) for row in loops[-most:]]
     shown, rows = 5 if loops else 4, []
     for name, words, row in named:
@@ -417,12 +420,6 @@ def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]
 def _of_wear(history: History) -> bool:
     """Test whether a step is the end of a wear cycle, which represents many cycles."""
     return float(history.get("wear_cycles", math.nan)) >= 0.0
-
-
-def _worn_label(row: Mapping[str, Any], histories: Sequence[History]) -> str:
-    """Return the label of a segment, with the number of cycles that it represents."""
-    last = histories[row["last_step"] - 1]
-    return f"{row['label']}, {cycle_count(last['wear_cycles'])} cycles" if _of_wear(last) else row["label"]
 
 
 def _span(histories: Sequence[History], before: int, end: int) -> dict[str, Any]:

@@ -68,22 +68,21 @@ def journal_of(path: Path) -> Path:
 
 @dataclasses.dataclass
 class Header:
-    """Metadata of a run; the deck of a session has its loads apart, and those of further steps follow."""
+    """Metadata of a run; in a session the loads of further steps follow behind the deck."""
 
     metadata: Metadata
-    loads: list[str] | None = None  # entries of [[load]] behind the deck; None: all are in it
-    steps: int = 0  # finished with these loads
+    steps: int | None = None  # whose loads the deck has; None: it has all
 
     def whole(self, controls: Iterable[Mapping[str, Any]]) -> Metadata:
         """Return the metadata of a run by the control data of its finished steps.
 
         A further segment has one entry of [[load]], which each of its steps has up to its own end.
         """
-        if self.loads is None:
+        if self.steps is None:
             return self.metadata
         known = list(controls)
         further = {control["segment"]: control["load"] for control in known[self.steps :]}
-        deck = "".join([self.metadata.deck, *self.loads, *further.values()])
+        deck = "".join([self.metadata.deck, *further.values()])
         return dataclasses.replace(self.metadata, deck=deck, planned_steps=max(len(known), self.steps))
 
 
@@ -97,7 +96,7 @@ def read_header(folder: Path) -> Header:
     path = folder / HEADER
     about = read_sealed(path)
     with reading(path, "the header of a journal"):
-        return Header(Metadata.from_plain(about["metadata"]), about["loads"], about["steps"])
+        return Header(Metadata.from_plain(about["metadata"]), about["steps"])
 
 
 def write_sealed(path: Path, about: Mapping[str, Any]) -> None:
@@ -140,12 +139,11 @@ def _digest(about: Any) -> str:
 class Journal:
     """The finished steps of a run, read from the disk one at a time.
 
-    Of large records that this process has written or read before (`ours`), each field is loaded at its use.
-    Restart data are read on request (`companions`).
+    Each field of a large record is loaded at its use, unless restart data are read, too (`companions`).
     """
 
-    def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
-        self.folder, self._companions, self._ours = folder, companions, ours
+    def __init__(self, folder: Path, companions: bool = False) -> None:
+        self.folder, self._companions = folder, companions
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         self._left = [folder / name for name in names if _is_left(name, folder)]
@@ -161,7 +159,7 @@ class Journal:
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            about, step = read_record(record, self._companions, lazy=self._ours)
+            about, step = read_record(record, self._companions, lazy=not self._companions)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
@@ -241,7 +239,7 @@ class Journal:
 
     def tidy(self) -> None:
         """Delete the reason of an early end, and remains of an interrupted write."""
-        for path in Journal(self.folder)._left:
+        for path in self._left:
             path.unlink(missing_ok=True)
 
 
@@ -291,11 +289,6 @@ def linked_folder(folder: Path) -> Path | None:
 def write_record(path: Path, run: str, step: Step) -> None:
     """Write the record of a step of a run."""
     fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
-    for name, values in fields.items():
-        if values.shape != step.lattice.shape:
-            raise ValueError(
-                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
-            )
     about = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,

@@ -31,12 +31,6 @@ COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
 _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
 _STEPS = 64**2  # nodes of a chunk with several steps
-_ATTRIBUTES = (  # all but those that describe the case
-    *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
-    *("lattice_spacing", "lattice_basis", "lattice_origin", "lattice_cell_ratio", "lattice_cell_angle"),
-    *("lattice_direction", "lattice_periodic"),
-    *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
-)
 
 
 def now() -> str:
@@ -71,22 +65,6 @@ class Metadata:
         require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
         return made(cls, {**values, **tuples})
-
-    @classmethod
-    def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Return the metadata from the attributes of a file; KeyError or ValueError for a fault."""
-        return cls(
-            title=str(attributes["title"]),
-            deck=str(attributes["deck"]),
-            fields=tuple(str(attributes["output_fields"]).split()),
-            every=int(attributes["output_every"]),
-            planned_steps=int(attributes["planned_steps"]),
-            parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
-            run=str(attributes["run"]),
-            created=str(attributes["created"]),
-            version=str(attributes["hexcontact_version"]),
-            resumed=tuple(str(attributes["history"]).splitlines()[1:]),
-        )
 
 
 class Layout:
@@ -132,10 +110,6 @@ class Layout:
             "col": np.asarray(self.window.cols, dtype="i4"),
         }
 
-    def coordinates(self) -> dict[str, NDArray[Any]]:
-        """Return the values of the coordinates."""
-        return self.axes() | {"x": np.asarray(self.window.x), "y": np.asarray(self.window.y)}
-
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Return the global attributes; `complete`: the result has all planned steps."""
         window, metadata = self.window, self.metadata
@@ -163,11 +137,6 @@ class Layout:
             "deck": metadata.deck,
         }
 
-    def keeps(self, position: int) -> bool:
-        """Test whether the output has the fields of the step at `position`."""
-        last = position == len(self.steps) - 1
-        return last or self.steps[position].number % self.metadata.every == 0
-
     @property
     def fields(self) -> list[str]:
         """Names of the quantities with a value at every node."""
@@ -186,7 +155,8 @@ class Layout:
 
     def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
         """Return a field in one step, padded to the whole window."""
-        if self.keeps(position) and name in step.fields:
+        kept = step.number % self.metadata.every == 0 or position == len(self.steps) - 1
+        if kept and name in step.fields:
             return self.padded(name, step)
         variable = self.variables[name]
         return np.full(self.window.shape, MISSING[name], dtype=variable.dtype)
@@ -245,20 +215,15 @@ def _union(windows: Sequence[Lattice]) -> Lattice:
     )
 
 
-def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
-    """Return the lattice window of the attributes and index coordinates of a file."""
-    x0, y0 = np.asarray(attributes.get("lattice_origin", (0.0, 0.0)), dtype=float).tolist()
-    cells = (f"lattice_{name}" for name in ("cell_ratio", "cell_angle"))  # older files have none
-    pattern = Pattern((x0, y0), *(float(attributes[name]) for name in cells if name in attributes))
-    spacing = float(attributes["lattice_spacing"])
-    pattern = pattern._replace(direction=float(attributes.get("lattice_direction", 0.0)))
-    found = pattern.window(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols))
-    return dataclasses.replace(found, periodic=bool(attributes.get("lattice_periodic", 0)))
-
-
 def lattice_of(dataset: Dataset) -> Lattice:
     """Return the lattice window of a result."""
-    return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
+    known, rows, cols = dataset.attrs, dataset["row"].values, dataset["col"].values
+    keys = {name: f"lattice_{name}" for name in Pattern._fields}  # of which older files have some
+    cells = {name: np.asarray(known[key], dtype=float).tolist() for name, key in keys.items() if key in known}
+    cells["origin"] = tuple(cells.get("origin", (0.0, 0.0)))
+    spacing, first = float(known["lattice_spacing"]), (int(rows[0]), int(cols[0]))
+    found = Pattern(**cells).window(spacing, *first, len(rows), len(cols))
+    return dataclasses.replace(found, periodic=bool(known.get("lattice_periodic", 0)))
 
 
 def step_of(dataset: Dataset, number: int) -> Dataset:
@@ -297,7 +262,9 @@ def assemble(
         for name in layout.fields
     }
     layout.fill(values, steps)
-    values |= layout.histories() | layout.coordinates() | layout.trials
+    values |= (
+        layout.histories() | layout.axes() | layout.trials | {"x": layout.window.x, "y": layout.window.y}
+    )
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

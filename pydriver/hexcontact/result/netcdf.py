@@ -40,7 +40,7 @@ from ..variables import (
     VARIABLES,
     names_where,
 )
-from .layout import COORDINATES, MISSING, Layout, Metadata, history_of, lattice_of
+from .layout import COORDINATES, MISSING, Layout, history_of, lattice_of
 from .step import Step
 
 if TYPE_CHECKING:
@@ -160,8 +160,8 @@ def _faults(dataset: Dataset) -> Iterator[str]:
         tomllib.loads(attributes["deck"])
     except tomllib.TOMLDecodeError as error:
         yield f"its deck is no TOML: {error}"
-    for place, number in enumerate(numbers):
-        step = dataset.isel(step=place)
+    for index, number in enumerate(numbers):
+        step = dataset.isel(step=index)
         fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
         history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
         kept = number % int(attributes["output_every"]) == 0 or number == numbers[-1]
@@ -421,7 +421,10 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
 
 def is_ours(path: Path) -> bool:
     """Test whether a file is a result of any version, which may be damaged."""
-    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= attributes(path).keys()
+    with path.open("rb") as file:
+        file.seek(-min(_SIZE, path.stat().st_size), os.SEEK_END)
+        sealed = file.read(len(_MARK)) == _MARK
+    return sealed or {"schema_version", "hexcontact_version"} <= attributes(path).keys()
 
 
 def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
@@ -478,7 +481,6 @@ def read_output(path: Path) -> Result:
         if not sealed and (fault := fault_of_result(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
-        _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
         return result
 
 
@@ -505,13 +507,6 @@ def seal(path: Path) -> None:
     with path.open("r+b") as file:
         size = file.seek(0, os.SEEK_END)
         file.write(_MARK + _digest(file.fileno(), size))
-
-
-def is_sealed(path: Path) -> bool:
-    """Test whether a file ends with a seal, which may be broken."""
-    with path.open("rb") as file:
-        file.seek(-min(_SIZE, path.stat().st_size), os.SEEK_END)
-        return file.read(len(_MARK)) == _MARK
 
 
 def check_seal(path: Path) -> bool:

@@ -77,7 +77,7 @@ class Store:
 
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
         self._at(path)
-        self.metadata = metadata
+        self.describe(records.Header(metadata))
         with self.writing("the journal"):
             self._lock, there = self._locked()
         try:
@@ -89,15 +89,11 @@ class Store:
 
     @property
     def metadata(self) -> Metadata:
-        """Metadata of the run; set ones are written with the next step."""
+        """Metadata of the run."""
         return self._header.whole(step.control for step in self.heads)
 
-    @metadata.setter
-    def metadata(self, metadata: Metadata) -> None:
-        self.describe(records.Header(metadata))
-
     def describe(self, header: records.Header) -> None:
-        """Set the metadata; of a session with its loads apart."""
+        """Set the metadata, which are written with the next step."""
         self._header, self._described = header, False
 
     @classmethod
@@ -168,7 +164,7 @@ class Store:
             records.remove_all(self.folder)
             return None
         if left is not None:
-            self.metadata = left
+            self.describe(records.Header(left))
             self._refuse_newer(not ours, trials.folder / records.HEADER)
             return None
         if not journal and output is not None:
@@ -204,7 +200,7 @@ class Store:
 
     def go_on(self, metadata: Metadata) -> None:
         """Prepare a reopened journal for further steps."""
-        self.metadata = metadata
+        self.describe(records.Header(metadata))
         with self.writing("the journal"):
             records.Journal(self.folder).tidy()
 
@@ -374,9 +370,9 @@ class Store:
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             heads = [step.head for step in steps()] if steps else self.heads
-            self.metadata = metadata or dataclasses.replace(self.metadata, planned_steps=len(heads))
+            about = metadata or dataclasses.replace(self.metadata, planned_steps=len(heads))
             with self.writing("the output"):
-                layout = Layout(self.metadata, heads, trials)
+                layout = Layout(about, heads, trials)
                 self._put_together(layout, (steps or self._steps)(), complete=True)
             self.finished = True
             records.remove_all(self.folder)
@@ -385,7 +381,7 @@ class Store:
     def _steps(self) -> Iterator[Step]:
         """Yield the finished steps: their records, and the last one as it is."""
         recorded = len(self.heads) - (self._last is not None)
-        yield from itertools.islice(records.Journal(self.folder, ours=True), recorded) if recorded else ()
+        yield from itertools.islice(records.Journal(self.folder), recorded) if recorded else ()
         if self._last is not None:
             yield self._last
 

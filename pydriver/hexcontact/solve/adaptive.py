@@ -35,7 +35,9 @@ class GivenPath:
         step is solved again on a larger window.
         """
         started, values = time.perf_counter(), target.values(begun)
-        while self.window.outgrown(reached := self.window.advance(state, target, values)):
+        while (reached := self.window.advance(state, target, values)).touches_rim:
+            if self.case.full_contact:
+                break
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
             state = self.window.carried(state, smaller)
         if not reached.converged:

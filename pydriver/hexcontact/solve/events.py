@@ -190,9 +190,6 @@ class Bar(Listener):
         self._live.stop()
 
 
-def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Listener:
-    """Return the display for `stream` (default: standard error): bar or lines, none if `quiet`."""
-    stream = stream or sys.stderr
-    if quiet:
-        return Listener()
-    return Bar() if stream is sys.stderr and stream.isatty() else Lines(stream)
+def reporter(quiet: bool = False) -> Listener:
+    """Return the display on standard error: bar or lines, none if `quiet`."""
+    return Listener() if quiet else Bar() if sys.stderr.isatty() else Lines(sys.stderr)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -209,7 +209,14 @@ class OnDisk:
                         f"the deck now leads to other lattices than those finished for {self._store.path}"
                     )
                 return solution
-        with self._opened(trial) as (store, last):
+        path, last = self._trials.path(trial.level, trial.copy), None
+        if Journal(journal_of(path)):
+            store, last = Store.reopened(path)
+            self._trials.check(self._store.metadata.run, store.metadata.run)
+        else:
+            store = Store(path, self._store.metadata, overwrite=True)
+        store.interim = False
+        with contextlib.closing(store):
             if last is not None:
                 found = f"{len(store.heads)} finished steps on {trial.name} of {self._store.path}"
                 check_step(case, last, found)
@@ -218,21 +225,6 @@ class OnDisk:
         with self._store.writing(f"{trial.name}"):
             self._trials.add(solution)
         return solution
-
-    @contextlib.contextmanager
-    def _opened(self, trial: Trial) -> Iterator[tuple[Store, Step | None]]:
-        """Open the journal of a lattice; yield its store and its last finished step."""
-        path, last = self._trials.path(trial.level, trial.copy), None
-        if Journal(journal_of(path)):
-            store, last = Store.reopened(path)
-            self._trials.check(self._store.metadata.run, store.metadata.run)
-        else:
-            store = Store(path, self._store.metadata, overwrite=True)
-        store.interim = False
-        try:
-            yield store, last
-        finally:
-            store.close()
 
     def finish(self, refinement: Refinement) -> None:
         """Write the output and delete the journal."""

@@ -28,8 +28,6 @@ from .events import Listener
 logger = logging.getLogger("hexcontact")
 logger.addHandler(logging.NullHandler())  # without it warnings go to standard error
 
-LEVELS = ("debug", "info", "warning", "error")
-
 
 def words(event: str, **values: Any) -> str:
     """Write an event and its values on one line: ``words("step", P=2.0)`` is ``"step P=2"``."""

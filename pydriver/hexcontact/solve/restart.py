@@ -74,7 +74,8 @@ def resume(
     """
     with reopened(path, case, overrides) as restart:
         if restart is None:
-            complete(path, case)
+            if (output := output_of(Path(path))).is_file():  # its tables may be missing
+                write_stresses(output, case)
             return checked(open_result(path))
         if restart.warning:
             warn(restart.warning, UserWarning)
@@ -84,13 +85,6 @@ def resume(
         with listener.following(restart.case.title, restart.case.planned_steps):
             run_into(restart.case, restart.store, listener, restart.before)
     return checked(open_result(restart.store.path))
-
-
-def complete(path: str | os.PathLike[str], case: Problem | None = None) -> None:
-    """Write the missing stresses of a finished run, which was killed before it wrote them."""
-    output = output_of(Path(path))
-    if output.is_file():
-        write_stresses(output, case)
 
 
 def was_begun(path: Path, case: Problem) -> bool:

@@ -45,9 +45,9 @@ def listeners(
     case: Problem, progress: Listener | bool | None = None, on_step: Callable[[Step], object] | None = None
 ) -> Listener:
     """Return the listeners of a run: log, display of progress, callback; arguments as `run`."""
-    shown = progress if isinstance(progress, Listener) else reporter(quiet=not progress)
+    shown = [progress] if isinstance(progress, Listener) else [reporter()] if progress else []
     callbacks = [Callback(on_step, refines=case.accuracy is not None)] if on_step else []
-    return Listeners(Log(), shown, *callbacks)
+    return Listeners(Log(), *shown, *callbacks)
 
 
 def run(

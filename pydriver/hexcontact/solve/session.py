@@ -263,7 +263,7 @@ class Session:
             self._resting = self._resting_in(step)
         if self._by_hand is not None:
             self._history = None
-            if len(self._steps) < self._by_hand.steps:
+            if len(self._steps) < (self._by_hand.steps or 0):
                 self._by_hand = self._described()
 
     def _next_step(self, entry: dict[str, Any] | None = None, part: int = 1, parts: int = 1) -> Step:
@@ -342,8 +342,8 @@ class Session:
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
         # on this lattice only
         others = {key: table for key, table in tables.items() if key not in ("accuracy", "load")}
-        about = dataclasses.replace(self._about, deck=as_toml({**others, "grid": grid}))
-        return Header(about, list(map(load_as_toml, loads)), len(self._steps))
+        deck = "".join([as_toml({**others, "grid": grid}), *map(load_as_toml, loads)])
+        return Header(dataclasses.replace(self._about, deck=deck), len(self._steps))
 
     # --- end ------------------------------------------------------------------------------------------------
 

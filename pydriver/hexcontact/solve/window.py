@@ -73,10 +73,6 @@ class Window:
         """Return the state at the end of a step on this window, if the next one needs it."""
         return None
 
-    def outgrown(self, solution: NormalSolution) -> bool:
-        """Test whether the contact reached the rim of the window, also in a part of the step only."""
-        return solution.touches_rim and not self.case.full_contact
-
     def grown(self, solution: NormalSolution, target: LoadStep) -> Self:
         """Return a larger window for a contact that reached the rim, unless the deck fixes the window."""
         if self.case.window_fixed:

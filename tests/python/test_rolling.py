@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexcontact import Case, DeckError, open_result, plotting, resume
+from hexcontact import Case, ConvergenceError, DeckError, open_result, plotting, resume
 from hexcontact.cli.printed import Summary
 from hexcontact.core.contact import ElasticPair, FlexibilityOperator
 from hexcontact.core.friction import FrictionalContact, Rolling
@@ -346,6 +346,12 @@ CREEP = {"rolling": "steady", "creepage_x": -0.001}
 def test_decks_that_make_no_sense_are_refused(loads: list[Any], tables: dict[str, Any], words: str) -> None:
     with pytest.raises(DeckError, match=words):
         Case.from_dict(ball(*loads, **tables))
+
+
+def test_a_torque_that_friction_cannot_carry_is_no_solution() -> None:
+    deck = ball({"rolling": "steady", "torque": 1.0, "tangential_load_y": 0.0})
+    with pytest.raises(ConvergenceError, match=r"gross sliding: .*\(creepage_x, creepage_y, spin\)"):
+        Case.from_dict(deck).run()
 
 
 def test_loads_by_hand_are_refused() -> None:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexcontact import Case, ConvergenceError, DeckError, open_result, plotting, resume
+from hexcontact import Case, ConvergenceError, DeckError, Study, open_result, plotting, resume
 from hexcontact.cli.printed import Summary
 from hexcontact.core.contact import ElasticPair, FlexibilityOperator
 from hexcontact.core.friction import FrictionalContact, Rolling
 from hexcontact.core.lattice import Lattice
+from hexcontact.plotting.history import study as draw_study
 from hexcontact.problem import plausibility
 from hexcontact.result.history_words import remarks, step_rows
 
@@ -567,3 +568,16 @@ def test_wear_of_a_pass_holds_the_volume_by_distance() -> None:
     )
     with pytest.raises(DeckError, match="expected a load step in which the bodies roll"):
         result.wear(1e-13, steps=[1])
+
+
+def test_study_of_creepages_draws_loads_and_power(tmp_path: Path) -> None:
+    deck = ball({"rolling": "steady", "creepage_y": 1e-4}, grid={"nodes_in_radius": 4})
+    axes = {"load.2.creepage_x": [-1e-3, 0.0, 1e-3], "load.2.spin": [0.0, 5.0]}
+    drawn = draw_study(Study(deck, axes, output=tmp_path / "creep.nc").run())
+    labels = [panel.get_ylabel() for panel in drawn.axes if panel.get_ylabel()]
+    assert [label.split(" (")[0] for label in labels] == [
+        "tangential load x",
+        "tangential load y",
+        "torque",
+        "creep power",
+    ]

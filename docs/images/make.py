@@ -153,6 +153,11 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "cattaneo_mindlin": lambda: plotting.tractions(solved("cattaneo_mindlin"), [13, 19, 25, 31, 37]),
     "interface": stiffening_interface,
     "path_dependence": path_dependence,
+    "rolling_dent_power": lambda: plotting.history(
+        solved("rolling_dent"),
+        ["max_pressure", "creepage_x", "dissipated_energy", "creep_power"],
+        "rolled_distance",
+    ),
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
     **runpy.run_path(str(HERE / "influence.py"))["FIGURES"],
     **runpy.run_path(str(HERE / "rolling.py"))["FIGURES"],

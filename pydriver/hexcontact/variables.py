@@ -154,7 +154,7 @@ VARIABLES: dict[str, Variable] = {
     "dissipation_density": _shear("J/m2", "energy by area dissipated so far", padding=0.0, title="Energy"),
     MOVED_GAP: _node(
         "m", "gap of the undeformed surfaces where those that move have come to",
-        title="Gap before loading", frictional=True, core="moves",
+        frictional=True, core="moves",
     ),
     "worn_depth": _node("m", "depth that is worn off both bodies", title="Worn depth", **_WORN),
     "worn_depth_step_change": _node("m", "change of the worn depth by jumps of half the size", **_WORN),

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from validation import rolling
 
-from hexcontact import Case, DeckError, open_result, plotting, resume
+from hexcontact import Case, ConvergenceError, DeckError, Study, open_result, plotting, resume
 from hexcontact.cli.printed import Summary
 from hexcontact.core.friction import Rolling
+from hexcontact.plotting.history import study as draw_study
 from hexcontact.problem import plausibility
 from hexcontact.result.history_words import remarks, step_rows
 
@@ -290,6 +291,12 @@ def test_decks_that_make_no_sense_are_refused(loads: list[Any], tables: dict[str
         Case.from_dict(ball(*loads, **tables))
 
 
+def test_a_torque_that_friction_cannot_carry_is_no_solution() -> None:
+    deck = ball({"rolling": "steady", "torque": 1.0, "tangential_load_y": 0.0})
+    with pytest.raises(ConvergenceError, match=r"gross sliding: .*\(creepage_x, creepage_y, spin\)"):
+        Case.from_dict(deck).run()
+
+
 def test_loads_by_hand_are_refused() -> None:
     session = Case.from_dict(ball(CREEP)).start()
     next(session)
@@ -503,3 +510,16 @@ def test_wear_of_a_pass_holds_the_volume_by_distance() -> None:
     )
     with pytest.raises(DeckError, match="expected a load step in which the bodies roll"):
         result.wear(1e-13, steps=[1])
+
+
+def test_study_of_creepages_draws_loads_and_power(tmp_path: Path) -> None:
+    deck = ball({"rolling": "steady", "creepage_y": 1e-4}, grid={"nodes_in_radius": 4})
+    axes = {"load.2.creepage_x": [-1e-3, 0.0, 1e-3], "load.2.spin": [0.0, 5.0]}
+    drawn = draw_study(Study(deck, axes, output=tmp_path / "creep.nc").run())
+    labels = [panel.get_ylabel() for panel in drawn.axes if panel.get_ylabel()]
+    assert [label.split(" (")[0] for label in labels] == [
+        "tangential load x",
+        "tangential load y",
+        "torque",
+        "creep power",
+    ]

@@ -30,6 +30,7 @@ _UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
 _JUMP = 1e-3  # of another creepage over the range of a curve, where it ends
 _MANY = 60  # steps beyond which curves have no markers
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
+_CONSTANT = 1e-6  # spread over value of a quantity that does not change
 _BOUNDS["creep_power"] = "creep_power_error"
 
 
@@ -177,6 +178,10 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
+    points = np.concatenate([np.asarray(line.get_xydata(), float) for line in axes.lines])
+    drawn = points[np.isfinite(points).all(axis=1), 1]
+    if drawn.size and np.ptp(drawn) < _CONSTANT * np.abs(drawn).max():  # rounding errors
+        axes.set_ylim(*sorted((0.0, 1.2 * float(drawn[0]))))
     named = _spelled(names[0] if len(names) == 1 else _common(names))
     axes.set(xlabel=label, ylabel=style.titled(named, unit))
     if len(names) > 1:

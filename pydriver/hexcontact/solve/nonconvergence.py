@@ -122,7 +122,8 @@ def _sliding(
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
-    expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
+    motions = ", ".join(motion for _, motion in [*target.drives.values()][1:])
+    expected = f"expected a smaller load, or a prescribed motion in its place ({motions})"
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
 
 

@@ -27,7 +27,7 @@ module hexcontact
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory, spectra_of
   use hc_contact_state, only: contact_state_t, new_friction_state, separated, stick, slip, &
                               load_target_t, force_control, displacement_control, about_z, n_motion, touches_rim, &
                               not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, &

@@ -106,20 +106,22 @@ contains
   end subroutine set_gap
 
   !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
-  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, unlike, periodic)
+  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, n_spectrum, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike; the window repeats
-    logical, intent(in) :: unlike, periodic
+    !> Number of spectra of the two bodies
+    integer, intent(in) :: n_spectrum
+    !> The window repeats
+    logical, intent(in) :: periodic
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: given
 
     ! initial gap, candidates
     given = 12*int(extent(1), long)*extent(2)
-    frictional_contact_memory = given + operators_memory(extent, threads, unlike, .false., periodic) &
-                                + (given + operators_memory(extent, threads, unlike, .true., periodic))/3
+    frictional_contact_memory = given + operators_memory(extent, threads, n_spectrum, .false., periodic) &
+                                + (given + operators_memory(extent, threads, n_spectrum, .true., periodic))/3
   end function frictional_contact_memory
 
   !> Count the additional bytes while a step is solved; the coarse lattices have done by then, and its record takes less.

@@ -57,7 +57,7 @@ contains
   !> Count the bytes of a problem while a step is solved on the window; parts, and their spectra in the cache, take
   !> more the more steps the contact grows in.
   pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, threads, &
-                                                                     unlike, periodic)
+                                                                     n_spectrum, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact
@@ -68,10 +68,12 @@ contains
     logical, intent(in) :: coupled
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike; the window repeats
-    logical, intent(in) :: unlike, periodic
+    !> Number of spectra of the two bodies
+    integer, intent(in) :: n_spectrum
+    !> The window repeats
+    logical, intent(in) :: periodic
 
-    windowed_friction_memory = frictional_contact_memory(extent, threads, unlike, periodic) &
+    windowed_friction_memory = frictional_contact_memory(extent, threads, n_spectrum, periodic) &
                                + friction_step_memory(extent, n_contact, n_force, coupled)
   end function windowed_friction_memory
 

@@ -45,7 +45,7 @@ module hc_edge_tractions
 contains
 
   !> Count the bytes that the correction takes, for a window and a contact of given sizes.
-  pure integer(selected_int_kind(18)) function edge_tractions_memory(extent, n_contact, sheared, threads, unlike)
+  pure integer(selected_int_kind(18)) function edge_tractions_memory(extent, n_contact, sheared, threads, n_spectrum)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact
@@ -54,8 +54,8 @@ contains
     logical, intent(in) :: sheared
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike
-    logical, intent(in) :: unlike
+    !> Number of spectra of the two bodies
+    integer, intent(in) :: n_spectrum
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of one of integers or logical values
     integer, parameter :: field = 8, half = 4
@@ -71,7 +71,8 @@ contains
     everywhere = everywhere + merge(6, 1, sheared)*field + (3*solved + 2*solved**2)*field + solved*half
     ! vectors of conjugate gradients, constraints twice
     packed = (7*solved + 2*solved**2)*field
-    edge_tractions_memory = everywhere*extent(1)*extent(2) + packed*n_contact + fft_memory(extent, .not. sheared, threads, unlike) &
+    edge_tractions_memory = everywhere*extent(1)*extent(2) + packed*n_contact &
+                            + fft_memory(extent, .not. sheared, threads, n_spectrum) &
                             + merge(2, 1, sheared)*edge_residue_memory(n_contact, tuning%samples, n)
   end function edge_tractions_memory
 

@@ -86,15 +86,15 @@ contains
   end subroutine new_dense_flexibility
 
   !> Count the bytes that the influence coefficients and the matrix of a contact take, factorized.
-  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only, unlike)
+  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only, n_spectrum)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact
     integer, intent(in) :: n_contact
     !> Contact without friction
     logical, intent(in) :: normal_only
-    !> The materials are unlike; absent: they are
-    logical, intent(in), optional :: unlike
+    !> Number of spectra of the two bodies; absent: the most
+    integer, intent(in), optional :: n_spectrum
     integer, parameter :: long = selected_int_kind(18)
     !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
     integer(long), parameter :: buffers = 3000000
@@ -114,9 +114,9 @@ contains
       dense_memory = dense_memory + 8*min(n + nint(13*sqrt(real(n, wp)), long), n_window)**2/2
     else
       slides = .true.
-      if (present(unlike)) slides = unlike
+      if (present(n_spectrum)) slides = n_spectrum > 4
       ! with those of the coarse lattice; in single precision the factor, and the complement of the sliding nodes, half touched
-      dense_memory = dense_memory + 2*n_block*4*n_window + 5*fft_memory(extent, .false., 1, unlike)/4 &
+      dense_memory = dense_memory + 2*n_block*4*n_window + 5*fft_memory(extent, .false., 1, n_spectrum)/4 &
                      + merge(fifths(2), fifths(1), slides)*n**2/5 + (vectors + merge(pages(2), pages(1), slides))*n
     end if
   end function dense_memory

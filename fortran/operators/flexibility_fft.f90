@@ -17,10 +17,10 @@ module hc_flexibility_fft
   implicit none
   private
 
-  public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
+  public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory, spectra_of
 
   !> Blocks that have spectra, the odd ones last, where that of yy is a multiple of the normal one less that of xx.
-  integer, parameter :: with_trace(5) = [1, 2, 3, 5, 6], n_spectrum = size(with_trace)
+  integer, parameter :: with_trace(5) = [1, 2, 3, 5, 6]
   !> Even blocks of all
   integer, parameter :: n_even = 4
   !> With a trace: spectrum that stands at (onto, from), negative where its sign is reversed
@@ -95,10 +95,8 @@ contains
       source%transformed = with_trace
       first_odd = n_even
     end if
-    n_kernel = merge(1, size(source%transformed), only_normal)
-    ! the odd blocks of like materials vanish
-    if (.not. medium%couples()) n_kernel = min(n_kernel, first_odd - 1)
-    operator%at_once = components_at_once(n_kernel, first_odd)
+    n_kernel = merge(1, spectra_of(medium), only_normal)
+    operator%at_once = components_at_once(n_kernel)
     call new_convolution(operator%convolution, lattice%extent, transform_length(lattice), n_kernel, operator%at_once, &
                          shared, error, first_odd=first_odd)
     if (allocated(error)) return
@@ -159,42 +157,51 @@ contains
     end associate
   end subroutine set_periodic_spectra
 
-  !> Count the bytes that the operator takes, for a window of the given size; bodies without a trace have a spectrum more.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared, periodic)
+  !> Return the number of spectra of two bodies: 3 if they are alike, since the odd blocks vanish, else 5; one more without a trace.
+  pure integer function spectra_of(medium)
+    class(elastic_medium_t), intent(in) :: medium
+
+    spectra_of = merge(5, 3, medium%couples()) + merge(0, 1, medium%trace() > 0.0_wp)
+  end function spectra_of
+
+  !> Count the bytes that the operator takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, n_spectrum, shared, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> The operator is applied to the pressure alone, for the gap alone
     logical, intent(in) :: normal_only
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike: the odd blocks do not vanish; absent: they are
-    logical, intent(in), optional :: unlike
+    !> Number of spectra of all components; absent: the most
+    integer, intent(in), optional :: n_spectrum
     !> Row transforms share the memory of others; absent: they have their own
     logical, intent(in), optional :: shared
     !> The window repeats; absent: it does not
     logical, intent(in), optional :: periodic
     integer :: n_kernel, n_component
 
-    n_kernel = merge(1, n_spectrum, normal_only)
-    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, n_even - 1), unlike)
-    n_component = components_at_once(n_kernel, n_even)
+    n_kernel = merge(1, n_block, normal_only)
+    if (present(n_spectrum)) n_kernel = min(n_kernel, n_spectrum)
+    n_component = components_at_once(n_kernel)
     if (present(shared)) n_component = merge(0, n_component, shared)
     fft_memory = convolution_memory(extent, padded_length(extent, periodic), n_kernel, n_component, threads)
   end function fft_memory
 
   !> Return the components that are multiplied together: without odd blocks, pressure and shear traction are apart.
-  pure integer function components_at_once(n_kernel, first_odd)
-    !> Number of spectra, and first one that is odd
-    integer, intent(in) :: n_kernel, first_odd
+  pure integer function components_at_once(n_kernel)
+    !> Number of spectra
+    integer, intent(in) :: n_kernel
 
     components_at_once = 1
-    if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel >= first_odd)
+    if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel > n_even)
   end function components_at_once
 
   !> Count the additional bytes while the full operator is set up.
-  pure integer(selected_int_kind(18)) function fft_setup_memory(extent)
+  pure integer(selected_int_kind(18)) function fft_setup_memory(extent, n_spectrum)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
+    !> Number of spectra
+    integer, intent(in) :: n_spectrum
 
     fft_setup_memory = transform_memory(extent, padded_length(extent), n_spectrum)
   end function fft_setup_memory

@@ -85,17 +85,17 @@ contains
   end subroutine new_operators
 
   !> Count the bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared, periodic)
+  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, n_spectrum, shared, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
-    !> The materials are unlike
-    logical, intent(in) :: unlike
+    !> Number of spectra of the two bodies
+    integer, intent(in) :: n_spectrum
     !> Row transforms share the memory of those of a finer lattice; the window repeats
     logical, intent(in) :: shared, periodic
 
-    operators_memory = fft_memory(extent, .false., threads, unlike, shared, periodic) &
+    operators_memory = fft_memory(extent, .false., threads, n_spectrum, shared, periodic) &
                        + preconditioner_memory(extent, threads, .false., shared=.true.) &
                        + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory

@@ -12,6 +12,7 @@ module hc_f2py_edges
   use hc_lattice, only: lattice_t
   use hc_friction_law, only: friction_law_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_flexibility_fft, only: spectra_of
   use hc_edge_tractions, only: correct_at_edges, edge_tractions_memory
   use hc_traction_field, only: traction_field_t, new_traction_field, n_part
   use hc_stress_at_edges, only: edge_traction_t, correct_stress_at_edges
@@ -131,7 +132,7 @@ contains
     corrected = traction
     space = space_over(lattice%extent)
     call require_memory(edge_tractions_memory(lattice%extent, count(zones(:, :, 1)), &
-                                              friction%resists() .and. friction%is_bounded(), space%threads, bodies%couples()), &
+                                              friction%resists() .and. friction%is_bounded(), space%threads, spectra_of(bodies)), &
                         error, space%threads)
     if (allocated(error)) return
     call correct_at_edges(lattice, edges_of(lattice, fields, zones), bodies, zones(:, :, 1), zones(:, :, 3), friction, corrected, &

@@ -10,7 +10,7 @@ module hc_f2py_problems
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: check_operator
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory, spectra_of
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t
   use hc_contact_state, only: contact_state_t, allocate_fields, field_of, n_load
@@ -71,8 +71,9 @@ contains
 
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
-    if (method == fft_based) bytes = fft_setup_memory(lattice%extent) &
-                                     + fft_memory(lattice%extent, .false., space%threads, periodic=lattice%is_periodic())
+    if (method == fft_based) bytes = fft_setup_memory(lattice%extent, spectra_of(bodies)) &
+                                     + fft_memory(lattice%extent, .false., space%threads, spectra_of(bodies), &
+                                                  periodic=lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call check_operator(lattice, bodies, error, threads)
     if (.not. allocated(error)) then
@@ -153,7 +154,7 @@ contains
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
-                                                              space%threads, bodies%couples(), lattice%is_periodic())
+                                                              space%threads, spectra_of(bodies), lattice%is_periodic())
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, &
                                                           error, law)

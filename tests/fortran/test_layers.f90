@@ -7,6 +7,7 @@ module test_layers
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
   use hc_layer_response, only: layer_t, layered_body_t, n_response, of_normal, of_along, of_across, of_coupling, n_wave, &
                                ll_p, tt_p, zz_p, lz_p, ll_q, zz_q, lz_q, tz_t, lt_t, uz_p, ul_p, uz_q, ul_q, ut_t
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, spectra_of
   use hc_interior_points, only: fields_at_points
   use hc_interior_planes, only: interior_planes_t, new_interior_planes
   use hc_depth_fields, only: half_space_of
@@ -44,6 +45,7 @@ contains
       new_test('symbols', test_symbols), &
       new_test('mean_on_rigid_bases', test_mean), &
       new_test('like_bodies', test_like), &
+      new_test('number_of_spectra', test_spectra), &
       new_test('both_methods', test_methods), &
       new_test('refused', test_refused) &
     ]
@@ -173,6 +175,38 @@ contains
     call fields_at_points(lattice, traction, 1, body, points, u, s, raised)
     call check_raised(error, raised, status%invalid_input, 'points in a rigid base')
   end subroutine test_stress
+
+  !> The memory is counted for as many spectra as there are.
+  subroutine test_spectra(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(material_t), parameter :: soft = material_t(1.0_wp, 0.3_wp), hard = material_t(4.0_wp, 0.2_wp)
+    type(lattice_t) :: lattice
+    type(layered_pair_t) :: coated
+    type(elastic_pair_t) :: plain
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 4], error)
+    if (.not. allocated(error)) call new_elastic_pair(plain, soft, soft, error)
+    if (.not. allocated(error)) call expect(plain, 3)
+    if (.not. allocated(error)) call new_elastic_pair(plain, soft, hard, error)
+    if (.not. allocated(error)) call expect(plain, 5)
+    if (.not. allocated(error)) call new_layered_pair(coated, [soft, soft], [coating_t(2.0_wp, hard)], [coating_t(2.0_wp, hard)], &
+                                                     error)
+    if (.not. allocated(error)) call expect(coated, 4)
+    if (.not. allocated(error)) call new_layered_pair(coated, [soft, soft], [coating_t(2.0_wp, hard)], [coating_t :: ], error)
+    if (.not. allocated(error)) call expect(coated, 6)
+
+  contains
+
+    subroutine expect(medium, n)
+      class(elastic_medium_t), intent(in) :: medium
+      integer, intent(in) :: n
+      type(fft_flexibility_t) :: operator
+
+      call new_fft_flexibility(operator, lattice, medium, error)
+      if (allocated(error)) return
+      call check(error, real([spectra_of(medium), size(operator%convolution%spectrum, 3)], wp), real([n, n], wp), 0.0_wp, 'spectra')
+    end subroutine expect
+  end subroutine test_spectra
 
   !> A layer of the material below is none: all blocks are those of half-spaces.
   subroutine test_equal(error)

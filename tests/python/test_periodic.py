@@ -195,6 +195,49 @@ def test_boxes_and_cycles_below() -> None:
     assert plane["crossland"].values[0, ::9, ::7] == pytest.approx(alone["crossland"].values, rel=1e-6)
 
 
+def test_wear_of_an_asperity_far_from_the_next() -> None:
+    """Beside the free window, as for the pressure; all that wears is on the gap."""
+    radius, a, spacings = 10e-3, 0.1e-3, 6
+    load = 4 * E_STAR * a**3 / (3 * radius)
+    shear = 0.3 * load
+    cycle = [{"tangential_load_x": -shear, "steps": 4}, {"tangential_load_x": shear, "steps": 4}]
+    loads = [
+        {"normal_load": load},
+        {"tangential_load_x": shear, "steps": 2},
+        {"label": "back", "path": cycle},
+    ]
+
+    def worn(cells: int, periodic: bool) -> tuple[np.ndarray, xarray.Dataset]:
+        n = cells * spacings
+        lattice = Lattice(a / spacings, -n // 2, -n // 2, n, n, cell_angle=math.pi / 2, periodic=periodic)
+        case = Case(
+            body_1=STEEL,
+            body_2=STEEL,
+            gap=lambda x, y: (x * x + y * y) / (2 * radius),
+            lattice=lattice,
+            friction_coefficient=0.5,
+            loads=loads,
+            wear={"coefficient_1": 1e-13, "cycle": "back", "cycles": 10, "jump": 1},
+        )
+        last = case.run().dataset.isel(step=-1)
+        middle = slice(n // 2 - 12, n // 2 + 12)
+        return last["worn_depth"].values[middle, middle], last
+
+    (alone, _), (near, _), (far, last) = worn(8, False), worn(8, True), worn(16, True)
+    assert alone.max() > 1e-11
+    change = [abs(field - alone).max() / alone.max() for field in (near, far)]
+    assert change[1] < 6e-3
+    assert change[0] / change[1] > 6
+    mean = last["initial_gap"].mean() + last["worn_depth"].mean()
+    assert float(last["mean_gap"]) == pytest.approx(float(mean - last["approach"]), rel=1e-5)
+    with pytest.raises(DeckError, match="expected mean_pressure or approach beside \\[wear\\]"):
+        waves(
+            friction_coefficient=0.5,
+            loads=[{"mean_gap": 1e-7}, {"label": "back", "path": cycle}],
+            wear={"coefficient_1": 1e-13, "cycle": "back", "cycles": 10},
+        )
+
+
 def test_steps_one_by_one() -> None:
     case = waves(friction_coefficient=0.3, loads=[{"mean_pressure": 0.1 * FULL}, {"mean_traction_x": 1e6}])
     with case.start() as session:

@@ -127,6 +127,11 @@ class ElasticPair:
         """Ratio of the additional tangential to the normal compliance."""
         return self.lambda_5 / self.lambda_1
 
+    @property
+    def spectra(self) -> int:
+        """Number of spectra of the operator of pressure and shear tractions."""
+        return 3 + 2 * (self.beta != 0.0)
+
     def as_array(self) -> Array:
         """Return the three constants as an array [1/Pa]."""
         return np.array([self.lambda_1, self.lambda_2, self.lambda_5])
@@ -160,6 +165,11 @@ class CoatedPair(ElasticPair):
     def beta(self) -> float:
         """Largest coupling of normal and tangential contact."""
         return self.coupling
+
+    @property
+    def spectra(self) -> int:
+        """Number of spectra: that of yy does not follow from the others."""
+        return super().spectra + 1
 
     def as_array(self) -> Array:
         """Return the constants of the bodies."""
@@ -352,13 +362,14 @@ def memory_needed(
     *,
     contact: int | None = None,
     part: Literal["problem", "operator", "set-up of the operator"] = "problem",
+    spectra: int = 5,
     threads: int = 1,
     periodic: bool = False,
 ) -> int:
     """Return the memory (bytes) of a frictionless problem on a window, which may repeat."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.normal_memory(*window, code, *checked(threads=threads), periodic))
+    return int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:

@@ -30,10 +30,10 @@ _Zone = tuple[Array, Mask, bool]  # fields and zones of the core; whether it is 
 
 
 def tractions_memory(
-    n_row: int, n_col: int, contact: int, sheared: bool, unlike: bool, threads: int = 0
+    n_row: int, n_col: int, contact: int, sheared: bool, spectra: int, threads: int = 0
 ) -> int:
     """Return the memory (bytes) of `ContactEdges.tractions`, besides its arguments and its result."""
-    return int(flat.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
+    return int(flat.memory_of_edges(n_col, n_row, contact, sheared, spectra, threads))
 
 
 class Edge(NamedTuple):

@@ -392,10 +392,10 @@ def memory_needed(
     contact: int | None = None,
     loads: int = 4,
     coupled: bool = True,
-    unlike: bool = True,
+    spectra: int = 5,
     threads: int = 1,
     periodic: bool = False,
 ) -> int:
     """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, unlike, *checked(threads=threads), periodic))
+    return int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))

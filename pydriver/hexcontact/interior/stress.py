@@ -348,7 +348,7 @@ def memory_needed(
 
 
 def tractions_needed(
-    lattice: Lattice, steps: int, contact: int, sheared: bool, unlike: bool, source: str | None = None
+    lattice: Lattice, steps: int, contact: int, sheared: bool, spectra: int, source: str | None = None
 ) -> int:
     """Return the memory (bytes) of the tractions of load steps, with their correction at the edges."""
     field = 8 * lattice.size
@@ -356,7 +356,7 @@ def tractions_needed(
     if source == "nodes":
         return loaded
     each, all_of_them = _CORRECTED_ARRAYS
-    correction = _EDGE_ARRAYS * field + tractions_memory(*lattice.shape, contact, sheared, unlike)
+    correction = _EDGE_ARRAYS * field + tractions_memory(*lattice.shape, contact, sheared, spectra)
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 

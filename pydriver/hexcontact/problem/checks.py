@@ -129,9 +129,12 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
         yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
     if tables["solver"].method == "direct":
         yield ("solver", "method"), f'expected "fft" {whole}'
-    for name in ("wear", "accuracy"):
-        if tables[name]:
-            yield (name,), f"is not available yet {whole}"
+    if tables["accuracy"]:
+        yield ("accuracy",), f"is not available yet {whole}"
+    if tables["wear"]:
+        for key, segment in _segments(tables["load"]):
+            if segment.mean_gap is not None:
+                yield (*key, "mean_gap"), "expected mean_pressure or approach beside [wear], which changes it"
     for place, table in enumerate(tables["stress"]):
         if table.source == "edges":
             yield ("stress", place, "source"), f'expected "nodes" {whole}: its contact has no known edge'

@@ -321,7 +321,7 @@ class Problem:
             contact=nodes,
             loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
             coupled=self.coupled,
-            unlike=self.pair.beta != 0.0,
+            spectra=self.pair.spectra,
             threads=memory.threads(),
             periodic=lattice.periodic,
         )

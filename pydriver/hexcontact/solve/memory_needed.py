@@ -79,11 +79,12 @@ def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str |
 
     mu = case.friction_coefficient  # nan where it varies
     sheared = math.isnan(mu) or 0.0 < mu < math.inf
-    nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
+    nodes, spectra = case.contact_nodes(lattice), case.pair.spectra
     used = "nodes" if case.deck.interface or lattice.periodic else source
-    needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)
+    needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, spectra, used)
     # beside the spectra of the solver, which are kept
-    return needed + case.frictional * contact.memory_needed("fft", *lattice.shape, part="operator")
+    kept = contact.memory_needed("fft", *lattice.shape, part="operator", spectra=spectra)
+    return needed + case.frictional * kept
 
 
 def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
@@ -95,7 +96,12 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
     operator, set_up = (
         contact.memory_needed(
-            "fft", *lattice.shape, part=part, threads=memory.threads(), periodic=lattice.periodic
+            "fft",
+            *lattice.shape,
+            part=part,
+            spectra=5 + (case.pair.spectra % 2 == 0),  # a body is unlike a rigid one
+            threads=memory.threads(),
+            periodic=lattice.periodic,
         )
         for part in ("operator", "set-up of the operator")
     )

@@ -20,8 +20,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 from typer.testing import CliRunner
 
-from hexcontact import Case, Result, plotting
+from hexcontact import Case, Result, Study, plotting
 from hexcontact.cli.app import app
+from hexcontact.plotting.history import study as draw_study
 
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"
@@ -141,6 +142,13 @@ def ends_of_paths(study: xarray.Dataset) -> Figure:
     return figure
 
 
+def rough_areas() -> Figure:
+    """Draw contact area and mean gap over the load, by the study of rough surfaces."""
+    with tempfile.TemporaryDirectory() as folder:
+        study = Study.from_toml(CASES / "study_rough.toml", output=Path(folder) / "study.nc").run()
+        return draw_study(study.load(), ["contact_area", "mean_gap"], over="p")
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "hertz_spheres": lambda: plotting.overview(solved("hertz_spheres")),
     "contact_boundary": lambda: plotting.contact_boundary(solved("hertz_spheres", grid__spacing="0.1 mm")),
@@ -158,6 +166,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         ["max_pressure", "creepage_x", "dissipated_energy", "creep_power"],
         "rolled_distance",
     ),
+    "rough_areas": rough_areas,
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
     **runpy.run_path(str(HERE / "influence.py"))["FIGURES"],
     **runpy.run_path(str(HERE / "rolling.py"))["FIGURES"],

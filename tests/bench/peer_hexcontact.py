@@ -20,6 +20,7 @@ from bench.square_window import (
     clock,
     main,
     relative_difference,
+    rough_window,
     shear_errors,
 )
 from hexcontact.core import kernel_cache
@@ -130,6 +131,34 @@ def cattaneo_mindlin(
     }
 
 
+def rough(side: int, tolerance: float, repeats: int, threads: int = 1) -> dict[str, Any]:
+    """A rough surface in a window that repeats, from nothing each time."""
+    contact = rough_window(side)
+    lattice = Lattice(1.0 / side, 0, 0, side, side, cell_angle=np.pi / 2, periodic=True)
+    pair = ElasticPair(1 / np.pi, 0.0, 0.0)
+    setup, problem = best_of(repeats, lambda: NormalContact(lattice, pair, contact.gap, threads=threads))
+    solve, solution = best_of(
+        repeats, lambda: problem.solve(normal_load=contact.mean_pressure, tolerance=tolerance)
+    )
+    if not solution.converged:
+        raise RuntimeError(f"not converged, R_n = {solution.residual_normal:.1e}")
+    return {
+        "setup": setup,
+        "solve": solve,
+        "iterations": solution.sweeps,
+        "pairs": 3 * solution.operator_applications,
+        "pair": transforms(side),
+        "own_residual": solution.residual_normal,
+        **contact.errors(solution.pressure, solution.gap),
+    }
+
+
+def transforms(side: int) -> float:
+    """Return the seconds of a pair of real transforms in double precision by numpy, on one thread."""
+    field = np.random.default_rng(0).standard_normal((side, side))
+    return best_of(3, lambda: np.fft.irfft2(np.fft.rfft2(field), s=field.shape))[0]
+
+
 def friction(
     name: str, side: int, threads: int, repeats: int, loose: bool = False, setups: int = 1
 ) -> dict[str, Any]:
@@ -214,6 +243,7 @@ if __name__ == "__main__":
         {
             "hertz": hertz,
             "cattaneo_mindlin": cattaneo_mindlin,
+            "rough": rough,
             "friction": friction,
             "normal": normal,
             "direct": direct,

@@ -26,6 +26,8 @@ ENOUGH = 10.0
 """Seconds after which a code is not run again."""
 
 SIZES = (256, 512, 1024, 2048)
+ROUGH_SIZES = (256, 512, 1024)
+ROUGH_TOLERANCE = 1e-6
 SHEARED_SIZES = (64, 128, 256, 512)
 TURNS = 3
 GROWTH = 6.0
@@ -154,6 +156,7 @@ def measure(
         sheared = (64,) if quick else SHEARED_SIZES
         pair = [code for code in codes if code.label in ("hexcontact", "aspher")]
         tables.append(cattaneo_mindlin(pair, sheared))
+    tables.append(rough(codes, [n for n in sizes or ROUGH_SIZES if n <= largest]))
     tables[0].remarks += absent
     return tables
 
@@ -211,6 +214,41 @@ def hertz(codes: list[Entry], sizes: Sequence[int]) -> list[Table]:
                 *at_its_error(side, best),
             )
     return [summary, table]
+
+
+def rough(codes: list[Entry], sizes: Sequence[int]) -> Table:
+    """A rough surface in a window that repeats: times, residuals, and area and mean gap of all codes."""
+    table = Table(
+        "A rough surface in a window that repeats, without friction, one thread: seconds",
+        [
+            *("window and code", "set-up", "solve", "solve ÷ ours", "total ÷ ours", "iterations"),
+            *("R_n", "A/A0", "mean gap/rms height"),
+        ],
+        remarks=[
+            "Self-affine, H = 0.8, wavelengths of 16 to a quarter of the nodes, mean pressure 0.05 E* h'."
+        ],
+    )
+    lines = [Entry(code.label, code.python, code.script, ROUGH_TOLERANCE) for code in codes]
+    for side in sizes:
+        answers = side_by_side(table, lines, side, {"problem": "rough", "side": side})
+        ours = answers["hexcontact"]
+        for label, answer in answers.items():
+            if "failed" in answer:
+                table.add(f"{side}² {label}", answer["failed"])
+                continue
+            total, our_total = (a["setup"] + a["solve"] for a in (answer, ours))
+            table.add(
+                f"{side}² {label}",
+                *(seconds(answer[name]) for name in ("setup", "solve")),
+                *(f"{answer['solve'] / ours['solve']:.2f}", f"{total / our_total:.2f}"),
+                str(answer.get("iterations", "")),
+                *(
+                    f"{answer['residual']:.0e}",
+                    f"{answer['contact_fraction']:.4f}",
+                    f"{answer['mean_gap']:.4f}",
+                ),
+            )
+    return table
 
 
 def at_its_error(side: int, other: dict[str, Any]) -> tuple[str, str]:

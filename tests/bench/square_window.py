@@ -89,6 +89,37 @@ def square_window(n: int, fraction: float, shift: Sequence[float] = (0.0, 0.0)) 
     return HertzContact(x, y, float(np.sqrt(fraction / np.pi)), h * h, float(own))
 
 
+@dataclass(frozen=True)
+class RoughWindow:
+    """One period, of side 1, of a rough surface on a flat; effective modulus 1."""
+
+    gap: Array
+    mean_pressure: float
+
+    def errors(self, pressure: Array, gap: Array) -> dict[str, float]:
+        """Residual of the discrete problem, and numbers to compare codes with."""
+        # uniform pressure 1 on a square, at its center (Love); the same scale for all codes
+        own = 4 * np.log(1 + np.sqrt(2)) / len(self.gap) / np.pi
+        unbalanced = pressure - np.maximum(0.0, pressure - gap / own)
+        return {
+            "residual": float(np.abs(unbalanced).max() / pressure.max()),
+            "contact_fraction": float(np.mean(pressure > 0)),
+            "mean_gap": float(gap.mean() / np.std(self.gap)),
+            "mean_pressure": float(pressure.mean() / self.mean_pressure - 1),
+        }
+
+
+def rough_window(n: int, seed: int = 1) -> RoughWindow:
+    """Return a self-affine surface, H = 0.8, waves of 16 to n/4 spacings, under 0.05 E* times its slope."""
+    number = np.hypot(*np.meshgrid(np.fft.fftfreq(n, 1 / n), np.fft.rfftfreq(n, 1 / n), indexing="ij"))
+    share = np.where((number >= 4) & (number <= n / 16), np.maximum(number, 1.0) ** -1.8, 0.0)
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((n, n))) * share
+    twice = np.where((np.arange(n // 2 + 1) % (n // 2)) == 0, 1.0, 2.0)
+    slope = float(np.sqrt(np.sum(twice * (2 * np.pi * number) ** 2 * np.abs(noise) ** 2)) / n**2)
+    heights = np.fft.irfft2(noise, s=(n, n)) * (0.1 / slope)
+    return RoughWindow(heights - heights.min(), 0.05 * 0.1)
+
+
 def shear_errors(
     contact: HertzContact, stick: Array, traction_x: Array, mu: float, share: float
 ) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -621,6 +622,65 @@ def test_a_friction_map_and_a_height_map_are_read_by_one_reader(file: Any) -> No
     found = Case.from_dict(tables)
     assert set(found.deck_tables["friction"]["coefficient"]) == {"x", "y", "values"}
     assert float(found.run().stick_area[-1]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "keys"),
+    [
+        ("mu.nc", lambda mu: netcdf_of(mu, x="um", y="um"), {}),
+        ("mu.csv", rows_of, {"units": "um", "extent": ["800 um", "600 um"]}),
+        ("mu.npy", lambda mu: mu[::-1], {"units": "um", "spacing": ["10 um", "10 um"]}),
+        ("mu.npy", lambda mu: mu, {"units": "um", "spacing": ["10 um", "10 um"], "first_row": "bottom"}),
+        ("mu.xyz", lambda mu: columns_of(mu, headers="x [um], y [um], z"), {}),
+        ("mu.csv", lambda mu: columns_of(mu, headers="x, y, mu"), {"units": "um", "variable": "mu"}),
+    ],
+)
+def test_coefficients_are_read_from_every_kind_of_file(file: Any, name: str, content: Any, keys: Any) -> None:
+    mu = 0.3 + X / 4000.0 + Y[:, None] / 8000.0
+    tables = {
+        "body": {"1": {**STEEL, "surface": {"shape": "sphere", "radius": 10e-3}}, "2": STEEL},
+        "friction": {"coefficient": {"map": file(name, content(mu)), **keys}},
+        "grid": {"spacing": 12e-6},
+        "load": [{"normal_load": 20.0}],
+    }
+    made = Case.from_dict(tables)
+    limits = made.friction_law(made.lattice).limits[0]
+    x, y = made.lattice.x, made.lattice.y
+    assert limits == pytest.approx(0.3 + x / 4000e-6 + y / 8000e-6, rel=1e-9)
+    again = Case.from_text(made.deck_text)
+    assert np.array_equal(again.friction_law(made.lattice).limits[0], limits)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({}, 'friction.coefficient.units: missing; expected the unit, such as "um"'),
+        ({"units": "um"}, "friction.coefficient.extent: missing; expected extent or spacing"),
+        (
+            {"units": "kg", "extent": [1.0, 1.0]},
+            'friction.coefficient.units = "kg": expected a unit of length',
+        ),
+        ({"unit": "um"}, "expected beside map only variable, units, extent, .* not unit"),
+        ({"units": "um", "extent": ["10 um", "10 um"]}, "the map does not cover the window"),
+        ({"units": "um", "extent": ["800 um", "600 um"], "variable": "mu"}, "expected nothing as variable"),
+    ],
+)
+def test_a_wrong_map_of_coefficients_is_one_sentence(file: Any, keys: Any, sentence: str) -> None:
+    tables = {
+        "body": {"1": {**STEEL, "surface": {"shape": "sphere", "radius": 10e-3}}, "2": STEEL},
+        "friction": {"coefficient": {"map": file("mu.csv", rows_of(0.3 + 0 * BALL)), **keys}},
+        "grid": {"spacing": 12e-6},
+        "load": [{"normal_load": 20.0}],
+    }
+    with pytest.raises(DeckError, match=sentence):
+        Case.from_dict(tables)
+
+
+def test_check_as_json_has_the_lines_about_maps(deck: Path) -> None:
+    found = json.loads(inside(deck.parent, "check", deck.name, "--json").stdout)
+    [about] = found["surfaces"]
+    assert (about["body"], about["shape"], len(about["lines"])) == (1, "map", 5)
+    assert about["lines"][0].startswith("ball.csv, x and y in um")
 
 
 def test_a_picture_shows_maps_profiles_or_the_gap_of_a_deck(deck: Path) -> None:

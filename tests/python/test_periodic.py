@@ -310,6 +310,18 @@ BAD = {
     ),
     "extent": ({"extent": None}, "grid.extent: expected the lengths of the period"),
     "boundary": ({"boundary": None}, "mean_pressure = 1000000.0: expected a window that repeats"),
+    "shear": (
+        {"friction_coefficient": None, "loads": [{"mean_pressure": 1e6}, {"mean_traction_y": 1e5}]},
+        r"load\.2\.mean_traction_y = 100000\.0: expected 0, or a \[friction\] table",
+    ),
+    "gap": (
+        {"loads": {"mean_gap": "3 um"}},
+        r"load\.1\.mean_gap = .*: expected .* or a mean gap below 1\.000 µm, that before loading",
+    ),
+    "none": (
+        {"loads": {"mean_pressure": 0}},
+        r"load\.1\.mean_pressure = 0.*: expected a mean pressure above",
+    ),
     "seam": ({"expression": "1e-6*(1 - cos(6*x/1e-3 + 1))"}, "grid.boundary .*: the gap does not repeat"),
     "punch": (
         {"body_1": {**STEEL, "surface": {"shape": "punch", "radius": 1e-4}}},

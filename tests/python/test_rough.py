@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from validation import repeating
 
 from hexcontact import Case, DeckError
 from hexcontact.surfaces import Rough
@@ -78,6 +79,40 @@ def test_a_rough_ball_has_several_spots() -> None:
     last = case.run().dataset.isel(step=-1)
     smooth = np.pi * (0.75 * 20.0 * 10e-3 / E_STAR) ** (2 / 3)
     assert 0.2 * smooth < float(last["contact_area"]) < 0.9 * smooth
+
+
+def sheared(nodes: int):
+    """Unlike bodies, pressed to 2 % of E* and sheared to 60 % of sliding."""
+    surface = {"shape": "rough", **WAVES, "rms_slope": 0.05}
+    last = Case(
+        body_1={**STEEL, "surface": surface}, body_2={"rigid": True}, friction_coefficient=0.3,
+        boundary="periodic", extent=(SIDE, SIDE), nodes_across=nodes,
+        loads=[{"mean_pressure": 5e8, "steps": 4}, {"mean_traction_x": 9e7, "steps": 2}],
+    ).run().dataset.isel(step=-1)  # fmt: skip
+    slips = (last["zone"] == 2).values
+    bound = 0.3 * last["pressure"].values
+    shear = np.hypot(last["traction_x"].values, last["traction_y"].values)
+    assert shear[slips] == pytest.approx(bound[slips], rel=1e-6)
+    assert (shear <= bound * (1 + 1e-6) + 1e-6 * bound.max()).all()
+    assert float(last["mean_gap"]) > 0.0
+    assert 0.1 < float(last["stick_area"] / last["contact_area"]) < 0.4
+    return last
+
+
+def test_unlike_rough_bodies_with_friction() -> None:
+    coarse, fine = sheared(64), sheared(128)
+    for name in ("shift_x", "dissipated_energy", "mean_gap"):
+        assert float(coarse[name]) == pytest.approx(float(fine[name]), rel=0.1)
+
+
+def test_friction_on_512_by_512_nodes() -> None:
+    """Superposition with ν = 0, and unlike bodies beside a lattice a quarter as fine."""
+    assert repeating.superposed(512, (0.6,)).passed
+    coarse, fine = sheared(128), sheared(512)
+    for name in ("shift_x", "dissipated_energy", "mean_gap", "stick_area"):
+        assert float(coarse[name]) == pytest.approx(float(fine[name]), rel=0.02)
+    change = abs(float(coarse["contact_area"] - fine["contact_area"]))
+    assert change < float(coarse["contact_area_error"])
 
 
 BAD = {

@@ -865,6 +865,12 @@ def test_without_dask_there_is_one_sentence(folder: Path, monkeypatch: pytest.Mo
 # --- the examples -------------------------------------------------------------------------------------------
 
 
+def test_area_of_rough_surfaces_over_the_load(folder: Path) -> None:
+    study = Study.from_toml(CASES / "study_rough.toml")
+    assert len(study) == 27
+    assert {axis.name for axis in study.plan.axes} == {"p", "seed", "spacing", "steps"}
+
+
 def test_example_is_a_good_study(folder: Path) -> None:
     study = Study.from_toml(CASES / "study_friction.toml")
     assert len(study) == 15

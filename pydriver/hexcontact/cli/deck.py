@@ -57,6 +57,7 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
         "window_fixed": case.window_fixed,
         "load_steps": case.planned_steps or None,
         "segments": case.load_steps[-1].segment + 1,
+        "surfaces": preview.surfaces_in_words(case),
         "largest_loads": preview.largest_loads(case),
         "memory": peak_memory(case, lattice),
         "operator_applications": preview.operator_applications(case),

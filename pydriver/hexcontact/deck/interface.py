@@ -7,27 +7,28 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from ..text import quantity
+from ..errors import DeckError
+from ..text import listed, quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
+from .measured import CoefficientMap
 from .table_base import Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, angle_text, to_si
 
 FROM_PYTHON = "python"  # in the deck of a case with a coefficient from Python
 _GRID = ("x", "y", "values")
+_OF_MAP = ("variable", "units", "extent", "spacing", "center", "first_row")
 
 
 @dataclass(frozen=True)
 class NodalCoefficient:
     """A coefficient of friction that differs from node to node."""
 
-    # a function of x and y (m), values over the nodes of a window, the file of a map, or its points and
-    # values
+    # a function of x and y (m), values over the nodes of a window, or points of a map and values
     source: Any = field(compare=False)
     in_deck: Any = FROM_PYTHON  # value in a deck
 
@@ -83,8 +84,15 @@ class FrictionKind(Kind):
     def _of_table(self, value: Mapping[str, Any]) -> Any:
         """Return two coefficients, the name of a map, or a map from a table."""
         keys, name = set(value), value.get("map")
-        if keys == {"map"} and isinstance(name, str) and name:
-            return NodalCoefficient(Path(name), dict(value))
+        if "map" in keys and isinstance(name, str) and name:
+            if others := sorted(map(str, keys - {"map", *_OF_MAP})):
+                refuse(f"expected beside map only {listed(_OF_MAP, 'and')}, not {listed(others, 'and')}")
+            given = {"file": name} | {str(key): value[key] for key in keys - {"map"}}
+            try:
+                read = CoefficientMap(**given)
+            except DeckError as error:
+                raise (error.__cause__ or error) from None
+            return NodalCoefficient(read.points[:3], dict(value))
         if keys == set(_GRID):
             with contextlib.suppress(TypeError, ValueError):
                 x, y, values = (np.asarray(value[key], float) for key in _GRID)
@@ -104,7 +112,8 @@ class FrictionKind(Kind):
     @property
     def schema(self) -> Schema:  # type: ignore[override]
         """A number, a formula, or one of the tables."""
-        file = {"type": "string", "description": "netCDF file of one variable over x and y"}
+        file = {"type": "string", "description": "file of numbers over x and y"}
+        keys_of_map = CoefficientMap.json_keys()
         above = {"type": "number", "exclusiveMinimum": 0}
         numbers = {"type": "array", "items": {"type": "number"}}
         two = {
@@ -117,7 +126,8 @@ class FrictionKind(Kind):
             "y": numbers | {"description": "places along y, m"},
             "values": {"type": "array", "items": numbers, "description": "coefficients, over y for each x"},
         }
-        tables = [({"map": file}, ["map"]), (two, ["along", "across"]), (grid, list(_GRID))]
+        of_file = {"map": file} | {key: keys_of_map[key] for key in _OF_MAP}
+        tables = [(of_file, ["map"]), (two, ["along", "across"]), (grid, list(_GRID))]
         objects = [
             {"type": "object", "properties": keys, "required": needed, "additionalProperties": False}
             for keys, needed in tables

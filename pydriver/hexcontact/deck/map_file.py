@@ -25,7 +25,7 @@ MOST_POINTS = 1_000_000
 """Points of a map, which is text in the deck of a result."""
 
 _TEXT = (".csv", ".txt", ".dat", ".xyz")
-_NETCDF = (".nc", ".nc4", ".cdf")
+NETCDF = (".nc", ".nc4", ".cdf")
 _HEIGHTS = ("z", "h", "height", "heights")  # headers of a column of heights, in small letters
 _EXPECTED = "heights as text: a matrix, or columns x, y and z with headers"
 _MOST_SENTENCES = 5
@@ -59,7 +59,7 @@ def _read(path: Path, variable: str | None, profile: bool, version: tuple[int, i
     suffix = path.suffix.lower()
     if suffix in _TEXT:
         found = _of_text(path, variable, profile)
-    elif suffix in _NETCDF:
+    elif suffix in NETCDF:
         found = _of_netcdf(path, variable, profile)
     elif suffix == ".npy":
         found = _of_numpy(path)
@@ -268,7 +268,7 @@ def _by_surface_topography(path: Path, channel: str | None) -> MapFile:
     try:
         library: Any = importlib.import_module("SurfaceTopography")
     except ImportError:
-        known = listed([*_TEXT, *_NETCDF, ".npy"], "and")
+        known = listed([*_TEXT, *NETCDF, ".npy"], "and")
         raise DeckError(
             f"{path}: this format is read by the package SurfaceTopography: pip install SurfaceTopography; "
             f"without it expected {known}"

@@ -22,10 +22,10 @@ from ..text import quantity
 from .faults import MISSING
 from .height_map import HeightMap, Placed
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
-from .map_file import MapFile, read_map
+from .map_file import NETCDF, MapFile, read_map
 from .surfaces import Angle, Point, Surface, shape
 from .table_base import meaning, refuse_key
-from .units import LENGTH, UnitError, readable, to_si
+from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
 _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file alone
 _POINTS = ("x", "y", "heights")
@@ -139,6 +139,7 @@ class Measured(Surface):
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
     extruded: ClassVar[bool] = False
+    _file_key: ClassVar[str] = "file"
     _period: tuple[float, float] | None = PrivateAttr(None)
     _placing: ClassVar[tuple[str, ...]] = ()  # further keys that go with a file alone
 
@@ -171,7 +172,7 @@ class Measured(Surface):
                 refuse_key("heights", MISSING, str(error).removeprefix("heights: "))
             name = str(self.file)
             lines = [line.removeprefix(name).lstrip(":, ") for line in str(error).splitlines()]
-            refuse_key("file", name, "; ".join(lines))
+            refuse_key(self._file_key, name, "; ".join(lines))
         return self
 
     # --- points ---------------------------------------------------------------------------------------------
@@ -189,7 +190,9 @@ class Measured(Surface):
         try:
             scale = to_si(f"1 {said or given}", LENGTH)
         except UnitError:
-            refuse_key("file", str(self.file), f'expected lengths in the file, not values in "{said}"')
+            refuse_key(
+                self._file_key, str(self.file), f'expected lengths in the file, not values in "{said}"'
+            )
         if given and to_si(f"1 {given}", LENGTH) != scale:
             refuse_key(key, given, f'expected nothing, or "{said}" as in the file')
         return scale
@@ -455,6 +458,40 @@ class Map(Measured):
         u, v = (a + b for a, b in zip(self.field.first_touch, self._origin, strict=True))
         yield f"{self._heights}; nearest to the other body at x = {quantity(u, 'm')}, y = {quantity(v, 'm')}"
         yield self.field.interpolated
+
+
+class CoefficientMap(Map):
+    """Numbers over x and y, read as a map of heights is: bilinear between the points, without holes."""
+
+    upwards: Annotated[bool, Flag()] = meaning(False, "not of use")
+    _file_key: ClassVar[str] = "map"
+
+    def _read(self, profile: bool) -> tuple[MapFile, Array, float]:
+        """Return the file, its values and the unit of its coordinates (m)."""
+        file = Path(self.file or "")
+        found = read_map(file, self.variable, profile)
+        try:
+            values = found.values * (to_si(f"1 {found.value_units}", NUMBER) if found.value_units else 1.0)
+        except UnitError:
+            refuse_key(
+                self._file_key, str(self.file), f'expected numbers, not values in "{found.value_units}"'
+            )
+        # coordinates of netCDF are in m, or in the unit that they name
+        meters = found.x is not None and file.suffix.lower() in NETCDF
+        units = found.units or ("m" if meters and not self.units else "")
+        return found, values, self._scale("units", units)
+
+    @classmethod
+    def json_keys(cls) -> dict[str, Schema]:
+        """Return the schemas of its keys."""
+        core = cls.__pydantic_core_schema__
+        keys: dict[str, Schema] = cls.model_json_schema()["properties"] if core else {}
+        return keys
+
+    @cached_property
+    def field(self) -> HeightMap:
+        """The numbers over the coordinates of the map."""
+        return HeightMap(*self.points[:3], "heights", 1, whole=True)
 
 
 @shape("profile")

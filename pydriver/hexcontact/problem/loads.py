@@ -16,6 +16,7 @@ from ..deck.faults import MISSING, Mistake
 from ..deck.keys import MEANS, Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
 from ..deck.series import MOST_STEPS
+from ..text import quantity
 from ..variables import BULK_STRESS, LOADS, ROLLED
 
 Control = Literal["force", "displacement"]
@@ -295,9 +296,18 @@ class History:
             return [Mistake(("load",), MISSING, sentence)]
         problems = list(self._problems.values())
         if all(step.z.value < SMALLEST for step in self.steps):
-            first = self._entries[0].normal_load
-            key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
             sentence = "expected a normal load or an approach above zero somewhere in the history"
+            if self._period:
+                height = quantity(self._period.mean_height, "m")
+                sentence = (
+                    "expected a mean pressure above zero somewhere in the history, or a mean gap below "
+                    f"{height}, that before loading"
+                )
+            names = ("normal_load", "mean_gap", "mean_pressure")
+            name = next((name for name in names if getattr(self._entries[0], name) is not None), None)
+            key, value = (
+                (("load", 0, name), getattr(self._entries[0], name)) if name else (("load",), MISSING)
+            )
             return [Mistake(key, value, sentence)]  # from which sliding and unknown shares follow
         return problems
 
@@ -392,7 +402,9 @@ def _overload(
     if not mu:
         for motion, target in tangential:
             by_force = target.control == "force"
-            name = step.drives[motion][0 if by_force else 1]
+            driven = step.drives[motion][0 if by_force else 1]
+            names = (driven, *(mean for mean, load in MEANS.items() if load == driven))
+            name = next((name for name in names if getattr(segment, name) is not None), driven)
             given = getattr(segment, name)
             # without friction, but with shear as an unknown, motions are free
             if target.value != 0 and given is not None and (by_force or mu is None):

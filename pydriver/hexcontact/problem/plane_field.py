@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..deck.height_map import HeightMap, Placed, in_si
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
-from ..deck.map_file import MOST_POINTS, netcdf_map
+from ..deck.map_file import MOST_POINTS
 from ..deck.separation import Separation
 from ..deck.units import LENGTH, NUMBER, Dimension
 from ..errors import DeckError
@@ -225,9 +224,7 @@ class FrictionField:
         self.varies = isinstance(mu, NodalCoefficient)
         if isinstance(mu, NodalCoefficient):
             source: Any = mu.source
-            if isinstance(source, Path):
-                source = _read_map(source)
-            elif isinstance(source, tuple):
+            if isinstance(source, tuple):
                 x, y, values = source
                 source = HeightMap(x, y, values, _NAME, COEFFICIENT.degree, whole=True)
             self._coefficient = PlaneField(source, COEFFICIENT)
@@ -239,16 +236,6 @@ class FrictionField:
         """Return the law at the nodes of a window."""
         mu = self._coefficient
         return FrictionLaw(mu.over(lattice) if isinstance(mu, PlaneField) else mu, **self._numbers)
-
-
-def _read_map(path: Path) -> HeightMap:
-    """Read a map: the only variable of a netCDF file that has the coordinates x and y."""
-    try:
-        return HeightMap.of(netcdf_map(path), _NAME, COEFFICIENT.dimension, COEFFICIENT.degree)
-    except FileNotFoundError:
-        raise DeckError(f"{_NAME}: there is no file {path}") from None
-    except DeckError as error:
-        raise DeckError(f"{_NAME}: {str(error).removeprefix(f'{_NAME}: ')}") from None
 
 
 def _of_few_points(source: Any) -> Any:

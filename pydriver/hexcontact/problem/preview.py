@@ -290,12 +290,21 @@ def _layer(layer: Coating) -> str:
     return f"{quantity(layer.thickness, 'm')}, {_elastic(layer)}"
 
 
+def surfaces_in_words(case: Problem) -> list[dict[str, Any]]:
+    """Return how measured and rough surfaces are read: body, shape and lines of words."""
+    return [
+        {"body": number, "shape": one.shape, "lines": lines}
+        for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
+        for one in (surface.parts if isinstance(surface, SurfaceSum) else (surface,))
+        if (lines := [*one.rows(case.lattice.spacing)])
+    ]
+
+
 def _maps(case: Problem) -> Iterator[Row]:
     """Yield rows about measured and rough surfaces."""
-    for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2)):
-        for one in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
-            for place, words in enumerate(one.rows(case.lattice.spacing)):
-                yield (f"{one.shape} of body {number}" if not place else "", words)
+    for one in surfaces_in_words(case):
+        for place, words in enumerate(one["lines"]):
+            yield (f"{one['shape']} of body {one['body']}" if not place else "", words)
 
 
 def _surface(surface: Surface | None) -> str:

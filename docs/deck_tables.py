@@ -19,7 +19,7 @@ from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Severa
 from hexcontact.deck.table_base import Table, expectation, kind_of, parts_of
 from hexcontact.problem import plausibility
 from hexcontact.study import backend
-from hexcontact.study.plan import Parameter, StudyFile
+from hexcontact.study.plan import CreepAxes, Parameter, StudyFile
 from hexcontact.text import shown
 from hexcontact.variables import ESTIMATED, VARIABLES, Variable
 
@@ -44,6 +44,7 @@ TABLES: dict[str, type[Table]] = {  # by their headings in keys.md
     "[[fatigue]]": deck_keys.Fatigue,
     "Study files": StudyFile,
     "[[parameter]] of a study": Parameter,
+    "[creep_table] of a study": CreepAxes,
     **{
         f"[{word}] of a study": part
         for word, (annotation, _) in backend.KEYS.items()

@@ -6,9 +6,9 @@
 !>
 !> with real C and D. One layer has closed forms (T.C. O'Sullivan, R.B. King, J. Tribology 110, 1988, for C_zz). Several layers
 !> are added one by one from the bottom: a 2 x 2 compliance of what lies below becomes that of what lies below the next surface,
-!> with exponentials that only decay.
+!> with exponentials that only decay. The amplitudes in each layer, from the top down, give displacement and stress at any depth.
 !>
-!> Equations: docs/theory/coatings.md, (J1) to (J4).
+!> Equations: docs/theory/coatings.md, (J1) to (J4), (J8).
 module hc_layer_response
   use hc_precision, only: wp, pi
   implicit none
@@ -18,6 +18,11 @@ module hc_layer_response
 
   !> Responses: k/(2 pi) times C_zz, C_LL, C_TT and -D [1/Pa]. On a half-space they do not depend on k.
   integer, parameter :: n_response = 4, of_normal = 1, of_along = 2, of_across = 3, of_coupling = 4
+
+  !> Fields at a depth, over i where they are odd in k: stresses LL, TT, zz, Lz by the pressure, then by q_L, ...
+  integer, parameter, public :: ll_p = 1, tt_p = 2, zz_p = 3, lz_p = 4, ll_q = 5, tt_q = 6, zz_q = 7, lz_q = 8
+  !> ... Tz and LT by q_T, and k times the displacements z, L by the pressure and by q_L, T by q_T [1/Pa].
+  integer, parameter, public :: tz_t = 9, lt_t = 10, uz_p = 11, ul_p = 12, uz_q = 13, ul_q = 14, ut_t = 15, n_wave = 15
 
   !> Wave number times thickness from which nothing below the layer is seen, in any digit.
   real(wp), parameter :: shortest = 100.0_wp
@@ -39,6 +44,8 @@ module hc_layer_response
   contains
     !> Responses to waves of traction
     procedure :: response
+    !> Stresses and displacements at a depth under waves of traction, the number of the layer there, and its material
+    procedure :: at_depth, layer_at, material_at
     !> Displacements by a uniform pressure and by a uniform shear traction over their values, on a rigid base
     procedure :: uniform
   end type layered_body_t
@@ -134,14 +141,7 @@ contains
     real(wp), dimension(2, 2) :: up, up_force, down, down_force, amplitude
     real(wp) :: r
 
-    ! at the bottom of the layer
-    up = rising(layer, 0.0_wp)
-    up_force = rising_force(layer, 0.0_wp)
-    down = falling(layer, x)
-    down_force = falling_force(layer, x)
-    up = inverse(up - matmul(c, up_force))
-    down = down - matmul(c, down_force)
-    amplitude = -matmul(up, down)
+    amplitude = reflection(layer, x, c)
     ! at its top
     up = rising(layer, -x)
     up_force = rising_force(layer, -x)
@@ -153,6 +153,132 @@ contains
       s = (1.0_wp + r)/((1.0_wp - r)*g)
     end associate
   end subroutine add_layer
+
+  !> Compute the amplitudes of rising solutions by those of falling ones.
+  pure function reflection(layer, x, c) result(r)
+    type(layer_t), intent(in) :: layer
+    !> Wave number times thickness, k times the compliance of what lies below [1/Pa]
+    real(wp), intent(in) :: x, c(2, 2)
+    real(wp), dimension(2, 2) :: up, up_force, down, down_force, r
+
+    up = rising(layer, 0.0_wp)
+    up_force = rising_force(layer, 0.0_wp)
+    down = falling(layer, x)
+    down_force = falling_force(layer, x)
+    up = inverse(up - matmul(c, up_force))
+    down = down - matmul(c, down_force)
+    r = -matmul(up, down)
+  end function reflection
+
+  !> Return the number of the layer at a depth, that above at an interface; one more than there are: the base.
+  pure integer function layer_at(self, z)
+    class(layered_body_t), intent(in) :: self
+    !> Depth [m]
+    real(wp), intent(in) :: z
+    real(wp) :: bottom
+
+    bottom = 0.0_wp
+    do layer_at = 1, size(self%layer)
+      bottom = bottom + self%layer(layer_at)%thickness
+      if (z <= bottom) return
+    end do
+  end function layer_at
+
+  !> Return the material at a depth.
+  pure type(layer_t) function material_at(self, z)
+    class(layered_body_t), intent(in) :: self
+    !> Depth [m]
+    real(wp), intent(in) :: z
+    integer :: here
+
+    here = self%layer_at(z)
+    material_at = self%base
+    if (here <= size(self%layer)) material_at = self%layer(here)
+  end function material_at
+
+  !> Compute stresses and displacements at a depth under waves of traction, (J8).
+  pure function at_depth(self, k, z) result(f)
+    class(layered_body_t), intent(in) :: self
+    !> Wave number [1/m], and depth [m]
+    real(wp), intent(in) :: k, z
+    real(wp) :: f(n_wave)
+    real(wp), dimension(2, 2) :: force, moved
+    real(wp) :: c(2, 2, size(self%layer)), s(size(self%layer)), base(n_response), anti(2), top
+    integer :: i, here
+
+    here = self%layer_at(z)
+    base = half_space(self%base)
+    do i = size(self%layer), 1, -1
+      if (i == size(self%layer)) then
+        c(:, :, i) = reshape([base(of_along), base(of_coupling), base(of_coupling), base(of_normal)], [2, 2])
+        s(i) = base(of_across)
+      else
+        c(:, :, i) = c(:, :, i + 1)
+        s(i) = s(i + 1)
+        call add_layer(self%layer(i + 1), k*self%layer(i + 1)%thickness, c(:, :, i), s(i))
+      end if
+    end do
+    force = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+    anti(1) = 1.0_wp
+    top = 0.0_wp
+    do i = 1, here - 1
+      call pass(self%layer(i), k*self%layer(i)%thickness, k*self%layer(i)%thickness, c(:, :, i), s(i), force, moved, anti)
+      top = top + self%layer(i)%thickness
+    end do
+    if (here <= size(self%layer)) then
+      call pass(self%layer(here), k*self%layer(here)%thickness, k*(z - top), c(:, :, here), s(here), force, moved, anti)
+      f = waves_of(self%layer(here), force, moved, anti)
+    else
+      moved = matmul(inverse(falling_force(self%base, 0.0_wp)), force)
+      force = matmul(falling_force(self%base, k*(z - top)), moved)
+      moved = matmul(falling(self%base, k*(z - top)), moved)
+      anti(1) = anti(1)*exp(-k*(z - top))
+      anti(2) = anti(1)/self%base%shear_modulus
+      f = waves_of(self%base, force, moved, anti)
+    end if
+  end function at_depth
+
+  !> Replace forces at the top of a layer by those at a depth in it, and compute k times the displacements there.
+  pure subroutine pass(layer, x, depth, c, s, force, moved, anti)
+    type(layer_t), intent(in) :: layer
+    !> Wave number times thickness, and times depth below the top
+    real(wp), intent(in) :: x, depth
+    !> k times the compliance of what lies below, in the plane of k and z, and across [1/Pa]
+    real(wp), intent(in) :: c(2, 2), s
+    !> Forces (L, z) by both loads, and displacements [1/Pa]
+    real(wp), intent(inout) :: force(2, 2)
+    real(wp), intent(out) :: moved(2, 2)
+    !> Force and displacement across
+    real(wp), intent(inout) :: anti(2)
+    real(wp) :: up(2, 2), r
+
+    up = reflection(layer, x, c)
+    force = matmul(inverse(falling_force(layer, 0.0_wp) + matmul(rising_force(layer, -x), up)), force)
+    moved = matmul(falling(layer, depth) + matmul(rising(layer, depth - x), up), force)
+    force = matmul(falling_force(layer, depth) + matmul(rising_force(layer, depth - x), up), force)
+    associate (g => layer%shear_modulus)
+      r = (g*s - 1.0_wp)/(g*s + 1.0_wp)
+      anti(1) = anti(1)/(1.0_wp - r*exp(-2.0_wp*x))
+      anti(2) = anti(1)*(exp(-depth) + r*exp(depth - 2.0_wp*x))/g
+      anti(1) = anti(1)*(exp(-depth) - r*exp(depth - 2.0_wp*x))
+    end associate
+  end subroutine pass
+
+  !> Collect the fields from forces on the part below and k times displacements, Hooke's law in the plane strain of k and z.
+  pure function waves_of(layer, force, moved, anti) result(f)
+    type(layer_t), intent(in) :: layer
+    real(wp), intent(in) :: force(2, 2), moved(2, 2), anti(2)
+    real(wp) :: f(n_wave), along(2)
+
+    associate (g => layer%shear_modulus, nu => layer%poisson_ratio)
+      along = -(2.0_wp*g*moved(1, :) + nu*force(2, :))/(1.0_wp - nu)
+      f([ll_p, zz_p, lz_p]) = [along(2), -force(2, 2), -force(1, 2)]
+      f([ll_q, zz_q, lz_q]) = [-along(1), force(2, 1), -force(1, 1)]
+      f([tt_p, tt_q]) = nu*[along(2) - force(2, 2), force(2, 1) - along(1)]
+      f([tz_t, lt_t, ut_t]) = [-anti(1), g*anti(2), anti(2)]
+      f([uz_p, ul_p, uz_q, ul_q]) = [moved(2, 2), moved(1, 2), -moved(2, 1), moved(1, 1)]
+    end associate
+  end function waves_of
 
   !> Compute the displacements (u_L/i, u_z) of the two solutions that decay with the depth, at x = k z.
   pure function falling(layer, x) result(u)

@@ -2,7 +2,8 @@
 !>
 !> At one depth the stress is a sum over lattice offsets with fifteen tables: six components of three loads less the
 !> three that are equal by reciprocity, zz of q_a = az of p and xz of q_y = yz of q_x; the displacement is one with eight,
-!> since x of q_y = y of q_x. However slowly they decay, the padded sum is exact.
+!> since x of q_y = y of q_x. However slowly they decay, the padded sum is exact. In a coated body zz of q_a is not az of p: the
+!> stress has seventeen tables.
 !>
 !> Equations: docs/theory/interior.md, (I11).
 module hc_interior_planes
@@ -10,7 +11,9 @@ module hc_interior_planes
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
-  use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, xx, yy, zz, xy, yz, xz
+  use hc_layer_response, only: layered_body_t
+  use hc_interior_fields, only: n_derivative, check_interior, xx, yy, zz, xy, yz, xz
+  use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_points, only: check_body
   use hc_fftw, only: good_size
@@ -45,7 +48,7 @@ module hc_interior_planes
     type(convolution_t) :: convolution
     type(tables_t) :: tables
     integer :: body = 1
-    real(wp) :: poisson_ratio = 0.0_wp
+    type(layered_body_t) :: inside
     !> Tractions in the frame of the body
     real(wp), allocatable :: loads(:, :, :)
   contains
@@ -62,9 +65,9 @@ module hc_interior_planes
     type(interior_pyramid_t) :: pyramid
     type(tables_t) :: tables
     real(wp) :: basis(2, 2) = 0.0_wp
-    !> Depth over the longest edge
-    real(wp) :: depth = 0.0_wp
-    real(wp) :: poisson_ratio = 0.0_wp
+    type(depth_fields_t) :: fields
+    !> Longest edge [m]
+    real(wp) :: spacing = 1.0_wp
     !> x -> -x maps the lattice to itself, column i of row j to -i - j
     logical :: mirrored = .false.
   contains
@@ -74,9 +77,9 @@ module hc_interior_planes
 contains
 
   !> The tables of the stress, or of the displacement.
-  pure type(tables_t) function tables_of(displaced)
-    !> Of the displacement
-    logical, intent(in) :: displaced
+  pure type(tables_t) function tables_of(displaced, coated)
+    !> Of the displacement; of a coated body
+    logical, intent(in) :: displaced, coated
 
     if (displaced) then
       tables_of%kind = of_displacement
@@ -87,6 +90,12 @@ contains
       tables_of%table = reshape([5, 6, 1, 2, 3, 7, 3, 4, 8], [3, 3])
       tables_of%mirror = real([1, 1, -1, 1, -1, 1, -1, 1], wp)
       tables_of%turned = [3]
+    else if (coated) then
+      tables_of%component = [xx, yy, zz, xy, xz, yz, yz, xz, yz, xx, yy, xy, zz, xx, yy, xy, zz]
+      tables_of%load = [1, 1, 1, 1, 2, 2, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3]
+      tables_of%table = reshape([1, 2, 3, 4, 9, 8, 10, 11, 13, 12, 6, 5, 14, 15, 17, 16, 7, 6], [6, 3])
+      tables_of%mirror = real([1, 1, 1, -1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1, 1, -1, 1], wp)
+      tables_of%turned = [yz, xz]
     else
       tables_of%component = [xx, yy, zz, xy, xz, yz, yz, xz, yz, xx, yy, xy, xx, yy, xy]
       tables_of%load = [1, 1, 1, 1, 2, 2, 3, 1, 1, 2, 2, 2, 3, 3, 3]
@@ -97,14 +106,15 @@ contains
   end function tables_of
 
   !> Plans and scratch space.
-  subroutine new_interior_planes(planes, lattice, body, poisson_ratio, error, space, displaced)
+  subroutine new_interior_planes(planes, lattice, body, inside, error, space, displaced)
     !> Planes to be set up
     type(interior_planes_t), intent(out) :: planes
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Number of the body, 1 or 2, and its Poisson's ratio
+    !> Number of the body, 1 or 2
     integer, intent(in) :: body
-    real(wp), intent(in) :: poisson_ratio
+    !> Its layers and what lies below them
+    type(layered_body_t), intent(in) :: inside
     !> Allocated on failure: a lattice of no use, no such body or material, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Who shares the work; absent: as many threads as OpenMP would take
@@ -114,18 +124,20 @@ contains
 
     type(field_space_t) :: shared
     integer :: stat
+    logical :: coated
 
     call check_lattice(lattice, error)
     if (.not. allocated(error)) call check_body(body, error)
-    if (.not. allocated(error)) call check_interior([0.0_wp], [0.0_wp], [0.0_wp], poisson_ratio, error)
+    if (.not. allocated(error)) call check_interior([0.0_wp], [0.0_wp], [0.0_wp], inside%base%poisson_ratio, error)
     if (allocated(error)) return
     shared = space_over(lattice%extent)
     if (present(space)) shared = space
-    planes%tables = tables_of(.false.)
-    if (present(displaced)) planes%tables = tables_of(displaced)
+    coated = size(inside%layer) > 0
+    planes%tables = tables_of(.false., coated)
+    if (present(displaced)) planes%tables = tables_of(displaced, coated)
     planes%lattice = lattice
     planes%body = body
-    planes%poisson_ratio = poisson_ratio
+    planes%inside = inside
     call new_interior_pyramid(planes%pyramid, lattice%unit_basis())
     allocate (planes%loads(lattice%extent(1), lattice%extent(2), 3), stat=stat)
     if (stat /= 0) then
@@ -138,16 +150,20 @@ contains
   end subroutine new_interior_planes
 
   !> Bytes that planes take, the setting up of their tables included.
-  pure integer(selected_int_kind(18)) function planes_memory(extent, threads)
+  pure integer(selected_int_kind(18)) function planes_memory(extent, coated, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
+    !> The body has layers
+    logical, intent(in) :: coated
     !> Threads to use
     integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
+    integer :: n_table
 
     ! those of the stress, which are more
-    planes_memory = convolution_memory(extent, good_size(2*extent - 1), 15, 6, threads) &
-                    + transform_memory(extent, good_size(2*extent - 1), 15) &
+    n_table = merge(17, 15, coated)
+    planes_memory = convolution_memory(extent, good_size(2*extent - 1), n_table, 6, threads) &
+                    + transform_memory(extent, good_size(2*extent - 1), n_table) &
                     + 3*product(int(extent, long))*(storage_size(1.0_wp)/8)
   end function planes_memory
 
@@ -174,15 +190,21 @@ contains
     type(plane_tables_t) :: source
     logical :: found
 
-    call check_interior([0.0_wp], [0.0_wp], [depth], self%poisson_ratio, error)
+    call check_interior([0.0_wp], [0.0_wp], [depth], self%inside%base%poisson_ratio, error)
+    if (.not. allocated(error)) call check_inside(self%inside, [depth], error)
+    if (.not. allocated(error)) call new_depth_fields(source%fields, self%inside, depth, error)
     if (allocated(error)) return
     source%basis = self%lattice%unit_basis()
-    source%depth = depth/self%lattice%spacing()
-    source%poisson_ratio = self%poisson_ratio
+    source%spacing = self%lattice%spacing()
     source%pyramid = self%pyramid
     source%tables = self%tables
     source%mirrored = all(abs([source%basis(2, 1), source%basis(1, 2) - 0.5_wp*source%basis(1, 1)]) <= 0.0_wp)
-    associate (key => new_depth_key(self%tables%kind, self%lattice, source%depth, self%poisson_ratio))
+    if (size(self%inside%layer) > 0) then
+      call self%convolution%find_spectra(found, error)
+      if (.not. allocated(error)) call self%convolution%transform_kernels(source, error)
+      return
+    end if
+    associate (key => new_depth_key(self%tables%kind, self%lattice, depth/source%spacing, self%inside%base%poisson_ratio))
       call self%convolution%find_spectra(found, error, cache, key)
       if (found .or. allocated(error)) return
       call self%convolution%transform_kernels(source, error)
@@ -218,27 +240,29 @@ contains
     integer, intent(in) :: j
     real(wp), intent(out) :: k(:, :)
 
-    real(wp) :: x(most_points), y(most_points), z(most_points), d(most_points, n_derivative), s(most_points, 6, 3)
-    integer :: i, n, m, middle, first, t
+    real(wp) :: x(most_points), y(most_points), z(most_points), d(most_points, n_derivative)
+    real(wp) :: u(most_points, 3, 3), s(most_points, 6, 3)
+    integer :: i, depth, n, m, middle, first, t
 
     n = size(k, 2)/2
     middle = n + 1
     ! columns of which the mirror images are in the row, too, are copies
     first = -n
     if (self%mirrored) first = -(j/2)
-    z = self%depth
     do while (first <= n)
       m = min(n - first + 1, most_points)
       do i = 1, m
         x(i) = (first + i - 1)*self%basis(1, 1) + j*self%basis(1, 2)
         y(i) = (first + i - 1)*self%basis(2, 1) + j*self%basis(2, 2)
       end do
-      call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-      if (self%tables%kind == of_displacement) then
-        call displacements(m, d(:m, :), d(:m, :), d(:m, :), z(:m), self%poisson_ratio, s(:m, :3, :))
-      else
-        call stresses(m, d(:m, :), d(:m, :), d(:m, :), self%poisson_ratio, s(:m, :, :))
-      end if
+      u = 0.0_wp
+      s = 0.0_wp
+      do depth = 1, size(self%fields%depth)
+        z = self%fields%depth(depth)/self%spacing
+        call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
+        call self%fields%add(depth, m, d(:m, :), d(:m, :), d(:m, :), self%spacing, u(:m, :, :), s(:m, :, :))
+      end do
+      if (self%tables%kind == of_displacement) s(:, :3, :) = u
       do t = 1, size(k, 1)
         k(t, middle + first:middle + first + m - 1) = s(:m, self%tables%component(t), self%tables%load(t))
       end do

@@ -4,14 +4,19 @@
 !> body 2. A point is given by its depth below the surface of its body; body 2 is computed in the frame mirrored at
 !> z = 0, in which the loads are (p, -q), and its fields are turned back.
 !>
+!> In a window that repeats the sum is one over waves (hc_periodic_interior).
+!>
 !> Equations: docs/theory/interior.md, (I10).
 module hc_interior_points
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
-  use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, yz, xz
+  use hc_layer_response, only: layered_body_t
+  use hc_interior_fields, only: n_derivative, check_interior, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
+  use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
+  use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior
   !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
@@ -21,19 +26,18 @@ module hc_interior_points
 contains
 
   !> Displacement and stress at points for a history of load steps.
-  !>
-  !> The influence of a pyramid on a point is worked out once for all steps.
-  subroutine fields_at_points(lattice, traction, body, poisson_ratio, points, displacement, stress, error, space)
+  subroutine fields_at_points(lattice, traction, body, inside, points, displacement, stress, error, space)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
     real(wp), intent(in), contiguous :: traction(:, :, :, :)
-    !> Number of the body, 1 or 2, and its Poisson's ratio
+    !> Number of the body, 1 or 2
     integer, intent(in) :: body
-    real(wp), intent(in) :: poisson_ratio
+    !> Its layers and what lies below them
+    type(layered_body_t), intent(in) :: inside
     !> Points, x, y and depth below the surface of the body (3, n) [m]
     real(wp), intent(in) :: points(:, :)
-    !> Displacement times the shear modulus (direction, point, step) [Pa m]
+    !> Displacement times the shear modulus of the surface (direction, point, step) [Pa m]
     real(wp), intent(out) :: displacement(:, :, :)
     !> Stress (component xx, yy, zz, xy, yz, xz; point; step) [Pa]
     real(wp), intent(out) :: stress(:, :, :)
@@ -42,51 +46,117 @@ contains
     !> Who shares the work; absent: as many threads as OpenMP would take
     type(field_space_t), intent(in), optional :: space
 
-    type(interior_pyramid_t) :: pyramid
     type(field_space_t) :: shared
-    real(wp), allocatable :: node(:, :), load(:, :)
-    real(wp), allocatable :: sums(:, :, :) ! of each thread; no stack holds those of many steps
-    real(wp) :: u(1, 3, 3), s(1, 6, 3), zeta(1)
-    integer :: i, step, k, thread, stat
+    type(periodic_interior_t) :: repeating
 
     call check_lattice(lattice, error)
     if (.not. allocated(error)) call check_body(body, error)
-    if (.not. allocated(error)) call check_interior(points(1, :), points(2, :), points(3, :), poisson_ratio, error)
-    if (.not. allocated(error)) call loaded_nodes(lattice, traction, body, node, load, error)
+    if (.not. allocated(error)) call check_interior(points(1, :), points(2, :), points(3, :), inside%base%poisson_ratio, error)
+    if (.not. allocated(error)) call check_inside(inside, points(3, :), error)
     if (allocated(error)) return
     shared = space_over(lattice%extent)
     if (present(space)) shared = space
-    call new_interior_pyramid(pyramid, lattice%basis)
-    allocate (sums(n_derivative, 3*size(traction, 4), shared%threads), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
-      return
+    if (lattice%is_periodic()) then
+      call new_periodic_interior(repeating, lattice, body, inside, traction, shared, error)
+      if (.not. allocated(error)) call repeating%at_points(points, displacement, stress, error)
+    else
+      call sum_at_points(lattice, traction, body, inside, points, displacement, stress, shared, error)
     end if
-
-    !$omp parallel do num_threads(shared%threads) schedule(dynamic) private(u, s, zeta, step, k, thread) if (size(points, 2) > 1)
-    do i = 1, size(points, 2)
-      thread = 1
-      !$ thread = omp_get_thread_num() + 1
-      call sum_pyramids(pyramid, node, load, points(:, i), sums(:, :, thread))
-      zeta = points(3, i)/pyramid%spacing
-      do step = 1, size(traction, 4)
-        k = 3*(step - 1)
-        associate (p => reshape(sums(:, k + 1, thread), [1, n_derivative]), &
-                   q_x => reshape(sums(:, k + 2, thread), [1, n_derivative]), &
-                   q_y => reshape(sums(:, k + 3, thread), [1, n_derivative]))
-          call displacements(1, p, q_x, q_y, zeta, poisson_ratio, u)
-          call stresses(1, p, q_x, q_y, poisson_ratio, s)
-        end associate
-        displacement(:, i, step) = pyramid%spacing*sum(u(1, :, :), dim=2)
-        stress(:, i, step) = sum(s(1, :, :), dim=2)
-      end do
-    end do
-    !$omp end parallel do
+    if (allocated(error)) return
     if (body == 2) then
       displacement(3, :, :) = -displacement(3, :, :)
       stress([yz, xz], :, :) = -stress([yz, xz], :, :)
     end if
   end subroutine fields_at_points
+
+  !> Sum over the pyramids of a window that ends. The influence of a pyramid on a point is worked out once for all steps.
+  subroutine sum_at_points(lattice, traction, body, inside, points, displacement, stress, space, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in), contiguous :: traction(:, :, :, :)
+    integer, intent(in) :: body
+    type(layered_body_t), intent(in) :: inside
+    real(wp), intent(in) :: points(:, :)
+    real(wp), intent(out) :: displacement(:, :, :), stress(:, :, :)
+    type(field_space_t), intent(in) :: space
+    !> Allocated on failure: layers that images do not describe, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    type(interior_pyramid_t) :: pyramid
+    type(depth_fields_t), allocatable :: fields(:)
+    real(wp), allocatable :: node(:, :), load(:, :), sums(:, :, :)
+    integer, allocatable :: level(:)
+    real(wp) :: u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
+    integer :: i, j, step, k, thread, stat
+
+    call loaded_nodes(lattice, traction, body, node, load, error)
+    if (.not. allocated(error)) call find_levels(inside, points(3, :), level, fields, error)
+    if (allocated(error)) return
+    call new_interior_pyramid(pyramid, lattice%basis)
+    ! of each thread; no stack holds those of many steps
+    allocate (sums(n_derivative, 3*size(traction, 4), space%threads), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
+      return
+    end if
+
+    !$omp parallel do num_threads(space%threads) schedule(dynamic) private(u, s, d, j, step, k, thread) if (size(points, 2) > 1)
+    do i = 1, size(points, 2)
+      thread = 1
+      !$ thread = omp_get_thread_num() + 1
+      displacement(:, i, :) = 0.0_wp
+      stress(:, i, :) = 0.0_wp
+      do j = 1, size(fields(level(i))%depth)
+        call sum_pyramids(pyramid, node, load, [points(:2, i), fields(level(i))%depth(j)], sums(:, :, thread))
+        do step = 1, size(traction, 4)
+          k = 3*(step - 1)
+          d(1, :, :) = sums(:, k + 1:k + 3, thread)
+          u = 0.0_wp
+          s = 0.0_wp
+          call fields(level(i))%add(j, 1, d(:, :, 1), d(:, :, 2), d(:, :, 3), pyramid%spacing, u, s)
+          displacement(:, i, step) = displacement(:, i, step) + pyramid%spacing*sum(u(1, :, :), dim=2)
+          stress(:, i, step) = stress(:, i, step) + sum(s(1, :, :), dim=2)
+        end do
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine sum_at_points
+
+  !> Set up the fields at all depths, each once in a coated body.
+  subroutine find_levels(inside, depth, level, fields, error)
+    type(layered_body_t), intent(in) :: inside
+    !> Depths of the points [m]
+    real(wp), intent(in) :: depth(:)
+    !> Number of the depth of each point
+    integer, allocatable, intent(out) :: level(:)
+    !> Fields at the depths
+    type(depth_fields_t), allocatable, intent(out) :: fields(:)
+    !> Allocated on failure: layers that images do not describe
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: raised
+    integer, allocatable :: first(:)
+    integer :: i, n
+
+    allocate (level(size(depth)), first(size(depth)))
+    n = 0
+    do i = 1, size(depth)
+      if (size(inside%layer) > 0) level(i) = findloc(abs(depth(first(:n)) - depth(i)) <= 0.0_wp, .true., dim=1)
+      if (size(inside%layer) > 0 .and. level(i) > 0) cycle
+      n = n + 1
+      first(n) = i
+      level(i) = n
+    end do
+    allocate (fields(n))
+    !$omp parallel do schedule(dynamic) private(raised)
+    do i = 1, n
+      call new_depth_fields(fields(i), inside, depth(first(i)), raised)
+      if (allocated(raised)) then
+        !$omp critical
+        error = raised
+        !$omp end critical
+      end if
+    end do
+    !$omp end parallel do
+  end subroutine find_levels
 
   !> Refuse the number of a body that there is not.
   pure subroutine check_body(body, error)

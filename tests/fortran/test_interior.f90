@@ -10,6 +10,7 @@ module test_interior
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
   use hc_interior_triangle, only: triangle_fields, mesh_fields
+  use hc_depth_fields, only: half_space_of
   use hc_interior_points, only: fields_at_points
   use hc_interior_planes, only: interior_planes_t, new_interior_planes
   use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
@@ -222,12 +223,13 @@ contains
       call new_lattice(lattice, bases(:, :, b), [-3, 2], [9, 6], raised, [0.3_wp, 0.1_wp])
       call lattice%coordinates(x, y)
       do body = 1, 2
-        call new_interior_planes(planes, lattice, body, 0.25_wp, raised)
+        call new_interior_planes(planes, lattice, body, half_space_of(0.25_wp), raised)
         do k = 0, 2
           depth = 0.15_wp*k
           call planes%set_depth(depth(1), raised)
           call planes%apply(traction(:, :, :, 1), plane, raised)
-          call fields_at_points(lattice, traction, body, 0.25_wp, transpose(reshape([x, y, depth], [54, 3])), u, s, raised)
+          call fields_at_points(lattice, traction, body, half_space_of(0.25_wp), transpose(reshape([x, y, depth], [54, 3])), &
+                                u, s, raised)
           call check(error, reshape(plane, [54*6]), reshape(transpose(s(:, :, 1)), [54*6]), 1.0e-13_wp, 'stress on a plane')
           if (allocated(error)) return
         end do
@@ -248,7 +250,7 @@ contains
     call random_number(traction)
     at = matmul(lattice%basis, [2.0_wp, 1.0_wp])
     do body = 1, 2
-      call fields_at_points(lattice, traction, body, 0.2_wp, reshape([at, 0.0_wp], [3, 1]), u, s, raised)
+      call fields_at_points(lattice, traction, body, half_space_of(0.2_wp), reshape([at, 0.0_wp], [3, 1]), u, s, raised)
       call check(error, reshape(s([zz, xz, yz], 1, :), [6]), reshape(-traction(3, 2, :, :), [6]), thr, 'surface')
       if (allocated(error)) return
     end do
@@ -316,7 +318,7 @@ contains
     call check_true(error, allocated(raised), 'a ratio of Poisson of 0.6 is refused')
     if (allocated(error)) return
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 4], raised)
-    call new_interior_planes(planes, lattice, 3, 0.3_wp, raised)
+    call new_interior_planes(planes, lattice, 3, half_space_of(0.3_wp), raised)
     call check_true(error, allocated(raised), 'a third body is refused')
   end subroutine test_arguments
 

@@ -1,11 +1,15 @@
 !> Bodies with coatings: responses, images, limits, and both methods with friction.
 module test_layers
   use hc_precision, only: wp, pi
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_block
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
-  use hc_layer_response, only: layer_t, layered_body_t, n_response
+  use hc_layer_response, only: layer_t, layered_body_t, n_response, of_normal, of_along, of_across, of_coupling, n_wave, &
+                               ll_p, tt_p, zz_p, lz_p, ll_q, zz_q, lz_q, tz_t, lt_t, uz_p, ul_p, uz_q, ul_q, ut_t
+  use hc_interior_points, only: fields_at_points
+  use hc_interior_planes, only: interior_planes_t, new_interior_planes
+  use hc_depth_fields, only: half_space_of
   use hc_layered_pair, only: coating_t, layered_pair_t, new_layered_pair
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_coulomb, only: coulomb_t
@@ -29,6 +33,8 @@ contains
 
     tests = [ &
       new_test('responses', test_responses), &
+      new_test('fields_at_depths', test_depths), &
+      new_test('stress_in_layers', test_stress), &
       new_test('equal_materials', test_equal), &
       new_test('split_layer', test_split), &
       new_test('limits', test_limits), &
@@ -66,6 +72,107 @@ contains
     close (unit)
     if (.not. allocated(error)) call check_true(error, n_row == 30, 'all rows were read')
   end subroutine test_responses
+
+  !> Waves below the surface: its displacements and tractions, equilibrium and Hooke's law in each layer, no jump between them.
+  subroutine test_depths(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: step = 1.0e-4_wp
+    integer, parameter :: continuous(9) = [zz_p, lz_p, zz_q, lz_q, tz_t, uz_p, ul_p, uz_q, ul_q]
+    type(layered_body_t) :: body
+    type(layer_t) :: here
+    real(wp), dimension(n_wave) :: f, rate
+    real(wp) :: k, z, law(9)
+    integer :: i
+
+    body%layer = [layer_t(0.5_wp, 3.0_wp, 0.3_wp), layer_t(0.2_wp, 0.4_wp, 0.45_wp), layer_t(0.6_wp, 1.5_wp, 0.1_wp)]
+    body%base = layer_t(0.0_wp, 1.0_wp, 0.25_wp)
+    do i = 1, 12
+      k = 0.3_wp*i
+      f = body%at_depth(k, 0.0_wp)
+      call check(error, f([zz_p, lz_p, zz_q, lz_q, tz_t]), [-1.0_wp, 0.0_wp, 0.0_wp, -1.0_wp, -1.0_wp], 1.0e-13_wp, 'tractions')
+      if (allocated(error)) return
+      associate (known => 2.0_wp*pi*body%response(k))
+        call check(error, f([uz_p, ul_q, ut_t, ul_p, uz_q]), [known([of_normal, of_along, of_across]), &
+                                                              known(of_coupling), -known(of_coupling)], 1.0e-13_wp, 'surface')
+      end associate
+      if (allocated(error)) return
+      f = body%at_depth(k, 0.5_wp) - body%at_depth(k, 0.5_wp*(1.0_wp + 1.0e-14_wp))
+      call check(error, largest_of(f(continuous)), 0.0_wp, 1.0e-12_wp, 'jumps')
+      if (allocated(error)) return
+      z = 0.14_wp*i - 0.09_wp
+      here = body%material_at(z)
+      f = body%at_depth(k, z)
+      rate = (8.0_wp*(body%at_depth(k, z + step) - body%at_depth(k, z - step)) &
+              - body%at_depth(k, z + 2.0_wp*step) + body%at_depth(k, z - 2.0_wp*step))/(12.0_wp*step*k)
+      associate (nu => here%poisson_ratio, g => here%shear_modulus)
+        ! equilibrium along L, z and T
+        law = [rate(lz_p) + f(ll_p), rate(zz_p) - f(lz_p), rate(lz_q) - f(ll_q), rate(zz_q) + f(lz_q), rate(tz_t) - f(lt_t), &
+               ! Hooke's law: strains zz, Lz and TT of a stress
+               2.0_wp*g*rate(uz_p) - f(zz_p) + nu*(f(ll_p) + f(tt_p) + f(zz_p))/(1.0_wp + nu), &
+               g*(rate(ul_p) + f(uz_p)) - f(lz_p), g*rate(ut_t) - f(tz_t), f(tt_p) - nu*(f(ll_p) + f(zz_p))]
+      end associate
+      call check(error, largest_of(law), 0.0_wp, 1.0e-8_wp, 'equations')
+      if (allocated(error)) return
+    end do
+
+  contains
+
+    pure real(wp) function largest_of(values)
+      real(wp), intent(in) :: values(:)
+      largest_of = maxval(abs(values))
+    end function largest_of
+  end subroutine test_depths
+
+  !> Points in a layer and below it: tractions of the surface, no jump at the base, planes, a layer of the material below.
+  subroutine test_stress(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: across(3) = [3, 5, 6]
+    real(wp), parameter :: thickness(3) = [1.0_wp, 0.6_wp, 2.5_wp], modulus(3) = [3.0_wp, 0.02_wp, 100.0_wp]
+    type(lattice_t) :: lattice
+    type(layered_body_t) :: body
+    type(interior_planes_t) :: planes
+    type(error_t), allocatable :: raised
+    real(wp) :: traction(8, 6, 3, 1), plane(8, 6, 6), points(3, 4), u(3, 4, 1), s(6, 4, 1), plain_u(3, 4, 1), plain(6, 4, 1)
+    real(wp) :: node(2)
+    integer :: i, number
+
+    call random_number(traction)
+    do number = 1, 2
+      do i = 1, size(modulus)
+        call new_lattice(lattice, equilateral_basis(0.5_wp), [-4, -3], [8, 6], error)
+        if (allocated(error)) return
+        body%layer = [layer_t(thickness(i), modulus(i), 0.3_wp)]
+        body%base = layer_t(0.0_wp, 1.0_wp, 0.2_wp)
+        node = matmul(lattice%basis, [0.0_wp, -1.0_wp])
+        points(:2, :) = spread(node, 2, 4)
+        points(3, :) = thickness(i)*[0.0_wp, 0.4_wp, 1.0_wp, 1.0_wp + 1.0e-10_wp]
+        call fields_at_points(lattice, traction, number, body, points, u, s, error)
+        if (allocated(error)) return
+        call check(error, s([3, 6, 5], 1, 1), -traction(5, 3, :, 1), 1.0e-12_wp, 'surface')
+        if (allocated(error)) return
+        call check(error, s(across, 3, 1), s(across, 4, 1), 1.0e-8_wp, 'traction at the base')
+        if (allocated(error)) return
+        call check(error, u(:, 3, 1)/maxval(abs(u)), u(:, 4, 1)/maxval(abs(u)), 1.0e-8_wp, 'displacement at the base')
+        if (allocated(error)) return
+        call new_interior_planes(planes, lattice, number, body, error)
+        if (.not. allocated(error)) call planes%set_depth(points(3, 2), error)
+        if (.not. allocated(error)) call planes%apply(traction(:, :, :, 1), plane, error)
+        if (allocated(error)) return
+        call check(error, plane(5, 3, :)/maxval(abs(plane)), s(:, 2, 1)/maxval(abs(plane)), 1.0e-11_wp, 'plane')
+        if (allocated(error)) return
+        body%layer(1) = layer_t(thickness(i), 1.0_wp, 0.2_wp)
+        call fields_at_points(lattice, traction, number, body, points, u, s, error)
+        if (.not. allocated(error)) call fields_at_points(lattice, traction, number, half_space_of(0.2_wp), points, plain_u, &
+                                                         plain, error)
+        if (allocated(error)) return
+        call check(error, [s, u], [plain, plain_u], 1.0e-8_wp, 'a layer of the material below')
+        if (allocated(error)) return
+      end do
+    end do
+    body%base%shear_modulus = 0.0_wp
+    call fields_at_points(lattice, traction, 1, body, points, u, s, raised)
+    call check_raised(error, raised, status%invalid_input, 'points in a rigid base')
+  end subroutine test_stress
 
   !> A layer of the material below is none: all blocks are those of half-spaces.
   subroutine test_equal(error)

@@ -9,6 +9,10 @@ module test_periodic
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_depth_fields, only: half_space_of
+  use hc_layer_response, only: layer_t, layered_body_t
+  use hc_interior_points, only: fields_at_points
+  use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_periodic_symbol, only: periodic_symbols_t, new_periodic_symbols, n_symbol
@@ -39,7 +43,9 @@ contains
       new_test('bad_windows', test_bad), &
       new_test('superposition', test_superposition), &
       new_test('flat', test_flat), &
-      new_test('unlike', test_unlike)]
+      new_test('unlike', test_unlike), &
+      new_test('waves_below', test_below), &
+      new_test('planes_below', test_planes)]
   end subroutine collect_periodic
 
   !> Frequencies of the equilateral lattice, K1 from Epstein's zeta sums, the others from extrapolated alias sums; at the
@@ -465,5 +471,79 @@ contains
     call check_true(error, all(after%pressure > 0.0_wp) .and. all(after%zone == stick), 'complete contact, which sticks')
     call check(error, after%motion(1), 0.0_wp, 1.0e-9_wp, 'no mean gap')
   end subroutine test_unlike
+
+  !> A wave of pressure and one of shear, linear between nodes: Westergaard's stress of each of its harmonics.
+  subroutine test_below(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 16, n_harmonic = 3000
+    real(wp), parameter :: nu = 0.3_wp, depth(7) = [0.0_wp, 0.01_wp, 0.1_wp, 0.12_wp, 0.13_wp, 0.3_wp, 0.9_wp]
+    type(lattice_t) :: lattice
+    real(wp) :: traction(n, 4, 3, 1), points(3, size(depth)), u(3, size(depth), 1), s(6, size(depth), 1), known(6), k, e, x(n, 4)
+    integer :: i, m
+
+    call new_lattice(lattice, oblique_basis(1.0_wp/n, 1.3_wp, 0.5_wp*pi, 0.0_wp), [-3, 1], [n, 4], error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    call lattice%coordinates(x, traction(:, :, 2, 1))
+    traction(:, :, 1, 1) = 2.0_wp + cos(2.0_wp*pi*x)
+    traction(:, :, 2, 1) = 0.3_wp*sin(2.0_wp*pi*x)
+    traction(:, :, 3, 1) = -0.2_wp
+    do i = 1, size(depth)
+      points(:, i) = [0.13_wp, 0.4_wp, depth(i)]
+    end do
+    call fields_at_points(lattice, traction, 1, half_space_of(nu), points, u, s, error)
+    if (allocated(error)) return
+    do i = 1, size(depth)
+      known = [0.0_wp, 0.0_wp, -2.0_wp, 0.0_wp, 0.2_wp, 0.0_wp]
+      do m = -n_harmonic, n_harmonic
+        k = 2.0_wp*pi*(1 + m*n)
+        e = (sin(k/(2*n))/(k/(2*n)))**2*exp(-abs(k)*depth(i))
+        associate (c => cos(k*points(1, i)), q => 0.3_wp*sign(1.0_wp, k), kz => abs(k)*depth(i))
+          known(1) = known(1) + e*c*(kz - 1.0_wp + q*(2.0_wp - kz))
+          known(2) = known(2) + 2.0_wp*nu*e*c*(q - 1.0_wp)
+          known(3) = known(3) + e*c*(q*kz - 1.0_wp - kz)
+          known(6) = known(6) - e*sin(k*points(1, i))*(sign(kz, k) + 0.3_wp*(1.0_wp - kz))
+        end associate
+      end do
+      call check(error, s(:, i, 1), known, 3.0e-7_wp, 'stress of a wave')
+      if (allocated(error)) return
+    end do
+  end subroutine test_below
+
+  !> Planes are the values at their nodes, in both bodies and below layers; their means are those of the tractions.
+  subroutine test_planes(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: depth(4) = [0.0_wp, 0.07_wp, 0.25_wp, 0.5_wp]
+    type(lattice_t) :: lattice
+    type(layered_body_t) :: body(2)
+    type(periodic_interior_t) :: repeating
+    real(wp) :: traction(8, 6, 3, 2), stress(8, 6, 6, 2), moved(8, 6, 3, 2), points(3, 1), u(3, 1, 2), s(6, 1, 2)
+    integer :: i, j
+
+    call random_number(traction)
+    call new_lattice(lattice, oblique_basis(0.1_wp, 0.7_wp, 1.2_wp, 0.4_wp), [-2, 3], [8, 6], error, [0.3_wp, 0.1_wp])
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    body(1) = half_space_of(0.25_wp)
+    body(2)%layer = [layer_t(0.2_wp, 3.0_wp, 0.3_wp)]
+    body(2)%base = layer_t(0.0_wp, 1.0_wp, 0.2_wp)
+    do i = 1, 2
+      do j = 1, size(depth)
+        points(:2, 1) = lattice%origin + matmul(lattice%basis, [2.0_wp + 8.0_wp, 5.0_wp - 6.0_wp])
+        points(3, 1) = depth(j)
+        call fields_at_points(lattice, traction, 1, body(i), points, u, s, error)
+        if (allocated(error)) return
+        call new_periodic_interior(repeating, lattice, 1, body(i), traction, field_space_t(), error)
+        if (.not. allocated(error)) call repeating%on_plane(depth(j), stress, error)
+        if (.not. allocated(error)) call repeating%on_plane(depth(j), moved, error)
+        if (allocated(error)) return
+        call check(error, [stress(5, 3, :, :), moved(5, 3, :, :)], [s(:, 1, :), u(:, 1, :)], 1.0e-8_wp, 'plane')
+        if (allocated(error)) return
+        call check(error, [sum(sum(stress(:, :, [3, 6, 5], :), dim=1), dim=1)]/48, [-sum(sum(traction, dim=1), dim=1)]/48, &
+                   1.0e-7_wp, 'means')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_planes
 
 end module test_periodic

@@ -1,7 +1,7 @@
 !> Rolling bodies: the tractions of the scheme at given creepages, steady and step by step, on rows of the lattice.
 module test_rolling
   use hc_precision, only: wp, pi
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, stick, &
     separated
@@ -11,6 +11,7 @@ module test_rolling
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
+  use hc_creep_loads, only: creep_loads_t, find_creep_loads
   use hc_load_path, only: advance, step_settings_t
   use hc_rolling, only: rolling_t, row_along
   use test_friction, only: new_sphere
@@ -44,6 +45,7 @@ contains
       new_test('powers', test_powers), &
       new_test('unlike', test_unlike), &
       new_test('to_steady', test_to_steady), &
+      new_test('creep_loads', test_creep_loads), &
       new_test('torque_and_creepage', test_torque)]
   end subroutine collect_rolling
 
@@ -214,6 +216,48 @@ contains
     end do
     call check_true(error, first(1) > 0.2_wp .and. abs(first(2)) > 0.1_wp, 'of no small size')
   end subroutine test_directions
+
+  !> Loads of many creepages are those of each; a case without solution is the last one.
+  subroutine test_creep_loads(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: creepage(3, 4) = reshape([-0.1_wp, 0.0_wp, 0.0_wp, -0.3_wp, 0.1_wp, 0.0_wp, 0.2_wp, -0.4_wp, 1.0_wp, &
+                                                     2.0_wp, 3.0_wp, -0.5_wp], [3, 4])
+    type(error_t), allocatable :: raised
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, begun
+    type(creep_loads_t) :: found
+    type(load_target_t) :: target
+    real(wp) :: load
+    integer :: k
+
+    call new_disc(contact, 9, [0.0_wp, 0.0_wp], 0.0_wp, load, error)
+    if (allocated(error)) return
+    target%value(1) = load
+    target%rolling = rolling_t([1, 0], .true.)
+    call new_friction_state(begun, contact%problem%lattice)
+    state = begun
+    call find_creep_loads(contact, state, target, creepage, step_settings_t(accurate), found, error)
+    if (allocated(error)) return
+    call check(error, found%n_solved, size(creepage, 2), 'all cases')
+    do k = 1, size(creepage, 2)
+      if (allocated(error)) return
+      call check_true(error, found%work(k) > 1.0_wp .and. found%work(k) <= 60.0_wp, 'operator applications')
+      if (allocated(error)) return
+      if (allocated(state%pressure)) deallocate (state%pressure)
+      call roll(contact, state, [f, d, d, d], [load, creepage(:, k)], .true., error)
+      if (allocated(error)) return
+      call check(error, found%load(:, k)/load, state%load(2:4)/load, 1.0e-8_wp, 'loads of a case')
+    end do
+    if (allocated(error)) return
+    state = begun
+    call find_creep_loads(contact, state, target, creepage, step_settings_t(accurate, max_sweeps=1, max_cuts=0), found, error)
+    if (allocated(error)) return
+    call check(error, found%n_solved, 0, 'no solution in one sweep')
+    if (allocated(error)) return
+    target%rolling%steady = .false.
+    call find_creep_loads(contact, state, target, creepage, step_settings_t(accurate), found, raised)
+    call check_raised(error, raised, status%invalid_input, 'no steady state')
+  end subroutine test_creep_loads
 
   !> Prescribed loads lead to creepages that cause these loads.
   subroutine test_loads(error)

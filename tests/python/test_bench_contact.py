@@ -1,10 +1,12 @@
 """The comparison with CONTACT: its executable is named by CONTACT_PROGRAM; here a script stands in for it."""
 
+import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from bench import contact, problems, report, run
+from bench import contact, creep, problems, report, run
 from test_bench_report import OPTIONS
 
 # Reads the number of elements of the last case, and writes what CONTACT writes of it.
@@ -46,6 +48,17 @@ def test_zones_version_and_share_of_stick_are_read(tmp_path: Path, monkeypatch: 
     assert zones == [(361, 177, 45, 132)] and 0 < seconds < 60
     assert found.history("AT_ONCE", 19, problems.TOLERANCE, repeats=1) < 60
     assert found.stick_share == 45 / 177
+
+
+def test_cases_of_a_creep_table_make_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = STAND_IN.replace("FN FX CETA CPHI", "FN CKSI CETA CPHI").replace("[1]) < 0", "[1]) >= 0")
+    monkeypatch.setenv("CONTACT_PROGRAM", program(tmp_path, script))
+    table = report.Table("Creep", ["what"] * 7)
+    cases = list(creep.neighbors())
+    assert len(set(cases)) == math.prod(creep.COUNTS)
+    there = contact.Program(Path(program(tmp_path, script)))
+    creep.add_contact(table, there, np.array(cases[:3]))
+    assert [row[0] for row in table.rows] == ["CONTACT, a/b = 1"] * 2
 
 
 def test_a_history_makes_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

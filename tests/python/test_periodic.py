@@ -65,7 +65,7 @@ def test_an_asperity_far_from_the_next_is_alone() -> None:
 
 
 def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
-    """Loads by their means, a result file, refused stress and edges."""
+    """Loads by their means, a result file, stress below, refused edges."""
     case = waves(
         body_2={"rigid": True},
         friction_coefficient=0.3,
@@ -86,16 +86,113 @@ def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
     assert read.lattice == case.lattice
     assert read.lattice.periodic
     assert read.traction_field().source == "nodes"
-    with pytest.raises(DeckError, match="stress below a window that repeats is not available yet"):
-        read.stress()
-    with pytest.raises(DeckError, match="stress below a window that repeats is not available yet"):
-        plotting.stress(read)
+    below = read.stress(depths=[0.0, 0.1e-3])
+    assert below.attrs["tractions"] == "nodes"
+    loads = {"stress_zz": "pressure", "stress_xz": "traction_x", "stress_yz": "traction_y"}
+    for name, load in loads.items():
+        surface, deep = below[name].values
+        peak = float(last["max_pressure"])
+        assert abs(surface + last[load].values).max() < 1e-6 * peak
+        assert deep.mean() == pytest.approx(-float(last[load].mean()), abs=1e-6 * peak)
+    with pytest.raises(DeckError, match='source = "edges": expected "nodes" in a window that repeats'):
+        read.stress(depths=[0.0], source="edges")
+    plotting.stress(read)
     charts = {chart["title"]: chart for chart in charts_of(read.history.reset_index().to_dict("records"))}
     [gaps] = charts["Mean gap"]["curves"].values()
     assert gaps[0] is None  # before the first load step the mean gap is that of the waves, and no load
     assert charts["Mean gap"]["unit"] == "nm"
     assert gaps[1] * 1e-9 == pytest.approx(float(read.mean_gap[0]), rel=1e-4)
     assert Case.from_text(read.deck).lattice == case.lattice
+
+
+def test_stress_below_a_wave() -> None:
+    """A wave pressed flat and sheared: Westergaard's stress (Johnson, 13.2), and the mean tractions."""
+    height, length = HEIGHT, WAVE
+    peak = math.pi * E_STAR * height / length
+    case = waves(
+        expression=f"{height}*(1 - cos(2*pi*x/{length}))",
+        friction_coefficient=0.5,
+        loads=[{"mean_pressure": 1.5 * peak}, {"mean_traction_x": 0.1 * peak}],
+    )
+    result = case.run()
+    x, depth = np.meshgrid([0.0, 0.11e-3, 0.4e-3], [0.0, 2e-6, 20e-6, 50e-6, 200e-6, 2e-3], indexing="ij")
+    points = np.stack([x, 0.3e-3 + 0 * x, depth], axis=-1)
+    found = result.stress(points=points)
+    k = 2 * math.pi / length
+    wave = peak * np.exp(-k * depth)
+    known = {
+        "stress_zz": -1.5 * peak - (1 + k * depth) * wave * np.cos(k * x),
+        "stress_xx": -(1 - k * depth) * wave * np.cos(k * x),
+        "stress_yy": -0.6 * wave * np.cos(k * x),
+        "stress_xz": -0.1 * peak - k * depth * wave * np.sin(k * x),
+        "stress_xy": 0.0,
+    }
+    for name, values in known.items():
+        assert abs(found[name].values - values).max() < 1e-3 * peak
+    other = result.stress(points=points, body=2)
+    assert abs(other["stress_zz"] - found["stress_zz"]).max() < 1e-9 * peak
+    mirrored = points * [-1.0, 1.0, 1.0]  # body 2 bears the opposite shear, and z points out of it
+    seen = result.stress(points=mirrored, body=2)["stress_xz"]
+    assert abs(seen - found["stress_xz"]).max() < 1e-6 * peak
+
+
+def test_stress_below_an_asperity_far_from_the_next() -> None:
+    """Beside the free window: the difference falls like the third power of the distance.
+
+    The mean pressure has no stress in the plane; on a wide disc it has -(1 + 2 nu)/2 of it.
+    """
+    radius, a, spacings = 10e-3, 0.1e-3, 8
+    load = 4 * E_STAR * a**3 / (3 * radius)
+    points = a * np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.1], [0.0, 0.0, 0.5], [1.0, 0.2, 1.0]])
+
+    def below(cells: int, periodic: bool) -> xarray.Dataset:
+        n = cells * spacings
+        lattice = Lattice(a / spacings, -n // 2, -n // 2, n, n, cell_angle=math.pi / 2, periodic=periodic)
+        gap = lambda x, y: (x * x + y * y) / (2 * radius)  # noqa: E731
+        bodies = {"body_1": STEEL, "body_2": STEEL}
+        return (
+            Case(gap=gap, lattice=lattice, normal_load=load, **bodies)
+            .run()
+            .stress(points=points, source="nodes")
+        )
+
+    alone = below(8, periodic=False)
+    peak = -float(alone["stress_zz"].min())
+    change = {}
+    for cells in (8, 16):
+        apart = below(cells, periodic=True)
+        mean = load / (cells * a) ** 2
+        more = {"stress_xx": -0.8 * mean, "stress_yy": -0.8 * mean, "von_mises_stress": np.nan}
+        change[cells] = max(
+            float(abs(apart[name] + more.get(name, 0.0) - alone[name]).max()) / peak
+            for name in alone.data_vars
+            if not np.isnan(more.get(name, 0.0))
+        )
+    assert change[16] < 1e-3
+    assert change[8] / change[16] > 6
+
+
+def test_boxes_and_cycles_below() -> None:
+    """Nodes beyond the window are those of the next; fatigue parameters of a cycle."""
+    segments = [(name, sign * 0.02 * FULL) for name, sign in (("pull", 1), ("push", -1), ("back", 1))]
+    path = [{"label": name, "mean_traction_x": load, "steps": 4} for name, load in segments]
+    case = waves(
+        32,
+        friction_coefficient=0.3,
+        loads=[{"mean_pressure": 0.2 * FULL}, {"path": path}],
+    )
+    result = case.run()
+    inside, outside = (
+        result.stress("stress_xx", depths=[20e-6], box=[[x, x + 0.5e-3], [-0.2e-3, 0.2e-3]])
+        for x in (-0.5e-3, 1.5e-3)
+    )
+    assert np.array_equal(inside["stress_xx"].values, outside["stress_xx"].values)
+    assert float(outside["x"].min()) > 1e-3
+    given = {"crossland_slope": 0.3, "segment": ["push", "back"]}
+    plane = result.fatigue("crossland", depths=[20e-6], **given)
+    places = np.stack([plane["x"].values, plane["y"].values, 20e-6 + 0 * plane["x"].values], axis=-1)
+    alone = result.fatigue("crossland", points=places[::9, ::7], **given)
+    assert plane["crossland"].values[0, ::9, ::7] == pytest.approx(alone["crossland"].values, rel=1e-6)
 
 
 def test_steps_one_by_one() -> None:
@@ -197,6 +294,12 @@ def test_a_wave_may_be_steepest_at_the_seam() -> None:
     assert waves(16, wave, loads={"mean_pressure": 1e6}).run().complete
     with pytest.raises(DeckError, match="the gap does not repeat"):
         waves(16, f"{wave} + 1e-5*x", loads={"mean_pressure": 1e6})
+
+
+def test_stress_has_the_tractions_of_nodes() -> None:
+    below = {"stress": [{"depths": [1e-5], "source": "edges"}]}
+    with pytest.raises(DeckError, match=r'stress.1.source = "edges": expected "nodes" beside a window that'):
+        waves(loads={"mean_pressure": 1e6}).changed(below)
 
 
 def test_lattices_of_python_repeat_too() -> None:

@@ -311,6 +311,19 @@ _ALL = (
     ),
     Check("torsion", "Torsion", "Spheres twisted, against Lubkin.", _of("tangential", "torsion")),
     Check(
+        "rolling-linear",
+        "Linear theory of rolling",
+        "Coefficients of an ellipse against Kalker's table and an independent calculation.",
+        _of("rolling", "linear"),
+    ),
+    Check(
+        "rolling",
+        "Creep forces of a circle",
+        "Steady rolling against an independent calculation.",
+        _of("rolling", "nonlinear"),
+    ),
+    Check("carter", "Rolling cylinders", "Middle of a roller, against Carter.", _of("rolling", "carter")),
+    Check(
         "long-contact",
         "Middle of a long contact, sheared (Figure 13.3)",
         "Tractions in the mid-plane against the plane solution of Cattaneo and Mindlin.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,6 +56,7 @@ def study(
     log_level: frame.Level = None,
 ) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
+    from ..deck.toml import read_toml
     from ..study.study import Study, study_reporter
     from .solving import Messages
 
@@ -63,6 +65,12 @@ def study(
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
     messages = Messages("study", quiet, as_json, log_file, log_level)
+    if "creep_table" in read_toml(file, "a study")[0]:
+        options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}
+        options |= {"--plan": plan, "--skip-invalid": skip_invalid, "--retry": retry}
+        if given := [name for name, value in options.items() if value not in (None, False)]:
+            raise DeckError(f"{given[0]}: expected no such option with a creep table, which is one case")
+        return _creep_table(file, output, messages)
     unchecked = case is not None or (collect and not skip_invalid)
     check: CheckLevel = "nothing" if unchecked else "decks" if plan else "windows"
     planned = Study.from_toml(file, output, check, skip_invalid)
@@ -98,6 +106,29 @@ def study(
         return {"exit_code": state.exit_code, **state.content()}
     if state.exit_code:
         raise SystemExit(state.exit_code)
+    return None
+
+
+def _creep_table(file: Path, output: Path | None, messages: Messages) -> frame.Content:
+    """Compute a creep table; a signal ends the process, and nothing is written."""
+    from ..solve.events import Lines
+    from ..study.creep import CreepStudy
+
+    table = CreepStudy.from_toml(file, output)
+    found: list[Any] = []
+    with messages.logging(file, table.output, table.table):
+        try:
+            with signal_pipe() as pipe:
+                listener = None if messages.silent else Lines(sys.stderr)
+                in_background(lambda: found.append(table.run(listener)), pipe)
+        except Interrupted as signaled:
+            messages.interrupted(signaled, "nothing is written")
+    errors = found[0].attrs["interpolation_error"]
+    if messages.as_json:
+        content = {"title": table.title, "output": table.output, "table": table.table, "exit_code": 0}
+        return content | {"cases": found[0]["status"].size, "interpolation_error": errors}
+    if not messages.quiet:
+        frame.print_output(f"written: {table.output}, {table.table}")
     return None
 
 

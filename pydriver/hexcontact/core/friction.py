@@ -284,6 +284,29 @@ class FrictionalContact(Contact):
         self._warn_of_rim(found)
         return found
 
+    def creep_loads(
+        self,
+        state: ContactState,
+        control: str,
+        value: float,
+        creepages: ArrayLike,
+        rolling: Rolling,
+        tolerance: float = 1e-8,
+    ) -> tuple[Array, Array, ContactState]:
+        """Return loads and work of many creepages in the steady state, up to the first failure.
+
+        Each row of creepages (x, y, spin) starts from the row before it, the first from `state`. The loads
+        are along x and y, and the torque; the last state is that of the last row.
+        """
+        tolerance, *_ = checked(tolerance=tolerance)
+        motions = reals(creepages, "creepages", (len(np.atleast_1d(creepages)), 3))
+        kinds = [CONTROLS[control], *[CONTROLS["displacement"]] * 3]
+        loads, work, solved, handle = self.called(
+            *(flat.creep_loads, kinds, [value, *[0.0] * 6], motions, tolerance, MAX_SWEEPS, MAX_CUTS),
+            *(rolling.ahead(self.lattice), self._held(state)),
+        )
+        return loads[:solved], work[:solved], self.solution(handle)
+
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
         flat.set_worn_depth(self, depth)

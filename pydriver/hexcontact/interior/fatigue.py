@@ -16,11 +16,12 @@ from ..arrays import Array, DataFrame, Dataset
 from ..core import fatigue, memory
 from ..core.lattice import Lattice
 from ..deck.below import NEEDS, Criteria
-from ..errors import DeckError
+from ..errors import DeckError, NotInResult
 from . import fields
 from .fields import Region, region
-from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, source_of, summed, window_over
+from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, summed, window_over
 
+COATED = "moduli and constants of fatigue parameters are those of one material"
 SLIPS = ("slip_increment_x", "slip_increment_y")
 _BLOCK = 1 << 27  # bytes of stress histories that are held at once, at least
 _AT_ONCE = 8  # steps whose stress on a plane is held besides
@@ -98,7 +99,8 @@ def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
     if where.lattice is not None and not summed(lattice, where):
         whole, _, _ = window_over(lattice, where.lattice)
         # tractions, and the stress on a plane twice
-        besides = max(besides, fields.planes_memory(whole) + 8 * min(steps, _AT_ONCE) * 15 * whole.size)
+        planes = fields.planes_memory(whole, min(steps, _AT_ONCE), coated=False)
+        besides = max(besides, planes + 8 * min(steps, _AT_ONCE) * 15 * whole.size)
     return 2 * loads + block + besides + 104 * where.count
 
 
@@ -118,7 +120,7 @@ def histories(loaded: Loaded, where: Region) -> Iterator[tuple[slice, Array]]:
 
 def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple[slice, Array]]:
     """Yield the histories that follow from the tractions of the lattice."""
-    lattice, steps, body, poisson_ratio = loaded.lattice, loaded.steps, loaded.body, loaded.material[0]
+    lattice, steps, body, layers = loaded.lattice, loaded.steps, loaded.body, loaded.layers
     block = max(_BLOCK, loads.nbytes)
     most = max(block // (48 * len(steps)), 1)
     memory.require(
@@ -130,8 +132,8 @@ def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple
         points = where.nodes.reshape(-1, 3)
         for first in range(0, where.count, most):
             part = slice(first, min(first + most, where.count))
-            stress = fields.at_points(lattice, loads, body, poisson_ratio, points[part])[1]
-            yield part, np.ascontiguousarray(np.moveaxis(add_bulk(stress, steps, body), 0, 1))
+            stress = fields.at_points(lattice, loads, body, layers, points[part])[1]
+            yield part, np.ascontiguousarray(np.moveaxis(add_bulk(stress, steps, loaded), 0, 1))
         return
     whole, rows, cols = window_over(lattice, where.lattice)
     loads = embedded(lattice, whole, loads)
@@ -139,13 +141,13 @@ def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple
     high = max(most // n_col, 1)
     for plane, depth in enumerate(where.depths):
         for row in range(0, n_row, high):
-            shown = slice(rows.start + row, rows.start + min(row + high, n_row))
-            block_of = np.empty(((shown.stop - shown.start) * n_col, len(steps), 6))
+            shown = rows[row : row + high]
+            block_of = np.empty((len(shown) * n_col, len(steps), 6))
             for first in range(0, len(steps), _AT_ONCE):
                 some = slice(first, first + _AT_ONCE)
-                found = fields.on_planes(whole, loads[some], body, poisson_ratio, [depth])[:, 0]
+                found = fields.on_planes(whole, loads[some], body, layers, [depth])[:, 0]
                 stress = np.moveaxis(found[..., shown, cols], 1, -1)
-                stress = add_bulk(stress.reshape(len(stress), -1, 6), steps[some], body)
+                stress = add_bulk(stress.reshape(len(stress), -1, 6), steps[some], loaded)
                 block_of[:, some] = np.moveaxis(stress, 0, 1)
             start = plane * where.lattice.size + row * n_col
             yield slice(start, start + len(block_of)), block_of
@@ -156,7 +158,9 @@ def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteri
     import xarray
 
     found = region(loaded.lattice, **where)
-    nu, shear_modulus = loaded.material
+    if loaded.coated:
+        raise NotInResult(f"body {loaded.body} has a coating: {COATED}")
+    [[_, shear_modulus, nu]] = loaded.layers
     moduli = {"young_modulus": 2.0 * shear_modulus * (1.0 + nu), "poisson_ratio": nu}
     moduli["shear_modulus"] = shear_modulus
     slip = _surface_slip(loaded.lattice, loaded.steps, found) if "ruiz" in criteria.parameters else None
@@ -174,7 +178,7 @@ def parameters_below(loaded: Loaded, where: Mapping[str, Any], criteria: Criteri
             for key, some in values.items()
         },
         coords=found.coordinates,
-        attrs={"body": np.int32(loaded.body), "tractions": source_of(loaded.steps)},
+        attrs={"body": np.int32(loaded.body), "tractions": loaded.source},
     )
 
 

@@ -160,26 +160,33 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def at_points(
-    lattice: Lattice, tractions: Array, body: int, poisson_ratio: float, points: ArrayLike, threads: int = 0
+    lattice: Lattice, tractions: Array, body: int, inside: ArrayLike, points: ArrayLike, threads: int = 0
 ) -> tuple[Array, Array]:
     """Return G u (step, n, 3) and the stress (step, n, 6; xx, yy, zz, xy, yz, xz) of a body in load steps.
 
-    The influence of each node on each point is worked out once for all steps.
+    `inside` is Poisson's ratio of a half-space, or thickness (m), shear modulus (Pa) and Poisson's ratio of
+    each layer, outermost first, and of what lies below; G is the shear modulus of the surface. The influence
+    of each node on each point is worked out once for all steps.
     """
     x, y, depth = np.asarray(points, dtype=float).reshape(-1, 3).T
     if not x.size:
         return np.empty((len(tractions), 0, 3)), np.empty((len(tractions), 0, 6))
     found: tuple[Array, Array] = flat.interior_at_points(
-        lattice, tractions, body, poisson_ratio, x, y, depth, threads
+        lattice, tractions, body, _layers(inside), x, y, depth, threads
     )
     return found
+
+
+def _layers(inside: ArrayLike) -> Array:
+    """Return the layers of a body, those of a half-space by its Poisson's ratio."""
+    return np.array([[0.0, 1.0, inside]] if np.ndim(inside) == 0 else inside, dtype=float)
 
 
 def on_planes(
     lattice: Lattice,
     tractions: Array,
     body: int,
-    poisson_ratio: float,
+    inside: ArrayLike,
     depths: ArrayLike,
     threads: int = 0,
     components: int = 6,
@@ -189,13 +196,14 @@ def on_planes(
     Parameters as of `at_points`; `depths` are those of the planes below the surface of the body, m. Six
     `components` are those of the stress (Pa), three those of the displacement times the shear modulus (Pa m).
     """
-    where = lattice, tractions, body, poisson_ratio, np.ravel(depths)
+    where = lattice, tractions, body, _layers(inside), np.ravel(depths)
     return np.asarray(flat.interior_on_planes(components, *where, threads))
 
 
-def planes_memory(lattice: Lattice, threads: int = 0) -> int:
+def planes_memory(lattice: Lattice, steps: int, coated: bool, threads: int = 0) -> int:
     """Return the memory in bytes that `on_planes` takes besides its result."""
-    return int(flat.memory_of_planes(lattice.n_col, lattice.n_row, threads))
+    window = lattice.n_col, lattice.n_row
+    return int(flat.memory_of_planes(*window, steps, lattice.periodic, coated, threads))
 
 
 def invariants(stress: ArrayLike) -> Array:

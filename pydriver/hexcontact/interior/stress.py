@@ -158,29 +158,39 @@ class Loaded:
     surface: Surface | None = None  # tractions to the edges, which the stress at depth 0 has exactly
 
     @property
-    def material(self) -> tuple[float, float]:
-        """Poisson's ratio and shear modulus (Pa) of the body."""
+    def layers(self) -> Array:
+        """Thickness (m), shear modulus (Pa) and Poisson's ratio of the layers, and of what lies below."""
         if integer(self.body, "body") not in (1, 2):
             raise DeckError(f"body = {self.body}: expected 1 or 2")
         if not self.bodies:
             raise NotInResult("the result does not say what the bodies are made of")
         one = self.bodies[self.body - 1]
-        if one.coating:
-            raise NotInResult(
-                f"body {self.body} has a coating: stresses are computed in half-spaces without layers only, "
-                "as yet"
-            )
-        if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
+        if one.rigid and not one.coating:
             raise NotInResult(f"body {self.body} is rigid: there is no stress to compute in it")
-        return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
+        constants = [(of.thickness, of.young_modulus, of.poisson_ratio) for of in one.coating]
+        constants.append((0.0, one.young_modulus or 0.0, one.poisson_ratio or 0.0))
+        return np.array([(t, e / (2.0 * (1.0 + nu)), nu) for t, e, nu in constants])
+
+    @property
+    def coated(self) -> bool:
+        """Whether the body has layers."""
+        return len(self.layers) > 1
+
+    @property
+    def source(self) -> str:
+        """Source of tractions by default: the edges, if the contact has some and their fields are kept."""
+        kept = all(name in step for step in self.steps for name in EDGES)
+        return "edges" if kept and not self.lattice.periodic else "nodes"
 
     def tractions(self, source: str | None = None) -> tuple[Array, str]:
         """Return the tractions (step, 3, n_row, n_col; Pa) of the steps, and their source."""
         if source is not None and source not in SOURCES:
             raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
         at_nodes = nodal_tractions(self.steps)
-        if (source or source_of(self.steps)) == "nodes":
+        if (source or self.source) == "nodes":
             return at_nodes, "nodes"
+        if self.lattice.periodic:
+            raise DeckError(f'source = "{source}": expected "nodes" in a window that repeats')
         if missing := [name for name in EDGES if any(name not in step for step in self.steps)]:
             raise NotInResult(
                 f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not "
@@ -204,11 +214,6 @@ def nodal_tractions(steps: Sequence[Fields]) -> Array:
 def _law_of(friction: float) -> FrictionLaw:
     """Return the law, without friction where shear tractions do not follow the pressure."""
     return FrictionLaw(friction if math.isfinite(friction) else 0.0)
-
-
-def source_of(steps: Sequence[Fields]) -> str:
-    """Return the source of tractions taken by default: the edges, if all steps have their fields."""
-    return "edges" if all(name in step for step in steps for name in EDGES) else "nodes"
 
 
 def _edges(lattice: Lattice, loads: Array, step: Fields) -> ContactEdges:
@@ -235,22 +240,22 @@ def below(
             hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
             raise DeckError(f"{name!r} is no quantity below the surface{hint}")
     names = tuple(components) or (*TENSOR, "von_mises_stress")
-    nu, shear_modulus = loaded.material
+    layers = loaded.layers
     loads, used = loaded.tractions(source)
     if found.lattice is None or summed(lattice, found):
         memory.require(
-            memory_needed(lattice, found, len(loads)),
+            memory_needed(lattice, found, len(loads), loaded.coated),
             f"the stress at {found.count} points in {len(loads)} steps",
             "choose fewer points or steps",
         )
-        flat = fields.at_points(lattice, loads, body, nu, found.nodes)
+        flat = fields.at_points(lattice, loads, body, layers, found.nodes)
         moved, stress = (values.reshape(len(loads), *found.shape, -1) for values in flat)
     else:
         moved = np.empty((0, 3))
         if any(name in _DISPLACEMENTS for name in names):
-            moved = _in_box(lattice, loads, body, nu, found, len(_DISPLACEMENTS))
-        stress = _in_box(lattice, loads, body, nu, found, len(TENSOR))
-    add_bulk(stress, steps, body)
+            moved = _in_box(lattice, loads, body, layers, found, len(_DISPLACEMENTS))
+        stress = _in_box(lattice, loads, body, layers, found, len(TENSOR))
+    add_bulk(stress, steps, loaded)
     about: dict[str, Any] = {"body": np.int32(body), "tractions": used}
     if used == "edges":
         near_surface = NearSurface(loaded, loads)
@@ -261,7 +266,7 @@ def below(
     if any(name in _INVARIANTS for name in names):
         scalars = fields.invariants(stress)
         values |= {name: scalars[..., k] for k, name in enumerate(_INVARIANTS)}
-    values |= {name: moved[..., k] / shear_modulus for k, name in enumerate(_DISPLACEMENTS)}
+    values |= {name: moved[..., k] / layers[0, 1] for k, name in enumerate(_DISPLACEMENTS)}
     one = numbers is None
     dims = found.dims if one else ("step", *found.dims)
     return xarray.Dataset(
@@ -271,10 +276,14 @@ def below(
     )
 
 
-def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
+def add_bulk(stress: Array, steps: Sequence[Fields], loaded: Loaded) -> Array:
     """Add the bulk stress of a body to the stress (step, ..., component) by its tractions, and return it."""
     for name in BULK_STRESS:
-        bulk = [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for step in steps]
+        bulk = [float(step.get(name, 0.0)) * (step.get("bulk_body") == loaded.body) for step in steps]
+        if any(bulk) and loaded.coated:
+            raise NotInResult(
+                f"body {loaded.body} has a coating and a bulk stress: that of the layers is not computed"
+            )
         component = TENSOR.index(name.removeprefix("bulk_"))
         stress[..., component] += np.reshape(bulk, (-1, *[1] * (stress.ndim - 2)))
     return stress
@@ -284,14 +293,17 @@ class NearSurface:
     """Correction of the stress of hats next to the surface: roots at the edges, tractions at depth 0."""
 
     def __init__(self, loaded: Loaded, loads: Array) -> None:
-        self._of, self._loads, self._poisson_ratio = loaded, loads, loaded.material[0]
+        self._of, self._loads = loaded, loads
+        thickness, _, self._poisson_ratio = loaded.layers[0]
+        # the correction is that of the outermost material
+        self._deepest = thickness if loaded.coated else math.inf
         self._law = _law_of(loaded.friction)
         self.refused = 0.0  # largest share of an edge without a root
 
     def correct(self, stress: Array, points: Array) -> None:
         """Correct the stress (step, point, 6) at points (point, 3), m."""
         lattice, surface = self._of.lattice, self._of.surface
-        near = points[:, 2] < NEAR * lattice.spacing
+        near = (points[:, 2] < NEAR * lattice.spacing) & (points[:, 2] <= self._deepest)
         if near.any():
             for k, (step, loads) in enumerate(zip(self._of.steps, self._loads, strict=True)):
                 [nodal] = nodal_tractions([step])
@@ -312,19 +324,24 @@ class NearSurface:
 def summed(lattice: Lattice, box: Region) -> bool:
     """Return whether sums at the nodes of a box take less work than planes that cover it and the window."""
     assert box.lattice is not None
+    if lattice.periodic:
+        return False
     return box.lattice.size * lattice.size < _SUMS_FOR_A_NODE * window_over(lattice, box.lattice)[0].size
 
 
-def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = False) -> int:
+def memory_needed(
+    lattice: Lattice, where: Region, steps: int, coated: bool = False, kept: bool = False
+) -> int:
     """Return the memory (bytes) of the stress of steps; `kept`: with the spectra for the next one."""
     if where.lattice is None or summed(lattice, where):
-        return 8 * steps * (6 * lattice.size + 30 * where.count)
+        waves = fields.planes_memory(lattice, steps, coated) if lattice.periodic else 0
+        return 8 * steps * (6 * lattice.size + 30 * where.count) + waves
     whole, count = window_over(lattice, where.lattice)[0], steps * where.depths.size
     # of fifteen influences, of each further depth; stored if those of all depths fit
     spectra = 15 * 8 * 2 * whole.size * (where.depths.size - 1)
-    kept = kept and spectra <= kernel_cache.bound()
+    kept = kept and spectra <= kernel_cache.bound() and not (lattice.periodic or coated)
     return (
-        fields.planes_memory(whole)
+        fields.planes_memory(whole, steps, coated)
         + 8 * (12 * count * where.lattice.size + (6 * count + 6 * steps) * whole.size)
         + kept * spectra
     )
@@ -343,17 +360,20 @@ def tractions_needed(
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 
-def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region, components: int) -> Array:
+def _in_box(
+    lattice: Lattice, loads: Array, body: int, layers: Array, where: Region, components: int
+) -> Array:
     """Return stress, or displacement times shear modulus, (step, depth, n_row, n_col, component)."""
     depths, target = where.depths, where.lattice
     assert target is not None
     whole, rows, cols = window_over(lattice, target)
     memory.require(
-        memory_needed(lattice, where, len(loads)),
+        memory_needed(lattice, where, len(loads), len(layers) > 1),
         f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes in {len(loads)} steps",
         "choose a smaller box, or one nearer to the window, fewer depths or steps",
     )
-    found = fields.on_planes(whole, embedded(lattice, whole, loads), body, nu, depths, components=components)
+    loads = embedded(lattice, whole, loads)
+    found = fields.on_planes(whole, loads, body, layers, depths, components=components)
     return np.moveaxis(found[..., rows, cols], 2, -1)
 
 
@@ -364,15 +384,20 @@ def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
     return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
 
 
-def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, slice, slice]:
-    """Return the window that covers two others, and the rows and columns of the second in it."""
-    low = [min(getattr(lattice, name), getattr(target, name)) for name in ("row_first", "col_first")]
-    high = [
-        max(one.row_first + one.n_row for one in (lattice, target)),
-        max(one.col_first + one.n_col for one in (lattice, target)),
-    ]
-    whole = dataclasses.replace(
-        lattice, row_first=low[0], col_first=low[1], n_row=high[0] - low[0], n_col=high[1] - low[1]
-    )
-    row, col = target.row_first - low[0], target.col_first - low[1]
-    return whole, slice(row, row + target.n_row), slice(col, col + target.n_col)
+def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, NDArray[Any], NDArray[Any]]:
+    """Return a window with the nodes of two others, and rows (n, 1) and columns (1, n) of the second in it.
+
+    A window that repeats has all nodes.
+    """
+    whole = lattice
+    if not lattice.periodic:
+        low = [min(getattr(lattice, name), getattr(target, name)) for name in ("row_first", "col_first")]
+        high = [
+            max(one.row_first + one.n_row for one in (lattice, target)),
+            max(one.col_first + one.n_col for one in (lattice, target)),
+        ]
+        whole = dataclasses.replace(
+            lattice, row_first=low[0], col_first=low[1], n_row=high[0] - low[0], n_col=high[1] - low[1]
+        )
+    rows, cols = target.rows - whole.row_first, target.cols - whole.col_first
+    return whole, rows[:, None] % whole.n_row, cols[None, :] % whole.n_col

@@ -116,7 +116,7 @@ def _below(result: Result | Dataset, step: int, points: Array, *names: str) -> D
     """Return stresses of a load step at points of body 1, or of body 2 if body 1 is rigid."""
     result = as_result(result)
     bodies = bodies_of(result.deck)
-    body = 2 if bodies and (bodies[0].rigid or bodies[0].coating) else 1
+    body = 2 if bodies and (bodies[0].rigid and not bodies[0].coating) else 1
     return result.stress(*names, step=step, body=body, points=points)
 
 

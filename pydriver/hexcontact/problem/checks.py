@@ -129,9 +129,12 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
         yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
     if tables["solver"].method == "direct":
         yield ("solver", "method"), f'expected "fft" {whole}'
-    for name in ("wear", "accuracy", "stress", "fatigue"):
+    for name in ("wear", "accuracy"):
         if tables[name]:
             yield (name,), f"is not available yet {whole}"
+    for place, table in enumerate(tables["stress"]):
+        if table.source == "edges":
+            yield ("stress", place, "source"), f'expected "nodes" {whole}: its contact has no known edge'
 
 
 def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) -> Found:
@@ -149,11 +152,15 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
             ("wear",),
             "expected nothing beside a coating: wear makes a layer thinner, which is not followed",
         )
-    for kind in ("stress", "fatigue"):
-        for place, table in enumerate(tables.get(kind) or ()):
-            if bodies[table.body - 1].coating:
-                sentence = f"body {table.body} has a coating, below which no stress is computed yet"
-                yield (kind, place, "body"), sentence
+    for place, cycle in enumerate(tables.get("fatigue") or ()):
+        if bodies[cycle.body - 1].coating:
+            sentence = f"body {cycle.body} has a coating: constants of fatigue are those of one material"
+            yield ("fatigue", place, "body"), sentence
+    bulk = tables.get("bulk")
+    for place, table in enumerate(tables.get("stress") or ()):
+        if bulk and bodies[bulk.body - 1].coating and table.body == bulk.body:
+            sentence = f"body {table.body} has a coating and a bulk stress: that of layers is not computed"
+            yield ("stress", place, "body"), sentence
     if repeating is None:
         return
     spacing = repeating.lattice.spacing * min(1.0, repeating.lattice.cell_ratio)
@@ -349,7 +356,8 @@ def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fou
     kinds = ("stress", "fatigue")
     below = [(kind, place, table) for kind in kinds for place, table in enumerate(tables[kind])]
     for kind, place, table in below:
-        if (bodies.body_1, bodies.body_2)[table.body - 1].rigid:
+        of = (bodies.body_1, bodies.body_2)[table.body - 1]
+        if of.rigid and not of.coating:
             yield (kind, place, "body"), f"body {table.body} is rigid: there is no stress to compute in it"
         name = table.name or f"{kind}_{place + 1}"
         plain = name.replace("_", "").replace("-", "").isalnum() and len(name.encode()) <= _LONGEST_NAME

@@ -334,8 +334,6 @@ class Result:
         self, body: int, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = True
     ) -> Loaded:
         """Return a body under the tractions of some steps."""
-        if self.lattice.periodic:
-            raise DeckError("stress below a window that repeats is not available yet")
         steps = self._loaded(numbers, more, edges)
         given = self.lattice, steps, bodies_of(self.deck), body, friction_of(self.dataset.attrs)
         return Loaded(*given, surface=lambda place: self.traction_field(numbers[place], "edges"))

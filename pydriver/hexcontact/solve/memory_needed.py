@@ -56,7 +56,8 @@ def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[s
     for number, table in enumerate(case.deck.stress, 1):
         all_steps = math.ceil(len(case.load_steps) / case.output.every)
         steps = all_steps if table.steps == "all" else len(table.steps or (1,))
-        below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
+        coated = bool((case.deck.body.body_1, case.deck.body.body_2)[table.body - 1].coating)
+        below = stress.memory_needed(lattice, region(lattice, **table.where), steps, coated, kept)
         needs[f"stress.{number}"] = max(below, _tractions_memory(case, lattice, steps, table.source))
     for number, cycle in enumerate(case.deck.fatigue, 1):
         steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
@@ -79,7 +80,7 @@ def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str |
     mu = case.friction_coefficient  # nan where it varies
     sheared = math.isnan(mu) or 0.0 < mu < math.inf
     nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
-    used = "nodes" if case.deck.interface else source
+    used = "nodes" if case.deck.interface or lattice.periodic else source
     needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)
     # beside the spectra of the solver, which are kept
     return needed + case.frictional * contact.memory_needed("fft", *lattice.shape, part="operator")

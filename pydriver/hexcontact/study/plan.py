@@ -35,7 +35,7 @@ from ..deck.kinds import (
 from ..deck.read import assemble
 from ..deck.table_base import Table, extended, kind_of, meaning
 from ..deck.toml import as_toml, with_overrides
-from ..deck.units import NUMBER, UnitError, to_si
+from ..deck.units import NUMBER, SPIN, UnitError, to_si
 from ..errors import DeckError, Fault
 from ..problem.checks import checked
 from ..problem.problem import Problem
@@ -142,6 +142,49 @@ class Parameter(Table):
         return self.name or self.key[0].replace(".", "_")
 
 
+def _both_signs(values: Sequence[float]) -> str:
+    return "" if values[0] < 0.0 < values[1] else "expected a number below 0 and one above it"
+
+
+def _from_zero(values: Sequence[float]) -> str:
+    fits = values[0] == 0.0 < values[1] or values[0] < 0.0 < values[1]
+    return "" if fits else "expected 0, or a number below it, and a number above it"
+
+
+_FEWEST = 4  # values along an axis of a creep table: as many as a cubic needs
+
+
+class CreepAxes(Table):
+    """Ranges of a creep table, and numbers of its cases; an empty table takes all from the contact."""
+
+    creepage_x: (
+        Annotated[
+            tuple[float, ...], Several(Quantity(NUMBER), "numbers", "[0, 0.01]", count=2, fault_of=_from_zero)
+        ]
+        | None
+    ) = meaning(None, "range of `creepage_x`; from 0: the table is mirrored; to full slip if absent")
+    creepage_y: (
+        Annotated[
+            tuple[float, ...],
+            Several(Quantity(NUMBER), "numbers", "[-0.01, 0.01]", count=2, fault_of=_both_signs),
+        ]
+        | None
+    ) = meaning(None, "range of `creepage_y` at the pole of the table; to full slip if absent")
+    spin: (
+        Annotated[
+            tuple[float, ...],
+            Several(Quantity(SPIN), "spins", '["0 rad/m", "40 rad/m"]', count=2, fault_of=_from_zero),
+        ]
+        | None
+    ) = meaning(None, "range of `spin`, likewise")
+    counts: Annotated[
+        tuple[int, ...], Several(Whole(_FEWEST, MOST_CASES), "whole numbers", "[12, 27, 10]", count=3)
+    ] = meaning((12, 27, 10), "numbers of creepages x and y and of spins, denser near 0")
+    held_out: Annotated[int, Whole(1, MOST_CASES)] = meaning(
+        50, "random cases that are solved to measure the error of interpolation"
+    )
+
+
 class _Study(Table):
     """A study file without the keys of backends."""
 
@@ -161,11 +204,18 @@ class _Study(Table):
     output: Annotated[str, Text()] | None = meaning(
         None, "netCDF file of the result; the name of the study file with .nc if absent", '"study.nc"'
     )
-    parameter: list[Parameter] = Field(min_length=1)
+    parameter: list[Parameter] = Field([], min_length=1)
+    creep_table: CreepAxes | None = None
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Require the keys of the combination, and refuse those of others."""
+        if "creep_table" in data:
+            for key in data.keys() - {"title", "deck", "output", "creep_table"}:
+                yield key, "expected only title, deck and output beside creep_table"
+            return
+        if "parameter" not in data:
+            yield "parameter", "missing; expected an array of tables of keys, or a table creep_table"
         combine = data.get("combine", "grid")
         if combine == "lhs" and "samples" not in data:
             yield "samples", "missing; a Latin hypercube needs the number of its cases"
@@ -207,7 +257,9 @@ class StudyFile(_Extended):
 def study_schema() -> Schema:
     """Return the JSON schema of study files."""
     required = [key for key, info in StudyFile.known_keys().items() if info.is_required()]
-    return schema_of(StudyFile, "hexcontact study", "Many cases of one deck") | {"required": required}
+    cases = [{"required": [key]} for key in ("parameter", "creep_table")]
+    schema = schema_of(StudyFile, "hexcontact study", "Many cases of one deck")
+    return schema | {"required": required, "oneOf": cases}
 
 
 def _length(values: object) -> int:

@@ -30,6 +30,7 @@ from ..text import quantity
 from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
+from .creep import CreepStudy
 from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
 from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
 
@@ -154,6 +155,8 @@ class Study:
             raise DeckError(f"{path} is a deck and no study; hexcontact run {path} solves it")
         study = cls.__new__(cls)
         study.file, study.name = StudyFile.parse(data, Source(str(path), text)), str(path)
+        if study.file.creep_table is not None:
+            raise DeckError(f"{path} is a creep table; hexcontact study {path} or run_study computes it")
         study.output = Path(output or study.file.output or f"{Path(path).stem}.nc")
         deck = Path(path).parent / study.file.deck
         base, deck_text = read_toml(deck)
@@ -326,5 +329,7 @@ class Study:
 
 
 def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> Dataset:
-    """Read a study file and run its missing cases; options as of `Study.run`."""
+    """Read a study file and run its missing cases, options as of `Study.run`; or compute its creep table."""
+    if "creep_table" in read_toml(path, "a study")[0]:
+        return CreepStudy.from_toml(path, output).run(**options)
     return Study.from_toml(path, output).run(**options)

@@ -124,23 +124,17 @@ def _left_in_limits() -> Iterator[int]:
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
     """Yield the free bytes of each control group (version 1 or 2) that limits this process."""
     with contextlib.suppress(OSError):
-        for files in _files_of_groups(cgroups, _read(process)):
-            if (left := _left_in_group(*files)) is not None:
-                yield left
-
-
-@functools.cache
-def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, bytes]]:
-    """Return limit, usage and statistics of each control group, and the key of the file cache in these."""
-    found = []
-    for controllers, folder in _folders_of_groups(cgroups, groups):
-        limit, usage, cache = "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file"
-        if not controllers:
-            limit, usage, cache = "memory.max", "memory.current", b"inactive_file"
-        elif "memory" not in controllers:
-            continue
-        found.append((f"{folder}/{limit}", f"{folder}/{usage}", f"{folder}/memory.stat", cache))
-    return found
+        for controllers, folder in _folders_of_groups(cgroups, _read(process)):
+            limit, usage, cache = "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file"
+            if not controllers:
+                limit, usage, cache = "memory.max", "memory.current", b"inactive_file"
+            with contextlib.suppress(OSError, ValueError):  # without the controller; "max" is no limit
+                allowed = int(_read(folder / limit))
+                if allowed <= _NO_LIMIT:
+                    used, known = int(_read(folder / usage)), _read(folder / "memory.stat").split()
+                    # the kernel frees the file cache on demand
+                    freed = int(dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0))
+                    yield max(0, allowed - used + freed)
 
 
 @functools.cache
@@ -174,27 +168,6 @@ def _folders_of_groups(cgroups: Path, groups: bytes) -> list[tuple[list[str], Pa
             if folder == root:
                 break
     return found
-
-
-def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
-    """Return limit less usage, without the file cache, which the kernel frees on demand."""
-    allowed = _number_in(limit)
-    if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is more than any machine has
-        return None
-    try:
-        used, known = _number_in(usage), _read(statistics).split()
-    except OSError:
-        return None
-    freed = dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0)
-    return None if used is None else max(0, allowed - used + int(freed))
-
-
-def _number_in(path: str | Path) -> int | None:
-    """Return the number in a file of the kernel; None if there is none."""
-    try:
-        return int(_read(path))
-    except (OSError, ValueError):
-        return None
 
 
 def _read(path: str | Path) -> bytes:

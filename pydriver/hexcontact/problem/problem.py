@@ -158,7 +158,7 @@ class Problem:
         """Whether the bodies roll: from the first step that does on, all do."""
         return bool(self.load_steps) and self.load_steps[-1].roll is not None
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Whether surfaces move with the rolling bodies."""
         return not self.gap_given and self.surfaces.moves

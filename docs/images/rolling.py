@@ -1,7 +1,11 @@
-"""Draw the signs of rolling for `make.py`."""
+"""Draw the signs of rolling, coefficients of the linear theory and creep curves for `make.py`."""
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
@@ -61,4 +65,57 @@ def _plane(axes: Axes) -> None:
     axes.text(0.35, -1.25, "body 1 less body 2", ha="center")
 
 
-FIGURES = {"rolling_signs": rolling_signs}
+sys.path.append(str(Path(__file__).parents[2] / "tests"))
+LIMIT = 2.0 * np.pi / 3.0  # load of a circle under p0 = a = 1
+
+
+@styled
+def kalker() -> Figure:
+    """Draw coefficients of the linear theory over the ratio of half-axes, beside the printed table."""
+    from validation.rolling import NAMES, coefficients, printed
+
+    canvas = new_figure(7.6, 5.6)
+    panels = canvas.subplots(2, 2, sharex=True).ravel()
+    colors, rows = dict(zip(("0", "0.25", "0.5"), (COMPUTED, EXACT, THIRD), strict=True)), printed()
+    for ratio, color in colors.items():
+        table = [row for row in rows if row["nu"] == ratio]
+        across = [float(row["a/b"]) for row in table]
+        found = [coefficients(value, float(ratio)) for value in across]
+        for name, axes in zip(NAMES, panels, strict=True):
+            axes.plot(across, [each[name] for each in found], color=color, label=rf"$\nu={ratio}$")
+            axes.plot(across, [float(row[name]) for row in table], "o", ms=3.5, mfc="none", color=color)
+            axes.set(xscale="log", yscale="log", ylabel=f"$C_{{{name[1:]}}}$")
+    for axes in panels[2:]:
+        axes.set_xlabel("a/b")
+    panels[0].legend(frameon=False)
+    return canvas
+
+
+@styled
+def creep_curves() -> Figure:
+    """Draw creep curves of a circle: along the rolling direction beside two laws, and across with spin."""
+    from validation.rolling import Ellipse, coefficients
+
+    canvas = new_figure(7.6, 3.2)
+    along, across = canvas.subplots(1, 2, sharey=True)
+    circle = Ellipse(1.0, 24, 0.25, 1.0)
+    creepage = np.linspace(0.0, 2.0, 41)
+    loads = circle.loads([(-value, 0.0, 0.0) for value in creepage]) / LIMIT
+    tau = coefficients(1.0, 0.25)["C11"] * creepage / LIMIT
+    along.plot(creepage, loads[:, 0], color=COMPUTED, label="computed")
+    along.plot(
+        creepage, 1.0 - (1.0 - np.minimum(tau / 3.0, 1.0)) ** 3, "--", color=EXACT, label="Johnson, Vermeulen"
+    )
+    along.plot(creepage, tau, ":", color=GUIDE, label="linear theory")
+    along.set(xlabel=r"$-\xi\,G/\mu p_0$", ylabel=r"$Q/\mu P$", xlim=(0.0, 2.0), ylim=(-1.05, 1.05))
+    along.legend(frameon=False, loc="lower right")
+    lateral = np.linspace(-2.5, 2.5, 51)
+    for spin, color in zip((0.0, 1.0, 2.0, 4.0), (COMPUTED, EXACT, THIRD, GUIDE), strict=True):
+        loads = circle.loads([(0.0, -value, -spin) for value in lateral]) / LIMIT
+        across.plot(lateral, loads[:, 1], color=color, label=f"{spin:g}")
+    across.set(xlabel=r"$-\eta\,G/\mu p_0$", xlim=(-2.5, 2.5))
+    across.legend(title=r"$-\phi\,aG/\mu p_0$", frameon=False, loc="lower right")
+    return canvas
+
+
+FIGURES = {"rolling_signs": rolling_signs, "kalker": kalker, "creep_curves": creep_curves}

@@ -122,11 +122,13 @@ contains
   end subroutine set_geometry
 
   !> Return whether pressure and shear traction act strongly on each other, by their coupling times min(mu, 1).
-  pure logical function couples_strongly(self)
+  pure logical function couples_strongly(self, target)
     class(friction_problem_t), intent(in) :: self
+    !> Loads or motions: slip over a spacing of steadily rolling bodies feels any coupling
+    type(load_target_t), intent(in) :: target
 
     couples_strongly = abs(self%medium%coupling())*min(self%friction%strength(0.0_wp), 1.0_wp) > &
-                       self%options%contact%strong_coupling .and. .not. self%goodman
+                       merge(0.0_wp, self%options%contact%strong_coupling, target%rolling%steady) .and. .not. self%goodman
   end function couples_strongly
 
   !> Return the state of bodies that do not touch; motions that are driven by their load stay where they are.

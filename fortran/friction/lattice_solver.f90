@@ -58,7 +58,7 @@ contains
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
     associate (options => problem%options%newton)
-      if (problem%couples_strongly()) call now%cut_parameter(options%cautious_share)
+      if (problem%couples_strongly(step%target)) call now%cut_parameter(options%cautious_share)
       do sweep = 1, step%max_sweeps
         call make_sweep(now, sweep, step%max_sweeps, error)
         if (allocated(error)) return
@@ -97,7 +97,7 @@ contains
     associate (options => now%problem%options%newton)
       staggered = max_sweeps
       if (now%pressure_feels_shear) staggered = options%staggered_sweeps
-      if (now%problem%couples_strongly()) staggered = options%staggered_sweeps_strong
+      if (now%problem%couples_strongly(now%target)) staggered = options%staggered_sweeps_strong
       if (sweep > staggered) then
         call coupled_sweep(now, failed, error)
         if (allocated(error)) return

@@ -113,6 +113,14 @@ def test_a_segment_with_steps_is_a_creep_curve() -> None:
         plotting.loop(result)
 
 
+def test_a_creep_curve_of_unlike_bodies_takes_little_more_work() -> None:
+    bodies = ball()["body"] | {"2": {"young_modulus": 70e9, "poisson_ratio": 0.33}}
+    loads = {"rolling": "steady", "tangential_load_x": "0.9 mu P", "steps": 9}
+    history = Case.from_dict(ball(loads, body=bodies, friction={"coefficient": 0.1})).run().history
+    assert history["operator_applications"][2:].max() < 45
+    assert history["creepage_x"].iloc[-1] < 0.0 < history["creepage_x"].iloc[1]
+
+
 def test_rolling_is_not_compared_with_solutions_of_bodies_that_do_not_roll() -> None:
     result = Case.from_dict(
         ball({"tangential_load_x": 9.0}, {"rolling": "steady", "tangential_load_x": 15.0})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import Protocol, TypeAlias, cast
 
 import numpy as np
 
@@ -25,13 +25,19 @@ from ..variables import BULK_STRESS, LARGEST, MOVED_GAP, TRACTIONS, VARIABLES, W
 from .layout import lattice_of, step_of
 from .step import is_kept, nodal
 
-if TYPE_CHECKING:
-    from .result import Result
-
 STICK = 1  # value of zone at a sticking node
 
 
-AnyResult: TypeAlias = "Result | Dataset"
+class HasDataset(Protocol):
+    """An object with a data set, such as a result."""
+
+    @property
+    def dataset(self) -> Dataset:
+        """Its data set."""
+        ...
+
+
+AnyResult: TypeAlias = "HasDataset | Dataset"
 Results: TypeAlias = "AnyResult | Sequence[AnyResult]"
 
 

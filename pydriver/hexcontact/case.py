@@ -293,9 +293,9 @@ class Case(Problem):
 
     @property
     def _notes(self) -> list[str]:
-        """Marked warnings, and the note on slopes that are not judged."""
-        notes = [f"warning: {sentence}" for sentence in plausibility.warnings(self)]
-        return [*notes, *([f"note: {note}"] if (note := plausibility.unjudged(self)) else [])]
+        """Marked warnings and notes."""
+        marked = [f"warning: {sentence}" for sentence in plausibility.warnings(self)]
+        return [*marked, *(f"note: {note}" for note in plausibility.notes(self).values())]
 
     def _repr_html_(self) -> str:
         from .problem.preview import case_rows

@@ -316,9 +316,11 @@ def test_loads_by_hand_are_refused() -> None:
 def test_a_rounded_distance_is_noted(caplog: pytest.LogCaptureFixture) -> None:
     case = Case.from_dict(ball({"rolling": 1e-4, "creepage_x": -0.001}))
     with caplog.at_level("INFO", logger="hexcontact"):
-        case.run()
+        result = case.run()
+    words = f"{round(1e-4 / case.lattice.spacing)} spacings of the lattice, and not 100.0 µm"
     assert 'note="segment 2 rolls' in caplog.text
-    assert f"{round(1e-4 / case.lattice.spacing)} spacings of the lattice, and not 100.0 µm" in caplog.text
+    for place in (caplog.text, repr(case), result.dataset.attrs["notes"]):
+        assert words in place
 
 
 # --- surfaces that move with their bodies -------------------------------------------------------------------

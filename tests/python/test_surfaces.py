@@ -460,6 +460,7 @@ def test_a_new_shape_needs_its_class_and_a_word() -> None:
             "shape": "wedge",
             "offset": [0.0, 0.0],
             "tilt": ["0 deg", "0 deg"],
+            "moves": False,
             "slope": 0.1,
         }
         found = [

@@ -35,6 +35,8 @@ def check(
         return case_content(case, target)
     for sentence in plausibility.warnings(case):
         frame.print_error(f"warning: {sentence}")
+    for note in plausibility.notes(case).values():
+        frame.print_error(f"note: {note}")
     printed.console().print(visible(f"{deck} is ready to run"), soft_wrap=True)
     return None
 

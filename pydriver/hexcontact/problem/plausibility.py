@@ -290,6 +290,12 @@ def row(case: Problem) -> str:
     )
 
 
+def notes(case: Problem) -> dict[str, str]:
+    """Return notes by what they are about: limits that are not judged, rounded distances."""
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    return {about: note for about, note in found.items() if note}
+
+
 def unjudged(case: Problem) -> str:
     """Return a note on limits that the warnings do not check, and on filled holes; empty without one."""
     if not case.gap_given:

@@ -101,7 +101,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "wear_tolerance": wear and wear.tolerance,
         "accuracy_target": case.accuracy and case.accuracy.target,
         "warnings": "\n".join(plausibility.warnings(case)) or None,
-        "notes": plausibility.unjudged(case) or None,
+        "notes": "\n".join(plausibility.notes(case).values()) or None,
         "machine": machine(),
     }
     return {name: value for name, value in found.items() if value is not None}

@@ -95,10 +95,8 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
             "the half-spaces move as a whole, and what is solved is the layer"
         )
         listener.said("full contact", sentence, area=lattice.size * lattice.cell_area)
-    notes = {"unjudged": plausibility.unjudged(case), "rounded": plausibility.rounded_distances(case)}
-    for about, note in notes.items():
-        if note and not case.trial:
-            listener.said(about, f"note: {note}", note=note)
+    for about, note in {} if case.trial else plausibility.notes(case).items():
+        listener.said(about, f"note: {note}", note=note)
     for sentence in [] if case.trial else plausibility.warnings(case):
         listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
 

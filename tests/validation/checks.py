@@ -348,6 +348,18 @@ _ALL = (
         _of("subsurface", "influence_functions"),
     ),
     Check(
+        "waves-below",
+        "Stress below a wave",
+        "A wave pressed flat and sheared in a window that repeats: largest error of the stress by depth.",
+        _of("subsurface", "waves"),
+    ),
+    Check(
+        "layers-below",
+        "Stress in a layer and below it",
+        "On the axis below Hertz's pressure, against transforms of Hooke's law and equilibrium.",
+        _of("coatings", "below"),
+    ),
+    Check(
         "bulk-plane",
         "Bulk stress: the shifted stick strip (Nowell and Hills)",
         "Long contact under tangential load and bulk stress across it, with slip of one sign and of both; "

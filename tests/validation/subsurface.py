@@ -95,6 +95,36 @@ def closed_forms() -> Comparison:
     return table
 
 
+def waves() -> Comparison:
+    """A wave pressed flat and sheared, 64 nodes on it: Johnson, section 13.2."""
+    table, length, height = Comparison(), 1e-3, 1e-6
+    peak = math.pi * 210e9 / (2 * (1 - 0.3**2)) * height / length
+    surface = {"shape": "formula", "expression": f"{height}*(1 - cos(2*pi*x/{length}))"}
+    case = Case(
+        body_1={**_BODY, "surface": surface},
+        body_2=_BODY,
+        boundary="periodic",
+        extent=[length, length],
+        nodes_across=64,
+        friction_coefficient=0.5,
+        loads=[{"mean_pressure": 1.5 * peak}, {"mean_traction_x": 0.1 * peak}],
+    )
+    result, k, x = case.run(), 2 * math.pi / length, length * np.array([0.0, 0.11, 0.4])
+    for depth in (0.0, 0.002, 0.02, 0.1, 0.3, 2.0):
+        z = depth * length
+        found = result.stress(points=np.stack([x, 0 * x, 0 * x + z], axis=-1))
+        even, odd = (peak * math.exp(-k * z) * wave(k * x) for wave in (np.cos, np.sin))
+        known = {
+            "stress_zz": -1.5 * peak - (1 + k * z) * even,
+            "stress_xx": -(1 - k * z) * even,
+            "stress_yy": -0.6 * even,
+            "stress_xz": -0.1 * peak - k * z * odd,
+        }
+        error = max(float(abs(found[name].values - values).max()) for name, values in known.items())
+        table.add(f"z/λ = {depth:g}", "largest error/p*", "-", error / peak, analytic=0.0, absolute=1e-3)
+    return table
+
+
 def influence_functions() -> Comparison:
     """Pyramids against values of 20 digits."""
     table = Comparison()

@@ -15,8 +15,17 @@ from pathlib import Path
 class CreepTable:
     """Loads on body 1 by creepages and spin, interpolated by cubics with continuous slopes.
 
-    Axes are creepage x, creepage y at the pole and spin: the pole turns creepages into those of another point
-    of the contact. An axis that begins at 0 stands for both signs.
+    Parameters
+    ----------
+    axes
+        Values of creepage x and y at the pole, and of the spin [rad/m]; an axis that begins at 0 stands for
+        both signs.
+    pole
+        Point of the contact whose creepages are those of the axes [m].
+    limit
+        mu P [N].
+    loads
+        Loads along x and y [N] and torque [N m], creepage x the fastest.
     """
 
     def __init__(
@@ -30,7 +39,18 @@ class CreepTable:
 
     @classmethod
     def read(cls, path: str | Path) -> CreepTable:
-        """Return the table of a file."""
+        """Return the table of a file.
+
+        Parameters
+        ----------
+        path
+            Text that ``hexcontact study`` writes.
+
+        Returns
+        -------
+        CreepTable
+            The table.
+        """
         lines = Path(path).read_text(encoding="utf-8").splitlines()
         words = iter(" ".join(line for line in lines if line[:1] != "#").split())
         counts = [int(next(words)) for _ in range(3)]
@@ -43,6 +63,18 @@ class CreepTable:
         """Return the loads along x and y [N] and the torque [N m] on body 1.
 
         Beyond the table all three motions are reduced by one factor, which is right where all points slip.
+
+        Parameters
+        ----------
+        creepage_x, creepage_y
+            Velocity of body 1 less that of body 2, over that of rolling.
+        spin
+            The same of their angular velocities [rad/m].
+
+        Returns
+        -------
+        tuple of float
+            The loads and the torque.
         """
         at = [creepage_x - spin * self.pole[1], creepage_y + spin * self.pole[0], spin]
         sign_x = sign = 1.0

@@ -1,5 +1,6 @@
 """Creep tables: computed, compared with single cases, and read by C, Fortran and Python programs."""
 
+import json
 import math
 import shutil
 import subprocess
@@ -56,7 +57,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study = written(folder, ball(STEADY), "counts = [7, 13, 6]\nheld_out = 30")
     done = CliRunner().invoke(app, ["study", str(study), "-o", str(folder / "creep.nc")])
     assert done.exit_code == 0, done.output
-    assert "creep.txt" in done.output
+    assert "creep.txt" in done.output and "larger counts make them smaller" in done.output
     return folder / "creep.txt"
 
 
@@ -209,6 +210,10 @@ def test_other_files_are_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(DeckError, match=r"creep.txt exists and is no creep table"):
         run_study(study, tmp_path / "creep.nc")
     assert (tmp_path / "creep.txt").read_text() == "notes"
+    (tmp_path / "creep.txt").unlink()
+    done = CliRunner().invoke(app, ["study", str(study), "-o", str(tmp_path / "creep.nc"), "--json"])
+    content = json.loads(done.stdout)
+    assert (content["cases"], len(content["interpolation_error"]), content["exit_code"]) == (64, 3, 0)
     refused = CliRunner().invoke(app, ["study", str(study), "--jobs", "2"])
     assert refused.exit_code == 2
     assert "--jobs: expected no such option with a creep table" in refused.output

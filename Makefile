@@ -154,7 +154,7 @@ mpi-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## Fo
 	@for mpi in $(MPIS); do $(MAKE) --no-print-directory mpi-check-$$mpi || exit 1; done
 
 mpi-check-%:
-	@sh .ci/bootstrap.sh --mpi $*
+	@env -u FC sh .ci/bootstrap.sh --mpi $*
 	@echo "Building hexcontact with $* (build/$*)"
 	$(call build_apart,build/$*-site,build/$*,mpi=enabled)
 	@meson test -C build/$* --print-errorlogs

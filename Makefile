@@ -23,6 +23,7 @@ WHEEL_BUILD := build/wheel
 WHEEL_SITE := build/wheel-site
 FLANG := flang-22
 FLANG_BUILD := build/flang
+MPIS := openmpi mpich
 
 # Least share of lines that tests must reach, percent.
 COVERED_FORTRAN := 97
@@ -62,7 +63,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check slurm-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check flang-check mpi-check slurm-check perturbed-test mutants coverage package wheel wheel-check oldest-check verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -155,6 +156,19 @@ slurm-check: install $(STAMPS)/extra-test  ## the job scripts of cases/cluster o
 	@sh .ci/bootstrap.sh --slurm
 	@[ -d $(JOBQUEUE) ] || $(pip) install --quiet --no-deps --target $(JOBQUEUE) dask-jobqueue || true
 	@PYTHONPATH=$(CURDIR)/$(JOBQUEUE) $(py) -m pytest --quiet $(PYTEST_ARGS) tests/batch
+
+mpi-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## Fortran units and tests of mpirun on builds with Open MPI and MPICH, which apt installs where they are missing
+	@for mpi in $(MPIS); do $(MAKE) --no-print-directory mpi-check-$$mpi || exit 1; done
+
+mpi-check-%:
+	@env -u FC sh .ci/bootstrap.sh --mpi $*
+	@echo "Building hexcontact with $* (build/$*)"
+	$(call build_apart,build/$*-site,build/$*,mpi=enabled)
+	@meson test -C build/$* --print-errorlogs
+	@PYTHONPATH=$(CURDIR)/build/$*-site $(py) $(pytest) $(MPI_CHECKED:%=tests/python/test_%.py)
+mpi-check-%: export FC = mpifort.$*
+# Also what hardly differs in a build with MPI: runs of one process.
+MPI_CHECKED := ranks first_step solve
 
 perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
 	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"

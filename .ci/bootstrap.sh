@@ -7,6 +7,7 @@
 #   sh .ci/bootstrap.sh --flang flang-22  the same, with that flang and its OpenMP
 #   sh .ci/bootstrap.sh --slurm    the same, with CI=true also Slurm, for its tests
 #   sh .ci/bootstrap.sh --cpp      the same, with a C++ compiler (pocketfft)
+#   sh .ci/bootstrap.sh --mpi openmpi     the same, with that MPI, or mpich
 #   sh .ci/bootstrap.sh --venv-ok  say nothing; succeed if .venv is usable
 #
 # PYTHON=/path/to/python3.12  uses that interpreter
@@ -20,6 +21,8 @@ flang=''
 [ "${1:-}" != --flang ] || flang=$2
 cpp=''
 [ "${1:-}" != --cpp ] || cpp=yes
+mpi=''
+[ "${1:-}" != --mpi ] || mpi=$2
 venv="$PWD/.venv"
 # A new environment must not be made with the interpreter of the old one.
 PATH=$(printf '%s' "$PATH" | sed "s|$venv/bin:||g")
@@ -138,6 +141,7 @@ look_around() {
   compiles_fortran || need 'a Fortran compiler' 'gfortran'
   [ -z "$cpp" ] || compiles_cpp || need 'a C++ compiler' 'g++'
   [ -z "$flang" ] || FC=$flang compiles_fortran -fopenmp || need "$flang with OpenMP" "$flang libomp-${flang##*-}-dev"
+  [ -z "$mpi" ] || have "mpifort.$mpi" || need "the MPI $mpi" "$([ "$mpi" = mpich ] && say mpich || say openmpi-bin) lib$mpi-dev"
   pkgconfig --version >/dev/null || need 'pkg-config' 'pkg-config'
   links openblas || links lapack blas || need 'OpenBLAS (or LAPACK and BLAS)' 'libopenblas-dev'
   links fftw3 fftw3f || need 'FFTW 3' 'libfftw3-dev'

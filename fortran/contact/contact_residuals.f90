@@ -108,6 +108,7 @@ contains
     class(normal_law_t), intent(in), optional :: law
     type(unilateral_t) :: unilateral
     real(wp) :: g(size(pressure, 1)), p_max, worst
+    real(wp) :: largest(3)
     integer(int64) :: found
     integer :: col, row, first
     logical :: wrong
@@ -140,7 +141,11 @@ contains
       end if
     end do
     !$omp end parallel do
-    if (wrong) then
+    largest = [p_max, worst, merge(1.0_wp, 0.0_wp, wrong)]
+    call space%most(largest)
+    p_max = largest(1)
+    worst = largest(2)
+    if (largest(3) > 0.0_wp) then
       normal_residual = huge(1.0_wp)
     else if (p_max > 0.0_wp) then
       normal_residual = worst/p_max

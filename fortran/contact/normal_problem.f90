@@ -7,9 +7,11 @@ module hc_normal_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
+  use hc_communicator, only: rows_held
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_hierarchy, only: level_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_contact_state, only: contact_state_t, load_target_t, check_problem, touches_rim, separated, slip, normal, force_control, &
     within_tolerance, not_finite
@@ -50,7 +52,7 @@ module hc_normal_problem
 contains
 
   !> Set up the normal part of a contact problem.
-  subroutine new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, law)
+  subroutine new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, law, space)
     !> Problem to be set up
     class(normal_problem_t), intent(inout) :: problem
     !> Lattice and window
@@ -65,8 +67,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Law of contact along the normal; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: law
+    !> Space of the fields, whose rows on this rank gap and candidates are; absent: that of the problem
+    type(field_space_t), intent(in), optional :: space
 
-    call check_problem(lattice, medium, initial_gap, candidate, error)
+    if (present(space)) problem%space = space
+    if (problem%space%ranks%size == 1) call check_problem(lattice, medium, initial_gap, candidate, error)
     if (allocated(error)) return
     if (present(law)) call law%check(error)
     if (allocated(error)) return
@@ -173,11 +178,12 @@ contains
     !> Classification parameter r'; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
     !> Pressure [Pa] and gap [m], row by row
-    real(wp), intent(in), dimension(self%lattice%extent(1), self%lattice%extent(2)) :: p, gap
+    real(wp), intent(in), dimension(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2))) :: p, gap
     !> Nodes in contact
-    logical, intent(in) :: contact(self%lattice%extent(1), self%lattice%extent(2))
+    logical, intent(in) :: contact(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2)))
     !> Compliance [m/Pa] and offset [m] of the spring of each node, 0 off the contact
-    real(wp), intent(out), dimension(self%lattice%extent(1), self%lattice%extent(2)) :: compliance, offset
+    real(wp), intent(out), dimension(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2))) :: &
+      compliance, offset
     type(tangent_t) :: tangent
     integer :: row
 
@@ -267,12 +273,31 @@ contains
     end if
     ! one by one: the largest of several numbers hides one that is not a number
     state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
-    state%clipped = touches_rim(state) .and. .not. self%lattice%is_periodic()
+    state%clipped = reaches_rim(self, state) .and. .not. self%lattice%is_periodic()
     if (state%converged) state%stopped = within_tolerance
     if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
     ! penetration without any pressure is infinite as well, but a state that can be shown
-    if (all(ieee_is_finite(state%pressure)) .and. all(ieee_is_finite(state%gap) .or. .not. self%candidate)) return
+    if (self%space%count(ieee_is_finite(state%pressure) .and. (ieee_is_finite(state%gap) .or. .not. self%candidate)) &
+        == self%lattice%size()) return
     call raise(error, status%no_convergence, not_finite)
   end subroutine complete_pressed
+
+  !> Return whether there is contact at the rim of the window.
+  logical function reaches_rim(self, state)
+    class(normal_problem_t), intent(in) :: self
+    !> State, with own rows of its pressure
+    type(contact_state_t), intent(in) :: state
+    logical, allocatable :: rim(:, :)
+
+    if (self%space%ranks%size == 1) then
+      reaches_rim = touches_rim(state)
+      return
+    end if
+    allocate (rim(size(state%pressure, 1), size(state%pressure, 2)), source=.false.)
+    rim([1, size(rim, 1)], :) = .true.
+    if (self%space%ranks%rank == 0) rim(:, 1) = .true.
+    if (self%space%ranks%rank == self%space%ranks%size - 1) rim(:, size(rim, 2)) = .true.
+    reaches_rim = self%space%count(rim .and. state%pressure > 0.0_wp) > 0
+  end function reaches_rim
 
 end module hc_normal_problem

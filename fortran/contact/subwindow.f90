@@ -7,8 +7,7 @@
 module hc_subwindow
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_options, only: multilevel_options_t
-  use hc_lattice, only: lattice_t
+  use hc_normal_problem, only: normal_problem_t
   use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_step_t
   use hc_contact_solver, only: friction_solver_t
   implicit none
@@ -19,14 +18,11 @@ module hc_subwindow
 contains
 
   !> Choose the part of the window to be tried next.
-  subroutine next_part(try, options, lattice, candidate, state, low, high, found)
+  subroutine next_part(try, problem, state, low, high, found)
     !> Number of the part, from 1 on
     integer, intent(in) :: try
-    type(multilevel_options_t), intent(in) :: options
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
+    !> Problem on the window
+    class(normal_problem_t), intent(in) :: problem
     !> State to start from at first; then that of the last part over the window, with its gap
     type(contact_state_t), intent(in) :: state
     !> Columns and rows, from 1 on
@@ -34,17 +30,41 @@ contains
     !> False: the whole window is next
     logical, intent(out) :: found
 
-    found = try <= options%max_parts
+    found = try <= problem%options%multilevel%max_parts
     low = 1
-    high = lattice%extent
+    high = problem%lattice%extent
     if (.not. found) return
     if (try == 1) then
-      call lattice%enclose(state%pressure > 0.0_wp, options, low, high)
+      call enclose(problem, state%pressure > 0.0_wp, low, high)
     else
-      call lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. candidate), options, low, high)
+      call enclose(problem, state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. problem%candidate), low, high)
     end if
-    found = lattice%is_worth_parting(low, high, options)
+    found = problem%lattice%is_worth_parting(low, high, problem%options%multilevel)
   end subroutine next_part
+
+  !> Find the part around some nodes.
+  subroutine enclose(problem, nodes, low, high)
+    class(normal_problem_t), intent(in) :: problem
+    !> The nodes (n_col, own rows)
+    logical, intent(in) :: nodes(:, :)
+    !> Columns and rows, from 1 on
+    integer, intent(out) :: low(2), high(2)
+    integer :: columns(size(nodes, 1)), rows(problem%lattice%extent(2)), own(2)
+
+    associate (ranks => problem%space%ranks, options => problem%options%multilevel)
+      if (ranks%size == 1) then
+        call problem%lattice%enclose(nodes, options, low, high)
+        return
+      end if
+      columns = count(nodes, dim=2)
+      rows = 0
+      own = problem%space%own_rows(size(rows))
+      rows(own(1):own(2)) = count(nodes, dim=1)
+      call ranks%add_counts(columns)
+      call ranks%add_counts(rows)
+      call problem%lattice%enclose_lines(columns > 0, rows > 0, options, low, high)
+    end associate
+  end subroutine enclose
 
   !> Solve a step on the part, and judge it on the window.
   subroutine solve_part(whole, part, corners, start, step, state, solved, error)

@@ -9,6 +9,9 @@
 !>
 !> Every kernel is even or odd, so that its spectrum is real, or i times real.
 !>
+!> Several ranks share the rows of the fields and, between two transposes, the blocks of columns with their spectra. Each transform
+!> is the same as on one rank.
+!>
 !> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int, c_f_pointer
@@ -16,6 +19,7 @@ module hc_convolution
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
+  use hc_communicator, only: block_layout_t
   use hc_field_space, only: field_space_t
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
@@ -65,19 +69,21 @@ module hc_convolution
     type(field_space_t) :: space
     !> Transform lengths along the two lattice directions
     integer :: padded(2) = 0
-    !> Columns in a block, number of blocks
-    integer :: width = 0, n_block = 0
-    !> Number of columns and rows of the window
-    integer, private :: extent(2) = 0
-    !> Number of frequencies along the first direction, and the leading dimension for them
-    integer, private :: n_frequency = 0, leading = 0
+    !> Columns in a block, number of blocks of this rank, and columns before the first of them
+    integer :: width = 0, n_block = 0, before = 0
+    !> Number of columns and rows of the window, and of the rows of this rank
+    integer, private :: extent(2) = 0, n_row = 0
+    !> Number of frequencies along the first direction, and the leading dimensions for them: of all blocks, of those of this rank
+    integer, private :: n_frequency = 0, leading = 0, own_leading = 0
     !> Number of kernels, the first odd one
     integer, private :: n_kernel = 0, first_odd = 0
-    !> Numbers of the row transforms
-    integer(int64), private :: n_work = 0
+    !> Numbers of the row transforms, and of all that lies in the scratch
+    integer(int64), private :: n_rows = 0, n_work = 0
     type(holdings_t), private :: held
-    !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share; the same as vectors
-    complex(wp), pointer, contiguous, private :: work(:, :, :) => null(), lines(:, :) => null()
+    !> Transforms of own rows (leading, n_row or one more, component), in memory that convolutions may share
+    complex(wp), pointer, contiguous, private :: work(:, :, :) => null()
+    !> Those of all rows in the columns of this rank, as vectors: on one rank the same memory
+    complex(wp), pointer, contiguous, private :: lines(:, :) => null()
     !> Two padded rows before and after their transform, for each thread
     complex(wp), allocatable, private :: row_buffer(:, :, :)
     !> One column block of each component before and after its transform, for each thread; column by column
@@ -146,10 +152,21 @@ contains
     self%width = block_width(padded(2))
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
+    self%n_row = extent(2)
+    if (space%ranks%size > 1) then
+      self%before = self%width*(space%ranks%first_item(self%n_block) - 1)
+      self%n_block = space%ranks%last_item(self%n_block) - space%ranks%first_item(self%n_block) + 1
+      associate (own => space%own_extent(extent))
+        self%n_row = own(2)
+      end associate
+    end if
+    self%own_leading = self%n_block*self%width
     self%held%place = address(self%held)
     self%held%scratch => space%scratch
     if (.not. associated(self%held%scratch)) allocate (self%held%scratch)
-    self%n_work = int(self%leading, int64)*even(extent(2))*n_component
+    self%n_rows = int(self%leading, int64)*even(self%n_row)*n_component
+    self%n_work = self%n_rows
+    if (space%ranks%size > 1) self%n_work = self%n_work + int(self%own_leading, int64)*even(extent(2))*n_component
     bytes = self%n_work*(storage_size((1.0_wp, 0.0_wp))/8)
     if (present(beside)) bytes = bytes + beside
     call self%held%scratch%reserve(bytes, stat)
@@ -158,9 +175,10 @@ contains
                              stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
-      return
+    else
+      call make_plans(self, error)
     end if
-    call make_plans(self, error)
+    call space%ranks%agree(error)
   end subroutine new_convolution
 
   !> Take the spectra from a cache, or allocate zero ones that are to be computed.
@@ -179,9 +197,7 @@ contains
     shape_wanted = [self%width*self%padded(2), self%n_block, self%n_kernel]
     found = .false.
     call release(self%held%spectrum)
-    if (present(cache)) then
-      if (associated(cache)) call cache%find(key, self%held%spectrum)
-    end if
+    if (is_kept(self, cache)) call cache%find(key, self%held%spectrum)
     if (associated(self%held%spectrum)) then
       call self%held%spectrum%point(shape_wanted, self%spectrum)
       found = associated(self%spectrum)
@@ -190,12 +206,20 @@ contains
     end if
     allocate (self%held%spectrum)
     call self%held%spectrum%reserve(shape_wanted, self%spectrum, stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
-      return
-    end if
-    self%spectrum = 0.0_wp
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+    call self%space%ranks%agree(error)
+    if (.not. allocated(error)) self%spectrum = 0.0_wp
   end subroutine find_spectra
+
+  !> Return whether a cache keeps the spectra: not the parts of several ranks.
+  logical function is_kept(self, cache)
+    class(convolution_t), intent(in) :: self
+    !> The cache, if there is one
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    is_kept = .false.
+    if (present(cache)) is_kept = associated(cache) .and. self%space%ranks%size == 1
+  end function is_kept
 
   !> Store complete spectra in the cache.
   subroutine store_spectra(self, cache, key)
@@ -205,8 +229,7 @@ contains
     !> With a cache: parameters of the kernels
     type(kernel_key_t), intent(in), optional :: key
 
-    if (.not. present(cache)) return
-    if (associated(cache)) call cache%store(key, self%held%spectrum)
+    if (is_kept(self, cache)) call cache%store(key, self%held%spectrum)
   end subroutine store_spectra
 
   !> Make the plans of the transforms.
@@ -244,26 +267,27 @@ contains
     class(kernel_source_t), intent(in) :: source
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    complex(wp), allocatable :: rows(:, :, :)
+    complex(wp), allocatable, target :: rows(:, :, :), columns(:, :, :)
     real(wp), allocatable :: kernel(:, :, :)
-    real(wp) :: scale, sign
-    integer :: n(2), n_kernel, j, m, b, column, thread, stat, from
+    real(wp) :: scale
+    integer :: n(2), n_kernel, first, j, m, thread, stat
 
     n = self%extent
     n_kernel = size(self%spectrum, 3)
     scale = 1.0_wp/(real(self%padded(1), wp)*real(self%padded(2), wp))
-    allocate (rows(self%leading, 0:even(n(2)) - 1, n_kernel), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
-      return
-    end if
+    first = self%space%ranks%first_row(n(2)) - 1
+    allocate (rows(self%leading, first:first + even(self%n_row) - 1, n_kernel), stat=stat)
+    if (stat == 0 .and. self%space%ranks%size > 1) allocate (columns(self%own_leading, even(n(2)), n_kernel), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
+    call self%space%ranks%agree(error)
+    if (allocated(error)) return
 
     thread = 1
-    !$omp parallel num_threads(self%space%threads) private(j, m, b, column, kernel, sign, from) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(j, m, kernel) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2))
     !$omp do schedule(dynamic)
-    do j = 0, n(2) - 1, 2
+    do j = first, first + self%n_row - 1, 2
       call source%row(j, kernel(:, :, 1))
       if (j + 1 < n(2)) then
         call source%row(j + 1, kernel(:, :, 2))
@@ -282,14 +306,34 @@ contains
       end do
     end do
     !$omp end do
+    !$omp end parallel
+    if (self%space%ranks%size > 1) then
+      call self%space%ranks%to_columns(layout_of(self, n_kernel), c_loc(rows), c_loc(columns))
+      call move_alloc(columns, rows)
+    end if
+    call transform_kernel_columns(self, rows)
+  end subroutine transform_kernels
+
+  !> Transform the columns of kernels.
+  subroutine transform_kernel_columns(self, rows)
+    class(convolution_t), intent(inout) :: self
+    !> Row transforms of the kernels, in the columns of this rank (own_leading, n_row or one more, kernel)
+    complex(wp), intent(in) :: rows(self%own_leading, even(self%extent(2)), size(self%spectrum, 3))
+    real(wp) :: sign
+    integer :: n(2), m, b, column, thread, from
+
+    n = self%extent
+    thread = 1
+    !$omp parallel num_threads(self%space%threads) private(m, b, column, sign, from) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
     !$omp do schedule(dynamic)
     do b = 1, self%n_block
       from = (b - 1)*self%width + 1
-      do m = 1, n_kernel
+      do m = 1, size(rows, 3)
         sign = merge(1.0_wp, -1.0_wp, m < self%first_odd)
         associate (given => self%block_buffer(:, 1, 1, thread), transformed => self%block_buffer(:, 1, 2, thread), &
                    length => self%padded(2))
-          call gather_columns(self%width, n(2), self%leading, length, rows(from, 0, m), given)
+          call gather_columns(self%width, n(2), self%own_leading, length, rows(from, 1, m), given)
           do column = 0, self%width - 1
             associate (line => given(column*length + 1:(column + 1)*length))
               line(length - n(2) + 2:) = sign*conjg(line(n(2):2:-1))
@@ -306,7 +350,18 @@ contains
     end do
     !$omp end do
     !$omp end parallel
-  end subroutine transform_kernels
+  end subroutine transform_kernel_columns
+
+  !> Return how rows and columns lie in memory.
+  type(block_layout_t) function layout_of(self, n_component) result(layout)
+    class(convolution_t), intent(in) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+    integer, parameter :: word = 32
+
+    layout = block_layout_t(self%extent(2), n_component, self%leading/self%width, &
+                            self%width*(storage_size((1.0_wp, 0.0_wp))/word), even(self%n_row), even(self%extent(2)))
+  end function layout_of
 
   !> Return the indices of the frequencies of a block, f(1) = 0...padded(1)/2, f(2) = 0...padded(2)-1.
   pure function frequencies(self, b) result(f)
@@ -320,7 +375,7 @@ contains
     allocate (f(2, self%width*self%padded(2)))
     do column = 1, self%width
       do row = 1, self%padded(2)
-        f(:, (column - 1)*self%padded(2) + row) = [(b - 1)*self%width + column - 1, row - 1]
+        f(:, (column - 1)*self%padded(2) + row) = [self%before + (b - 1)*self%width + column - 1, row - 1]
       end do
     end do
   end function frequencies
@@ -361,8 +416,13 @@ contains
     !> Number of components
     integer, intent(in) :: n_component
 
-    call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(self%extent(2)), n_component])
-    self%lines(1:self%leading*even(self%extent(2)), 1:n_component) => self%work
+    call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(self%n_row), n_component])
+    if (self%space%ranks%size > 1) then
+      call c_f_pointer(self%held%scratch%place(self%n_rows*(storage_size((1.0_wp, 0.0_wp))/64)), self%lines, &
+                       [self%own_leading*even(self%extent(2)), n_component])
+    else
+      self%lines(1:self%leading*even(self%extent(2)), 1:n_component) => self%work
+    end if
   end subroutine take_work
 
   !> Return the address of the memory beside the row transforms.
@@ -385,12 +445,15 @@ contains
     self%row_buffer(self%extent(1) + 1:, 1, thread) = 0.0_wp
     do i = 1, size(field, 3)
       !$omp do schedule(static)
-      do row = 1, self%extent(2), 2
+      do row = 1, self%n_row, 2
         call transform_rows(self, row, i, thread, field(:, :, i))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
+    if (self%space%ranks%size > 1) then
+      call self%space%ranks%to_columns(layout_of(self, size(self%work, 3)), c_loc(self%work), c_loc(self%lines))
+    end if
   end subroutine transform_fields
 
   !> Transform the columns, multiply with the spectra, and transform them back.
@@ -418,7 +481,10 @@ contains
     real(wp), intent(inout), contiguous :: result(:, :, :)
     integer :: n(2), o, row, thread
 
-    n = self%extent
+    n = [self%extent(1), self%n_row]
+    if (self%space%ranks%size > 1) then
+      call self%space%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
+    end if
     thread = 1
     !$omp parallel num_threads(self%space%threads) private(o, row) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
@@ -471,7 +537,7 @@ contains
     real(wp), intent(in), contiguous :: field(:, :)
     integer :: last
 
-    last = min(row + 1, self%extent(2))
+    last = min(row + 1, self%n_row)
     ! the columns that only fill up the last block are transformed, too
     self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
     associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
@@ -503,10 +569,10 @@ contains
     integer :: i, o, first, last
 
     first = (b - 1)*self%width + 1
-    last = first + self%leading*(self%extent(2) - 1) + self%width - 1
+    last = first + self%own_leading*(self%extent(2) - 1) + self%width - 1
     associate (given => self%block_buffer(:, :, 1, thread), transformed => self%block_buffer(:, :, 2, thread))
       do i = 1, size(kernel, 2)
-        call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
+        call gather_columns(self%width, self%extent(2), self%own_leading, self%padded(2), self%lines(first:last, i), given(:, i))
         call fftw_execute_dft(self%held%plans%column, given(:, i), transformed(:, i))
       end do
       if (associated(self%wide)) then
@@ -518,7 +584,7 @@ contains
       end if
       do o = 1, size(kernel, 1)
         call fftw_execute_dft(self%held%plans%column, given(:, o), transformed(:, o))
-        call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), &
+        call scatter_columns(self%width, self%extent(2), self%padded(2), self%own_leading, transformed(:, o), &
                              self%lines(first:last, o))
       end do
     end associate
@@ -534,7 +600,7 @@ contains
     !$ thread = omp_get_thread_num() + 1
     do k = 1, 2
       !$omp do schedule(static)
-      do row = 1, self%extent(2), 2
+      do row = 1, self%n_row, 2
         call fftw_execute_dft(self%held%plans%row, self%row_buffer(:, 1, thread), self%row_buffer(:, 2, thread))
       end do
       !$omp end do

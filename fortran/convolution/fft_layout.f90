@@ -1,6 +1,7 @@
 !> How the transforms of a convolution are laid out in memory, and how much of it they take.
 module hc_fft_layout
   use hc_precision, only: wp
+  use hc_communicator, only: communicator_t
   implicit none
   private
 
@@ -31,17 +32,31 @@ contains
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
 
-  !> Count the additional bytes while the kernels of a padded convolution are transformed: their rows.
-  pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel)
+  !> Count the additional bytes while the kernels of a padded convolution are transformed: their rows, and on several ranks
+  !> the columns that they exchange them for.
+  pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel, ranks)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Transform lengths
     integer, intent(in) :: padded(2)
     !> Number of kernels
     integer, intent(in) :: n_kernel
+    !> Ranks that share the rows; absent: one
+    type(communicator_t), intent(in), optional :: ranks
     integer, parameter :: long = selected_int_kind(18)
+    integer(long) :: numbers
+    integer :: width, n_block
 
-    transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*leading_size(padded)*int(even(extent(2)), long)
+    numbers = leading_size(padded)*int(even(extent(2)), long)
+    if (present(ranks)) then
+      if (ranks%size > 1) then
+        width = block_width(padded(2))
+        n_block = leading_size(padded)/width
+        numbers = leading_size(padded)*int(even(ranks%last_row(extent(2)) - ranks%first_row(extent(2)) + 1), long) &
+                  + width*(ranks%last_item(n_block) - ranks%first_item(n_block) + 1)*int(even(extent(2)), long)
+      end if
+    end if
+    transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*numbers
   end function transform_memory
 
   !> Compute the leading dimension for the frequencies along the first direction, in whole blocks.

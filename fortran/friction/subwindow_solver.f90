@@ -99,13 +99,11 @@ contains
     if (to_part) to_part = self%problem%is_pressed(target)
     if (to_part) then
       do try = 1, self%problem%options%multilevel%max_parts + 1
-        associate (problem => self%problem, options => self%problem%options%multilevel)
-          if (try == 1) then
-            call next_part(try, options, problem%lattice, problem%candidate, start, low, high, found)
-          else
-            call next_part(try, options, problem%lattice, problem%candidate, state, low, high, found)
-          end if
-        end associate
+        if (try == 1) then
+          call next_part(try, self%problem, start, low, high, found)
+        else
+          call next_part(try, self%problem, state, low, high, found)
+        end if
         if (.not. found) exit
         call extract_part(self, low, high, error)
         if (allocated(error)) return

@@ -7,8 +7,9 @@
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_communicator, only: communicator_t
   use hc_options, only: options_t
-  use hc_lattice, only: lattice_t
+  use hc_lattice, only: lattice_t, floor_half
   use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
@@ -53,6 +54,8 @@ module hc_normal_contact
     type(kernel_cache_t), pointer :: cache => null()
     !> Threads to use; 0: as many as OpenMP would take
     integer :: threads = 0
+    !> Ranks that share the larger windows
+    type(communicator_t) :: ranks
   contains
     procedure :: solve_step
     !> Solve for a normal load or an approach
@@ -62,16 +65,16 @@ module hc_normal_contact
 contains
 
   !> Set up the operators of a problem on all its lattices.
-  subroutine new_normal_contact(self, lattice, medium, initial_gap, candidate, error, n_threads, cache, options, law)
+  subroutine new_normal_contact(self, lattice, medium, initial_gap, candidate, error, n_threads, cache, options, law, ranks)
     !> Problem to be set up
     type(normal_contact_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
-    !> Initial gap (n_col, n_row) [m]
+    !> Initial gap (n_col, own rows) [m]
     real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
+    !> Nodes that may come into contact (n_col, own rows)
     logical, intent(in) :: candidate(:, :)
     !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
@@ -83,9 +86,12 @@ contains
     type(options_t), intent(in), optional :: options
     !> Law of contact; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: law
+    !> Ranks that solve it together; absent: one
+    type(communicator_t), intent(in), optional :: ranks
 
     integer :: l
 
+    if (present(ranks)) self%ranks = ranks
     if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     if (present(options)) self%options = options
@@ -94,7 +100,7 @@ contains
     allocate (self%level(level_count(lattice, self%options%multilevel%smallest_side)))
     allocate (self%scratch)
     self%level(1)%options = self%options
-    call new_normal_problem(self%level(1), lattice, medium, initial_gap, candidate, error, law)
+    call new_normal_problem(self%level(1), lattice, medium, initial_gap, candidate, error, law, space_of(self, lattice))
     if (allocated(error)) return
     do l = 2, size(self%level)
       call self%level(l - 1)%coarsen(self%level(l))
@@ -174,17 +180,16 @@ contains
     call check_target([control], [target], tolerance, max_sweeps, error)
     if (allocated(error)) return
     call self%scratch%take(stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
-      return
-    end if
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+    call self%ranks%agree(error)
+    if (allocated(error)) return
     goal = load_target_t([control], [target])
     work = 0.0_wp
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
         if (level%space%count(level%candidate) == 0) cycle
         if (l > 1 .and. .not. allocated(passing)) allocate (passing)
-        allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
+        allocate (state%pressure(level%lattice%extent(1), level%own_rows()), source=0.0_wp)
         coarse_tolerance = self%options%normal%coarse_tolerance
         if (allocated(coarse%pressure)) then
           if (is_smooth(level, self%level(l + 1)%space%max(coarse%pressure))) then
@@ -238,25 +243,29 @@ contains
   subroutine prolong_pressure(coarser, coarse, level, pressure)
     !> Coarser lattice, and pressure and gap there
     type(normal_lattice_t), intent(in) :: coarser
-    type(contact_state_t), intent(in) :: coarse
+    type(contact_state_t), intent(inout) :: coarse
     !> Finer lattice
     type(normal_lattice_t), intent(in) :: level
     !> Pressure there
-    real(wp), intent(inout) :: pressure(:, :)
+    real(wp), intent(inout), contiguous :: pressure(:, :)
     real(wp), dimension(size(pressure, 1)) :: compliance, offset
     real(wp), allocatable :: contact(:, :)
+    type(lattice_t) :: coarse_rows, fine_rows
     type(tangent_t) :: tangent
     real(wp) :: p_max
     integer :: row
 
     p_max = coarser%space%max(coarse%pressure)
+    coarse_rows = coarser%lattice
+    fine_rows = level%lattice
+    if (level%space%ranks%size > 1) call take_coarse_rows(coarser, coarse, level, coarse_rows, fine_rows)
     if (.not. is_smooth(level, p_max)) then
-      call prolong_edge(coarser%lattice, coarse%pressure, level%lattice, pressure, level%space)
+      call prolong_edge(coarse_rows, coarse%pressure, fine_rows, pressure, level%space)
       return
     end if
     tangent = tangent_t(1.0_wp/coarser%normal_compliance, level%softest_spring(p_max))
     allocate (contact, source=coarse%pressure - tangent%r*min(coarse%gap, coarser%normal_compliance*p_max))
-    call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
+    call prolong(coarse_rows, contact, fine_rows, pressure, level%space)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too
@@ -268,6 +277,32 @@ contains
     !$omp end parallel do
   end subroutine prolong_pressure
 
+  !> Take the rows of the coarse solution about those of the finer lattice on this rank, with the neighbors of neighbors.
+  subroutine take_coarse_rows(coarser, coarse, level, coarse_rows, fine_rows)
+    type(normal_lattice_t), intent(in) :: coarser
+    !> Pressure and gap on own rows; then on those rows
+    type(contact_state_t), intent(inout) :: coarse
+    type(normal_lattice_t), intent(in) :: level
+    !> Lattices of those rows, and of own rows
+    type(lattice_t), intent(out) :: coarse_rows, fine_rows
+    integer, parameter :: neighbors_of_neighbors = 2
+    real(wp), allocatable :: rows(:, :)
+    integer :: own(2), wanted(2)
+
+    own = level%space%own_rows(level%lattice%extent(2))
+    fine_rows = level%rows_of(own(1), own(2))
+    own = level%lattice%first(2) + own - 1
+    wanted = [floor_half(own(1)), floor_half(own(2) + 1)] - coarser%lattice%first(2) + 1
+    wanted = wanted + [-neighbors_of_neighbors, neighbors_of_neighbors]
+    wanted = min(max(wanted, 1), coarser%lattice%extent(2))
+    coarse_rows = coarser%rows_of(wanted(1), wanted(2))
+    allocate (rows(coarser%lattice%extent(1), wanted(2) - wanted(1) + 1))
+    call coarser%space%fetch(coarser%lattice%extent(2), coarse%pressure, wanted(1), rows)
+    coarse%pressure = rows
+    call coarser%space%fetch(coarser%lattice%extent(2), coarse%gap, wanted(1), rows)
+    coarse%gap = rows
+  end subroutine take_coarse_rows
+
   !> Return the space of a lattice: one thread where the start of the others takes longer than each of the short passes.
   type(field_space_t) function space_of(self, lattice)
     class(normal_contact_t), intent(in) :: self
@@ -276,6 +311,7 @@ contains
     if (self%threads > 0 .or. lattice%size() >= self%options%normal%worth_sharing) then
       space_of = space_over(lattice%extent, self%threads)
     end if
+    space_of%ranks = self%ranks%over(lattice%extent)
     space_of%scratch => self%scratch
   end function space_of
 
@@ -310,12 +346,12 @@ contains
     associate (whole => self%level(1))
       sweeps = 0
       do try = 1, self%options%multilevel%max_parts + 1
-        call next_part(try, self%options%multilevel, whole%lattice, whole%candidate, state, low, high, found)
+        call next_part(try, whole, state, low, high, found)
         if (.not. found) exit
         call extract_part(self, low, high, error)
         if (allocated(error)) return
-        associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
-          part%pressure = state%pressure(first(1):last(1), first(2):last(2))
+        associate (inner => self%inner)
+          call whole%cut(state%pressure, self%corner, inner, part%pressure)
           ! the product over the window contains the errors of single precision
           call solve_on_normal_lattice(inner, self%iterate, target, &
                                        self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
@@ -323,7 +359,7 @@ contains
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
           call new_contact_state(state, whole%lattice, whole%space)
-          state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
+          call whole%paste(inner, self%corner, part%pressure, state%pressure)
         end associate
         state%motion = part%motion
         state%stopped = part%stopped

@@ -53,17 +53,17 @@ contains
         end associate
       end do
       !$omp end parallel do
-      mean = sum(part)/now%punch_sum
+      mean = level%space%total(part)/now%punch_sum
     end if
     call cut(level, now, step_length, step_length*mean, part, punch)
-    if (.not. sum(part) > 0.0_wp) then
+    if (.not. level%space%total(part) > 0.0_wp) then
       ! none of the pressure is left where it should be
       now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
       part = count(now%active, dim=1)
     end if
     ! what was cut off goes where it changes the approach alone
     if (.not. now%by_load) return
-    lack = real((now%pressures/now%p_unit - sum(part))/now%punch_sum, sp)
+    lack = real((now%pressures/now%p_unit - level%space%total(part))/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
@@ -107,9 +107,9 @@ contains
     end do
     !$omp end parallel do
     mean = 0.0_wp
-    if (now%by_load) mean = sum(sum_z)/now%punch_sum
+    if (now%by_load) mean = level%space%total(sum_z)/now%punch_sum
     back = 0.0_sp
-    if (curved > 0.0_wp) back = max(real(-sum(part)/curved, sp), 0.0_sp)
+    if (curved > 0.0_wp) back = max(real(-level%space%total(part)/curved, sp), 0.0_sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
@@ -122,14 +122,14 @@ contains
       end associate
     end do
     !$omp end parallel do
-    uncut = length*sum(part)
+    uncut = length*level%space%total(part)
     off = length*mean
     do try = 1, max_cuts
       call cut(level, now, length, off, part, punch)
       if (.not. now%by_load) exit
-      lack = sum(part) - now%pressures/now%p_unit
+      lack = level%space%total(part) - now%pressures/now%p_unit
       if (abs(lack) <= rounding*now%pressures/now%p_unit) exit
-      off = off + lack/merge(sum(punch), now%punch_sum, sum(punch) > 0.0_wp)
+      off = off + lack/merge(level%space%total(punch), now%punch_sum, level%space%total(punch) > 0.0_wp)
     end do
     fall = steepness(level, now)
     if (.not. fall > least_share*max(uncut, 0.0_wp)) fall = 0.0_wp
@@ -181,7 +181,7 @@ contains
       end associate
     end do
     !$omp end parallel do
-    steepness = sum(part)/now%w_unit
+    steepness = level%space%total(part)/now%w_unit
   end function steepness
 
   !> Compute the next direction of conjugate gradients.
@@ -205,10 +205,10 @@ contains
       end associate
     end do
     !$omp end parallel do
-    call recurrence%last_share(sum(part), share, anew)
+    call recurrence%last_share(level%space%total(part), share, anew)
     back = real(share, sp)
     mean = 0.0_sp
-    if (now%by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
+    if (now%by_load) mean = real(level%space%total(sum_z)/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (anew) now%d(:, row, 1) = 0.0_sp
@@ -242,7 +242,7 @@ contains
         sum_z(row) = sum(real(now%z(:, row, 1), wp), mask=now%active(:, row))
       end do
       !$omp end parallel do
-      mean = real(sum(sum_z)/now%punch_sum, sp)
+      mean = real(level%space%total(sum_z)/now%punch_sum, sp)
     end if
     unit = now%p_unit/now%w_unit
     !$omp parallel do schedule(static) num_threads(level%space%threads)
@@ -254,7 +254,7 @@ contains
     end do
     !$omp end parallel do
     back = 0.0_sp
-    if (.not. anew) back = max(real(-sum(part)/curvature(level, now), sp), 0.0_sp)
+    if (.not. anew) back = max(real(-level%space%total(part)/curvature(level, now), sp), 0.0_sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (anew) now%d(:, row, 1) = 0.0_sp
@@ -281,7 +281,7 @@ contains
       end associate
     end do
     !$omp end parallel do
-    curvature = sum(part)
+    curvature = level%space%total(part)
   end function curvature
 
   !> Compute the length of the step along a direction by the springs of a compliant law; 0 if there is no curvature.
@@ -300,7 +300,7 @@ contains
     !$omp end parallel do
     steepness = curvature(level, now)
     find_sprung_step = 0.0_wp
-    if (steepness > 0.0_wp) find_sprung_step = sum(part)/steepness
+    if (steepness > 0.0_wp) find_sprung_step = level%space%total(part)/steepness
   end function find_sprung_step
 
 end module hc_normal_directions

@@ -81,7 +81,7 @@ contains
       end associate
     end do
     !$omp end parallel do
-    factor = sum(overlap)/sum(resistance)
+    factor = level%space%total(overlap)/level%space%total(resistance)
     if (.not. factor > 0.0_wp) factor = now%approach/level%space%max(now%w)
     now%p = factor*now%p
     now%w = factor*now%w
@@ -127,7 +127,7 @@ contains
       end associate
     end do
     !$omp end parallel do
-    now%approach = sum(moment)/sum(weight)
+    now%approach = level%space%total(moment)/level%space%total(weight)
   end subroutine find_approach
 
   !> Compute the residuals, and find the set that the present pressure and gap call for.
@@ -146,7 +146,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(classification_t) :: found(size(now%p, 2))
     type(limits_t) :: limits
-    integer :: row
+    real(wp) :: largest(4)
+    integer :: row, numbers(3)
 
     ! r' of (N2)
     limits = limits_t(level%normal_classification_parameter(now%n_active), 1.0_wp/level%normal_compliance, now%approach)
@@ -160,21 +161,25 @@ contains
       end if
     end do
     !$omp end parallel do
-    if (.not. (all(found%finite) .and. ieee_is_finite(now%approach))) then
+    numbers = [count(.not. found%finite), sum(found%n_next), sum(found%n_changed)]
+    call level%space%ranks%add_counts(numbers)
+    if (numbers(1) > 0 .or. .not. ieee_is_finite(now%approach)) then
       call raise(error, status%no_convergence, not_finite)
       return
     end if
-    now%p_max = maxval(found%p_max)
-    now%residual = maxval(found%worst)/now%p_max
-    now%residual_changed = maxval(found%worst_changed)/now%p_max
-    now%residual_active = maxval(found%worst_active)
+    largest = [maxval(found%p_max), maxval(found%worst), maxval(found%worst_changed), maxval(found%worst_active)]
+    call level%space%most(largest)
+    now%p_max = largest(1)
+    now%residual = largest(2)/now%p_max
+    now%residual_changed = largest(3)/now%p_max
+    now%residual_active = largest(4)
     if (.not. allocated(now%offset)) then
       now%residual_active = now%residual_active/(level%normal_compliance*now%p_max)
     else
       now%residual_active = now%residual_active/now%p_max
     end if
-    now%n_next = sum(found%n_next)
-    changed = sum(found%n_changed) > 0 .and. now%n_next > 0
+    now%n_next = numbers(2)
+    changed = numbers(3) > 0 .and. now%n_next > 0
     if (now%n_next > 0) return
     ! too much pressure everywhere: reduce it on the old set
     next = now%active
@@ -339,7 +344,7 @@ contains
     real(wp), intent(in) :: share
     !> The approach follows a prescribed load
     logical, intent(in) :: follows
-    real(wp) :: step, closing, moment(size(now%p, 2))
+    real(wp) :: step, closing, moment(size(now%p, 2)), change(1)
     real(sp) :: largest
     integer :: row
 
@@ -363,8 +368,10 @@ contains
       largest = max(largest, largest_of(size(now%p, 1), now%kd(:, row, 1)))
     end do
     !$omp end parallel do
-    now%closing_error = now%closing_error + single_error*abs(closing)*largest
-    if (follows) now%approach = now%approach + closing*sum(moment)/now%punch_sum
+    change = largest
+    call level%space%most(change)
+    now%closing_error = now%closing_error + single_error*abs(closing)*change(1)
+    if (follows) now%approach = now%approach + closing*level%space%total(moment)/now%punch_sum
   end subroutine advance
 
   !> Set tension to zero: it is within the tolerance.
@@ -375,17 +382,19 @@ contains
     type(normal_iterate_t), intent(inout) :: now
     !> There was some
     logical, intent(out) :: pulls
-    integer :: row
+    integer :: row, n(1)
 
-    pulls = .false.
-    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(.or.: pulls)
+    n = 0
+    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(+: n)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
-        pulls = pulls .or. count(now%p(from:to, row) < 0.0_wp) > 0
+        n = n + count(now%p(from:to, row) < 0.0_wp)
         now%p(from:to, row) = max(now%p(from:to, row), 0.0_wp)
       end associate
     end do
     !$omp end parallel do
+    call level%space%ranks%add_counts(n)
+    pulls = n(1) > 0
   end subroutine remove_tension
 
   !> Compute the difference between the prescribed load and the sum of the pressures, which is rounding error.
@@ -428,7 +437,7 @@ contains
     integer :: n(2), row, stat, try
     logical :: known
 
-    n = level%lattice%extent
+    n = level%own_extent()
     if (allocated(now%active)) then
       if (any(shape(now%active) /= n)) deallocate (now%d, now%active, now%span)
     end if
@@ -444,12 +453,13 @@ contains
     if (stat == 0 .and. level%normal_law%is_compliant()) then
       allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
     end if
-    if (stat /= 0) then
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+    call level%space%ranks%agree(error)
+    if (allocated(error)) then
       now = normal_iterate_t()                                                 ! fields that did fit
-      call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
       return
     end if
-    known = any(now%p > 0.0_wp .and. candidate)
+    known = level%space%count(now%p > 0.0_wp .and. candidate) > 0
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, n(2)
       now%active(:, row) = candidate(:, row)

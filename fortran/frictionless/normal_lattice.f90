@@ -92,7 +92,7 @@ contains
     if (allocated(error)) return
     call move_alloc(preconditioner, self%preconditioner)
     call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), 1, 1, space, error, &
-                         beside=before_last(self) + self%lattice%size()*(storage_size(1.0_sp)/8))
+                         beside=before_last(self) + self%own_size()*(storage_size(1.0_sp)/8))
     if (allocated(error)) return
     if (self%exact) then
       self%single%wide => self%flexibility%convolution%spectrum(:, :, 1)
@@ -116,8 +116,8 @@ contains
   pure integer(int64) function before_last(self)
     class(normal_lattice_t), intent(in) :: self
 
-    before_last = max(transform_memory(self%lattice%extent, transform_length(self%lattice), 1), &
-                      2*int(self%lattice%size(), int64)*(storage_size(1.0_sp)/8))
+    before_last = max(transform_memory(self%lattice%extent, transform_length(self%lattice), 1, self%space%ranks), &
+                      2*int(self%own_size(), int64)*(storage_size(1.0_sp)/8))
   end function before_last
 
   !> Take fields from the memory of the transforms: products in double precision destroy the first two.
@@ -128,10 +128,10 @@ contains
     real(sp), pointer, contiguous :: all(:)
     integer(int64) :: n, from
 
-    n = self%lattice%size()
+    n = self%own_size()
     from = before_last(self)/(storage_size(1.0_sp)/8)
     call c_f_pointer(self%single%beside(), all, [from + n])
-    associate (extent => self%lattice%extent)
+    associate (extent => self%own_extent())
       first(1:extent(1), 1:extent(2), 1:1) => all(:n)
       second(1:extent(1), 1:extent(2), 1:1) => all(n + 1:2*n)
       last(1:extent(1), 1:extent(2), 1:1) => all(from + 1:)

@@ -120,10 +120,9 @@ contains
       if (allocated(now%punch)) deallocate (now%punch)
       if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
       allocate (state%zone(size(state%gap, 1), size(state%gap, 2)), stat=stat)
-      if (stat /= 0) then
-        call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
-        return
-      end if
+      if (stat /= 0) call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+      call level%space%ranks%agree(error)
+      if (allocated(error)) return
       state%motion(normal) = now%approach
     end if
     call level%complete_pressed(target, tolerance, state, error)
@@ -262,8 +261,9 @@ contains
     if (progress%step == conjugate) progress%emptied = .false.
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
-      found = .false.
-      if (progress%step == searched .or. progress%emptied .or. .not. any(now%p < 0.0_wp)) then
+      ! without tension, or after it was taken away
+      found = level%space%count(now%p < 0.0_wp) == 0
+      if (found .or. progress%step == searched .or. progress%emptied) then
         call search_step(level, now, progress, found)
       end if
       progress%emptied = .not. found

@@ -1,9 +1,12 @@
-!> Space of the fields over a window: threads that share the work, and operations on the values of many nodes.
+!> Space of the fields over a window: ranks and threads that share the work, and operations on the values of many nodes.
 !>
-!> Fields are plain arrays: windows (n_col, n_row), or vectors of nodes. Sums are taken in fixed blocks or row by row,
-!> so that they do not depend on the number of threads.
+!> Fields are plain arrays: windows (n_col, n_row), or vectors of nodes. A rank holds its own rows of the window only. Sums are
+!> taken in fixed blocks or row by row, so that they do not depend on the number of threads; sums over windows, and largest
+!> values, do not depend on the number of ranks, either.
 module hc_field_space
+  use, intrinsic :: iso_c_binding, only: c_loc
   use hc_precision, only: wp, sp
+  use hc_communicator, only: communicator_t
   use hc_scratch, only: scratch_t
   !$ use omp_lib, only: omp_get_max_threads
   implicit none
@@ -22,6 +25,8 @@ module hc_field_space
   type :: field_space_t
     !> Number of threads
     integer :: threads = 1
+    !> Ranks that share the rows of the window; by default this one holds all
+    type(communicator_t) :: ranks
     !> Memory that the transforms of a solver share; not there: each has its own
     type(scratch_t), pointer :: scratch => null()
   contains
@@ -39,6 +44,13 @@ module hc_field_space
     !> Number of nodes of a set, and of nodes with a value above zero
     generic :: count => count_nodes, count_window
     procedure :: count_positive
+    !> Sum of values by row; largest values, in place
+    procedure :: total, most
+    !> First and last row of this rank, and the size of its part of a field
+    procedure :: own_rows, own_extent
+    !> Rows of a field over the window, wherever they lie
+    generic :: fetch => fetch_window, fetch_single, fetch_mask
+    procedure, private :: fetch_window, fetch_single, fetch_mask
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
     procedure, private :: vector_sum, window_sum, window_sum_on, window_sum_single, vector_max, vector_max_on, window_max, &
@@ -79,6 +91,115 @@ contains
 
     threads_for = merge(self%threads, 1, n >= worth_sharing)
   end function threads_for
+
+  !> Sum values by row over all ranks.
+  real(wp) function total(self, part)
+    class(field_space_t), intent(in) :: self
+    !> Values of the own rows
+    real(wp), intent(in), contiguous :: part(:)
+
+    total = self%ranks%total(part)
+  end function total
+
+  !> Replace values by the largest of all ranks.
+  subroutine most(self, value)
+    class(field_space_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: value(:)
+
+    call self%ranks%most(value)
+  end subroutine most
+
+  !> Return the largest of a value of all ranks.
+  real(wp) function largest(self, value)
+    type(field_space_t), intent(in) :: self
+    real(wp), intent(in) :: value
+    real(wp) :: values(1)
+
+    values = value
+    call self%ranks%most(values)
+    largest = values(1)
+  end function largest
+
+  !> Return the sum of a count of all ranks.
+  integer function number(self, value)
+    type(field_space_t), intent(in) :: self
+    integer, intent(in) :: value
+    integer :: values(1)
+
+    values = value
+    call self%ranks%add_counts(values)
+    number = values(1)
+  end function number
+
+  !> Return the first and the last row of this rank.
+  pure function own_rows(self, n_row) result(rows)
+    class(field_space_t), intent(in) :: self
+    !> Rows of the window
+    integer, intent(in) :: n_row
+    integer :: rows(2)
+
+    rows = [self%ranks%first_row(n_row), self%ranks%last_row(n_row)]
+  end function own_rows
+
+  !> Return the columns and rows of a field in the memory of this rank.
+  pure function own_extent(self, extent)
+    class(field_space_t), intent(in) :: self
+    !> Columns and rows of the window
+    integer, intent(in) :: extent(2)
+    integer :: own_extent(2)
+
+    associate (rows => self%own_rows(extent(2)))
+      own_extent = [extent(1), rows(2) - rows(1) + 1]
+    end associate
+  end function own_extent
+
+  !> Take rows of a field; all ranks take part.
+  subroutine fetch_window(self, n_row, own, first, values)
+    class(field_space_t), intent(in) :: self
+    !> Rows of the window
+    integer, intent(in) :: n_row
+    !> Own rows of the field (n_col, own rows)
+    real(wp), intent(in), contiguous, target :: own(:, :)
+    !> First of the rows that are wanted, and their values (n_col, number of rows)
+    integer, intent(in) :: first
+    real(wp), intent(out), contiguous, target :: values(:, :)
+
+    if (self%ranks%size == 1) then
+      values = own(:, first:first + size(values, 2) - 1)
+    else
+      call self%ranks%fetch(2*size(own, 1), n_row, c_loc(own), [first, first + size(values, 2) - 1], c_loc(values))
+    end if
+  end subroutine fetch_window
+
+  !> Take rows of a field in single precision.
+  subroutine fetch_single(self, n_row, own, first, values)
+    class(field_space_t), intent(in) :: self
+    integer, intent(in) :: n_row
+    real(sp), intent(in), contiguous, target :: own(:, :)
+    integer, intent(in) :: first
+    real(sp), intent(out), contiguous, target :: values(:, :)
+
+    if (self%ranks%size == 1) then
+      values = own(:, first:first + size(values, 2) - 1)
+    else
+      call self%ranks%fetch(size(own, 1), n_row, c_loc(own), [first, first + size(values, 2) - 1], c_loc(values))
+    end if
+  end subroutine fetch_single
+
+  !> Take rows of a mask.
+  subroutine fetch_mask(self, n_row, own, first, values)
+    class(field_space_t), intent(in) :: self
+    integer, intent(in) :: n_row
+    logical, intent(in), contiguous, target :: own(:, :)
+    integer, intent(in) :: first
+    logical, intent(out), contiguous, target :: values(:, :)
+
+    if (self%ranks%size == 1) then
+      values = own(:, first:first + size(values, 2) - 1)
+    else
+      call self%ranks%fetch(size(own, 1), n_row, c_loc(own), [first, first + size(values, 2) - 1], c_loc(values))
+    end if
+  end subroutine fetch_mask
 
   !> Set x <- value.
   subroutine fill(self, x, value)
@@ -138,6 +259,7 @@ contains
       vector_max = max(vector_max, x(i))
     end do
     !$omp end parallel do simd
+    vector_max = largest(self, vector_max)
   end function vector_max
 
   !> Return the largest element of a field over the window.
@@ -156,6 +278,7 @@ contains
       end do
     end do
     !$omp end parallel do
+    window_max = largest(self, window_max)
   end function window_max
 
   !> Return the largest element on a set of nodes.
@@ -173,6 +296,7 @@ contains
       vector_max_on = max(vector_max_on, merge(x(i), -huge(1.0_wp), nodes(i)))
     end do
     !$omp end parallel do simd
+    vector_max_on = largest(self, vector_max_on)
   end function vector_max_on
 
   !> Return the largest element of a field over the window on a set of nodes.
@@ -190,6 +314,7 @@ contains
       window_max_on = max(window_max_on, maxval(x(:, row), mask=nodes(:, row)))
     end do
     !$omp end parallel do
+    window_max_on = largest(self, window_max_on)
   end function window_max_on
 
   !> Return the smallest element on a set of nodes.
@@ -207,6 +332,7 @@ contains
       vector_min = min(vector_min, merge(x(i), huge(1.0_wp), nodes(i)))
     end do
     !$omp end parallel do simd
+    vector_min = -largest(self, -vector_min)
   end function vector_min
 
   !> Return the smallest element of a field over the window on a set of nodes.
@@ -224,6 +350,7 @@ contains
       window_min = min(window_min, minval(x(:, row), mask=nodes(:, row)))
     end do
     !$omp end parallel do
+    window_min = -largest(self, -window_min)
   end function window_min
 
   !> Return the largest absolute value, 0 of nothing.
@@ -239,6 +366,7 @@ contains
       max_abs = max(max_abs, abs(x(i)))
     end do
     !$omp end parallel do simd
+    max_abs = largest(self, max_abs)
   end function max_abs
 
   !> Count the nodes of a set of the window.
@@ -254,6 +382,7 @@ contains
       count_window = count_window + count(nodes(:, row))
     end do
     !$omp end parallel do
+    count_window = number(self, count_window)
   end function count_window
 
   !> Count the nodes of the window with a value above zero.
@@ -269,6 +398,7 @@ contains
       count_positive = count_positive + count(x(:, row) > 0.0_wp)
     end do
     !$omp end parallel do
+    count_positive = number(self, count_positive)
   end function count_positive
 
   !> Count the nodes of a set.
@@ -284,6 +414,7 @@ contains
       count_nodes = count_nodes + merge(1, 0, nodes(i))
     end do
     !$omp end parallel do simd
+    count_nodes = number(self, count_nodes)
   end function count_nodes
 
   !> Sum the elements.
@@ -299,7 +430,7 @@ contains
       part(k) = sum(x((k - 1)*sum_block + 1:min(k*sum_block, size(x))))
     end do
     !$omp end parallel do
-    vector_sum = sum(part)
+    vector_sum = self%ranks%total(part)
   end function vector_sum
 
   !> Sum a field over the window, row by row.
@@ -315,7 +446,7 @@ contains
       part(row) = sum(x(:, row))
     end do
     !$omp end parallel do
-    window_sum = sum(part)
+    window_sum = self%ranks%total(part)
   end function window_sum
 
   !> Sum a field over a set of nodes of the window, row by row.
@@ -333,7 +464,7 @@ contains
       part(row) = sum(x(:, row), mask=nodes(:, row))
     end do
     !$omp end parallel do
-    window_sum_on = sum(part)
+    window_sum_on = self%ranks%total(part)
   end function window_sum_on
 
   !> Sum a field in single precision over the window, row by row, in double precision.
@@ -349,7 +480,7 @@ contains
       part(row) = sum(real(x(:, row), wp))
     end do
     !$omp end parallel do
-    window_sum_single = sum(part)
+    window_sum_single = self%ranks%total(part)
   end function window_sum_single
 
   !> Add x <- x + B share.
@@ -405,7 +536,7 @@ contains
       part(k) = ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
     end do
     !$omp end parallel do
-    dot = sum(part)
+    dot = self%ranks%total(part)
   end function dot
 
 end module hc_field_space

@@ -1,8 +1,11 @@
 !> A contact problem on a hierarchy of lattices, each of every second node of the finer one, and on a part of its window.
 !>
+!> Ranks share the rows of each window that is large enough; a smaller one is on all of them alike.
+!>
 !> Theory: docs/theory/multilevel.md.
 module hc_hierarchy
   use hc_precision, only: wp
+  use hc_communicator, only: rows_held
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_transfer, only: restrict_field, restrict_mask
@@ -15,13 +18,19 @@ module hc_hierarchy
   type, abstract :: level_t
     !> Lattice and window
     type(lattice_t) :: lattice
-    !> Initial gap (n_col, n_row) [m]
+    !> Initial gap (n_col, own rows) [m]
     real(wp), allocatable :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
+    !> Nodes that may come into contact (n_col, own rows)
     logical, allocatable :: candidate(:, :)
     !> Space of the fields
     type(field_space_t) :: space
   contains
+    !> Columns and rows of a field in the memory of this rank, and their product
+    procedure :: own_extent, own_rows, own_size
+    !> Lattice of some rows
+    procedure :: rows_of
+    !> Field on a part of the window, and back
+    procedure :: cut, paste
     !> The same problem on the lattice of every second node
     procedure :: coarsen
     !> Gap of the problem there, set again
@@ -71,10 +80,21 @@ contains
     !> The problem there
     class(level_t), intent(inout) :: coarse
 
+    logical, allocatable :: rows(:, :)
+    integer :: first(2), n
+
     coarse%lattice = self%lattice%coarsened()
-    call self%coarsen_gap(coarse)
-    coarse%candidate = restrict_mask(self%lattice, self%candidate, coarse%lattice)
     coarse%space = self%space
+    coarse%space%ranks = self%space%ranks%over(coarse%lattice%extent)
+    call self%coarsen_gap(coarse)
+    if (self%space%ranks%size == 1) then
+      coarse%candidate = restrict_mask(self%lattice, self%candidate, coarse%lattice)
+    else
+      call find_fine_rows(self, coarse, first, n)
+      allocate (rows(self%lattice%extent(1), n))
+      call self%space%fetch(self%lattice%extent(2), self%candidate, first(2), rows)
+      coarse%candidate = rows(first(1)::2, ::2)
+    end if
     call coarse%inherit(self)
   end subroutine coarsen
 
@@ -83,9 +103,107 @@ contains
     class(level_t), intent(in) :: self
     !> The problem there
     class(level_t), intent(inout) :: coarse
+    real(wp), allocatable :: rows(:, :)
+    integer :: first(2), n
 
-    coarse%initial_gap = restrict_field(self%lattice, self%initial_gap, coarse%lattice)
+    if (self%space%ranks%size == 1) then
+      coarse%initial_gap = restrict_field(self%lattice, self%initial_gap, coarse%lattice)
+    else
+      call find_fine_rows(self, coarse, first, n)
+      allocate (rows(self%lattice%extent(1), n))
+      call self%space%fetch(self%lattice%extent(2), self%initial_gap, first(2), rows)
+      coarse%initial_gap = rows(first(1)::2, ::2)
+    end if
   end subroutine coarsen_gap
+
+  !> Find the first column and row of the fine nodes that the own rows of the coarse lattice consist of, and their rows.
+  subroutine find_fine_rows(fine, coarse, first, n)
+    class(level_t), intent(in) :: fine, coarse
+    integer, intent(out) :: first(2), n
+
+    first = 2*coarse%lattice%first - fine%lattice%first + 1
+    associate (rows => coarse%space%own_rows(coarse%lattice%extent(2)))
+      first(2) = first(2) + 2*(rows(1) - 1)
+      n = 2*(rows(2) - rows(1)) + 1
+    end associate
+  end subroutine find_fine_rows
+
+  !> Return the columns and rows of a field in the memory of this rank.
+  pure function own_extent(self)
+    class(level_t), intent(in) :: self
+    integer :: own_extent(2)
+
+    own_extent = self%space%own_extent(self%lattice%extent)
+  end function own_extent
+
+  !> Return the number of rows in the memory of this rank.
+  pure integer function own_rows(self)
+    class(level_t), intent(in) :: self
+
+    own_rows = rows_held(self%space%ranks, self%lattice%extent(2))
+  end function own_rows
+
+  !> Return the number of nodes in the memory of this rank.
+  pure integer function own_size(self)
+    class(level_t), intent(in) :: self
+
+    own_size = self%lattice%extent(1)*self%own_rows()
+  end function own_size
+
+  !> Return the lattice of some rows of the window.
+  pure type(lattice_t) function rows_of(self, first, last) result(rows)
+    class(level_t), intent(in) :: self
+    !> First and last row
+    integer, intent(in) :: first, last
+
+    rows = self%lattice%subwindow([1, first], [self%lattice%extent(1), last])
+  end function rows_of
+
+  !> Take a field on a part of the window.
+  subroutine cut(self, field, low, part, values)
+    class(level_t), intent(in) :: self
+    !> Field (n_col, own rows)
+    real(wp), intent(in), contiguous :: field(:, :)
+    !> First column and row of the part
+    integer, intent(in) :: low(2)
+    !> The problem there
+    class(level_t), intent(in) :: part
+    !> Field there (columns and own rows of the part)
+    real(wp), allocatable, intent(inout) :: values(:, :)
+    real(wp), allocatable :: rows(:, :)
+    integer :: first
+
+    first = low(2) + part%space%ranks%first_row(part%lattice%extent(2)) - 1
+    associate (last => low(1) + part%lattice%extent(1) - 1, n => part%own_rows())
+      if (self%space%ranks%size == 1) then
+        values = field(low(1):last, first:first + n - 1)
+      else
+        allocate (rows(size(field, 1), n))
+        call self%space%fetch(self%lattice%extent(2), field, first, rows)
+        values = rows(low(1):last, :)
+      end if
+    end associate
+  end subroutine cut
+
+  !> Set a field on a part of the window.
+  subroutine paste(self, part, low, values, field)
+    class(level_t), intent(in) :: self
+    !> The problem on the part, and first column and row of it
+    class(level_t), intent(in) :: part
+    integer, intent(in) :: low(2)
+    !> Field there (columns and own rows of the part)
+    real(wp), intent(in), contiguous :: values(:, :)
+    !> Field (n_col, own rows)
+    real(wp), intent(inout), contiguous :: field(:, :)
+    real(wp), allocatable :: rows(:, :)
+    integer :: own(2), wanted(2)
+
+    own = self%space%own_rows(self%lattice%extent(2))
+    wanted = [max(own(1), low(2)), min(own(2), low(2) + part%lattice%extent(2) - 1)]
+    allocate (rows(part%lattice%extent(1), max(wanted(2) - wanted(1) + 1, 0)))
+    call part%space%fetch(part%lattice%extent(2), values, wanted(1) - low(2) + 1, rows)
+    field(low(1):low(1) + size(rows, 1) - 1, wanted(1) - own(1) + 1:wanted(2) - own(1) + 1) = rows
+  end subroutine paste
 
   !> Set up the same problem on the part of its window between some columns and rows.
   subroutine extract_part(self, low, high, part)
@@ -95,10 +213,20 @@ contains
     !> The problem there
     class(level_t), intent(inout) :: part
 
+    logical, allocatable :: rows(:, :)
+
     part%lattice = self%lattice%subwindow(low, high)
-    part%initial_gap = self%initial_gap(low(1):high(1), low(2):high(2))
-    part%candidate = self%candidate(low(1):high(1), low(2):high(2))
     part%space = self%space
+    part%space%ranks = self%space%ranks%over(part%lattice%extent)
+    call self%cut(self%initial_gap, low, part, part%initial_gap)
+    if (self%space%ranks%size == 1) then
+      part%candidate = self%candidate(low(1):high(1), low(2):high(2))
+    else
+      allocate (rows(size(self%candidate, 1), part%own_rows()))
+      call self%space%fetch(self%lattice%extent(2), self%candidate, &
+                            low(2) + part%space%ranks%first_row(part%lattice%extent(2)) - 1, rows)
+      part%candidate = rows(low(1):high(1), :)
+    end if
     call part%inherit(self)
   end subroutine extract_part
 

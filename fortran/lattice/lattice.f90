@@ -69,7 +69,7 @@ module hc_lattice
     !> Sum and largest value over each node and its neighbors; nodes within some steps of a zone
     procedure :: ring_sum, ring_max, dilated
     !> The part of the window around some nodes: its columns and rows, whether it pays, its lattice
-    procedure :: enclose, is_worth_parting, subwindow
+    procedure :: enclose, enclose_lines, is_worth_parting, subwindow
   end type lattice_t
 
 contains
@@ -388,12 +388,25 @@ contains
     type(multilevel_options_t), intent(in) :: options
     !> Columns and rows, from 1 on
     integer, intent(out) :: low(2), high(2)
+
+    call self%enclose_lines(any(nodes, dim=2), any(nodes, dim=1), options, low, high)
+  end subroutine enclose
+
+  !> Find the same part from the columns and rows that contain nodes.
+  pure subroutine enclose_lines(self, columns, rows, options, low, high)
+    class(lattice_t), intent(in) :: self
+    !> Columns and rows with nodes
+    logical, intent(in) :: columns(:), rows(:)
+    type(multilevel_options_t), intent(in) :: options
+    !> Columns and rows, from 1 on
+    integer, intent(out) :: low(2), high(2)
     integer :: d, margin, step
     logical :: line(maxval(self%extent))
 
     do d = 1, 2
       line = .false.
-      line(:self%extent(d)) = any(nodes, dim=3 - d)
+      if (d == 1) line(:size(columns)) = columns
+      if (d == 2) line(:size(rows)) = rows
       low(d) = max(findloc(line, .true., dim=1), 1)
       high(d) = findloc(line, .true., dim=1, back=.true.)
       if (high(d) == 0) high(d) = self%extent(d)
@@ -406,7 +419,7 @@ contains
       low(d) = max((low(d) - margin - 1)/step*step + 1, 1)
       high(d) = min((high(d) + margin + step - 1)/step*step, self%extent(d))
     end do
-  end subroutine enclose
+  end subroutine enclose_lines
 
   !> Return whether the part is so much smaller than the window that separate operators pay; no part repeats with the window.
   pure logical function is_worth_parting(self, low, high, options)

@@ -43,11 +43,15 @@ module hc_edge_continuation
     integer :: smoothings = 0
     !> Space of the rings
     type(field_space_t) :: space
+    !> Ranks that share the fields; on several ones the rings are those in `rows`, own rows and those that their values depend on
+    type(field_space_t) :: fields
+    integer :: own(2) = 0, rows(2) = 0, n_row = 0
   contains
     !> Continue a field beyond the active nodes
     procedure :: extend
     !> The transpose: add what acts on the rings to the active nodes
     procedure :: fold
+    procedure, private :: extend_rings, fold_rings
   end type edge_extension_t
 
 contains
@@ -56,46 +60,137 @@ contains
   subroutine new_edge_extension(self, active, space, options, within, near)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
-    !> Active nodes (n_col, n_row)
+    !> Active nodes (n_col, own rows)
     logical, intent(in), contiguous :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
-    !> Nodes beyond which there are no rings (n_col, n_row); absent: all of the window
+    !> Nodes beyond which there are no rings (n_col, n_row), on one rank; absent: all of the window
     logical, intent(in), contiguous, optional :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
+    integer, allocatable :: mark(:), frontier(:), step(:)
 
+    step = neighbor_steps(size(active, 1) + 2)
+    if (present(near)) step = pack(step, near)
+    if (space%ranks%size > 1) then
+      call share_rings(self, active, space, options, step)
+    else
+      call mark_window(active, space, mark, within)
+      call find_edge(active, mark, step, space, frontier)
+      call find_rings(self, size(active, 1), number_of_rings(options, space%count(active), size(frontier)), step, frontier, mark, &
+                      space, options)
+    end if
+  end subroutine new_edge_extension
+
+  !> Compute the number of rings.
+  pure integer function number_of_rings(options, n_active, n_edge)
+    type(preconditioner_options_t), intent(in) :: options
+    !> Active nodes, and those at the edge
+    integer, intent(in) :: n_active, n_edge
+
+    number_of_rings = 0
+    if (n_edge == 0) return
+    number_of_rings = min(options%max_rings, int(options%ring_factor*(real(n_active, wp)/n_edge)**options%ring_power))
+  end function number_of_rings
+
+  !> Find the rings in own rows and in those that their values depend on: smoothed rings further in or out, and the active nodes
+  !> that these begin at.
+  subroutine share_rings(self, active, space, options, step)
+    type(edge_extension_t), intent(inout) :: self
+    !> Active nodes (n_col, own rows)
+    logical, intent(in), contiguous :: active(:, :)
+    type(field_space_t), intent(in) :: space
+    type(preconditioner_options_t), intent(in) :: options
+    !> Steps to the neighbors of a node
+    integer, intent(in), contiguous :: step(:)
+    logical, allocatable :: wider(:, :)
+    integer, allocatable :: mark(:), frontier(:)
+    integer :: counts(3), n_ring
+
+    self%fields = space
+    self%own = 0
+    counts = size(active, 2)
+    call space%ranks%add_counts(counts)
+    self%n_row = counts(1)
+    self%own = space%own_rows(self%n_row)
+    call take_rows(self, active, 1, wider)
+    call mark_window(wider, space, mark)
+    call find_edge(wider, mark, step, space, frontier)
+    counts = [count(active), count(is_own(self, size(active, 1), frontier)), 0]
+    call space%ranks%add_counts(counts)
+    n_ring = number_of_rings(options, counts(1), counts(2))
+    call take_rows(self, active, n_ring*(options%smoothings + 2) + 1, wider)
+    call mark_window(wider, space, mark)
+    call find_edge(wider, mark, step, space, frontier)
+    call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
+  end subroutine share_rings
+
+  !> Take own rows and some more on each side, as far as the window goes.
+  subroutine take_rows(self, active, more, wider)
+    type(edge_extension_t), intent(inout) :: self
+    !> Active nodes (n_col, own rows)
+    logical, intent(in), contiguous :: active(:, :)
+    !> Number of further rows
+    integer, intent(in) :: more
+    !> Active nodes of all of these rows
+    logical, allocatable, intent(out) :: wider(:, :)
+
+    self%rows = [max(self%own(1) - more, 1), min(self%own(2) + more, self%n_row)]
+    allocate (wider(size(active, 1), self%rows(2) - self%rows(1) + 1))
+    call self%fields%fetch(self%n_row, active, self%rows(1), wider)
+  end subroutine take_rows
+
+  !> Return whether a place in the marks is in an own row.
+  elemental logical function is_own(self, n_col, place)
+    type(edge_extension_t), intent(in) :: self
+    integer, intent(in) :: n_col, place
+    integer :: row
+
+    row = self%rows(1) + (place - 1)/(n_col + 2) - 1
+    is_own = row >= self%own(1) .and. row <= self%own(2)
+  end function is_own
+
+  !> Grow the rings from the nodes at the edge.
+  subroutine find_rings(self, n_col, most_rings, step, frontier, mark, space, options)
+    type(edge_extension_t), intent(inout) :: self
+    !> Number of columns, and of rings, unless they fill the window before
+    integer, intent(in) :: n_col, most_rings
+    !> Steps to the neighbors of a node
+    integer, intent(in), contiguous :: step(:)
+    !> Nodes at the edge
+    integer, allocatable, intent(inout) :: frontier(:)
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
-    integer, allocatable :: mark(:)
-    integer, allocatable :: frontier(:), next(:), node(:)
-    integer, allocatable :: step(:)
-    integer :: n_ring, n_col, width, n_active, r, n, k
-    real(wp) :: fall
+    integer, intent(inout), contiguous :: mark(:)
+    type(field_space_t), intent(in) :: space
+    type(preconditioner_options_t), intent(in) :: options
+    integer, allocatable :: next(:), node(:)
+    integer :: n_ring, width, r, n, k
+    real(wp) :: fall, found(1)
 
-    n_col = size(active, 1)
     width = n_col + 2
-    step = neighbor_steps(width)
-    if (present(near)) step = pack(step, near)
-    call mark_window(active, space, mark, within)
-    n_active = space%count(active)
-    call find_edge(active, mark, step, space, frontier)
-    n_ring = 0
-    if (size(frontier) > 0) then
-      n_ring = min(options%max_rings, int(options%ring_factor*(real(n_active, wp)/size(frontier))**options%ring_power))
-    end if
+    found = 0.0_wp
     allocate (node(0), self%ring(1))
     self%ring(1) = 1
-    do r = 1, n_ring
+    do r = 1, most_rings
       call next_ring(frontier, step, mark, size(node), next)
-      if (size(next) == 0) exit
+      if (space%ranks%size > 1) then
+        if (any(is_own(self, n_col, next))) found = r
+      else if (size(next) == 0) then
+        exit
+      end if
       node = [node, next]
       self%ring = [self%ring, size(node) + 1]
       call move_alloc(next, frontier)
     end do
 
+    if (space%ranks%size > 1) then
+      call space%most(found)
+      self%ring = self%ring(:nint(found(1)) + 1)
+      node = node(:self%ring(size(self%ring)) - 1)
+    end if
     n = size(node)
     n_ring = size(self%ring) - 1
     self%smoothings = options%smoothings
@@ -128,7 +223,7 @@ contains
       in_window = place - 1 - row*width + (row - 1)*n_col
     end function in_window
 
-  end subroutine new_edge_extension
+  end subroutine find_rings
 
   !> Mark all nodes before there are rings.
   subroutine mark_window(active, space, mark, within)
@@ -294,6 +389,54 @@ contains
   !> Continue a field beyond the active nodes.
   subroutine extend(self, field, own, first)
     class(edge_extension_t), intent(in) :: self
+    !> Field over the own rows (n)
+    real(sp), intent(inout), contiguous, target :: field(:)
+    !> Share of their own value at the nodes of the rings, to which the rest of the continuation is added: absent, 0 (n)
+    real(sp), intent(in), optional, contiguous, target :: own(:)
+    !> Height of the continuation in the first ring; absent: 1
+    real(sp), intent(in), optional :: first
+    real(sp), allocatable :: wider(:), wider_own(:)
+
+    if (self%fields%ranks%size == 1) then
+      call self%extend_rings(field, own, first)
+      return
+    end if
+    call widen(self, field, wider)
+    if (present(own)) call widen(self, own, wider_own)                         ! absent if it is not allocated
+    call self%extend_rings(wider, wider_own, first)
+    call narrow(self, wider, field)
+  end subroutine extend
+
+  !> Take a field on all rows of the rings.
+  subroutine widen(self, field, wider)
+    class(edge_extension_t), intent(in) :: self
+    real(sp), intent(in), contiguous, target :: field(:)
+    real(sp), allocatable, target, intent(out) :: wider(:)
+    real(sp), pointer, contiguous :: own(:, :), rows(:, :)
+    integer :: n_col, n
+
+    n_col = size(field)/(self%own(2) - self%own(1) + 1)
+    n = self%rows(2) - self%rows(1) + 1
+    allocate (wider(n_col*n))
+    own(1:n_col, 1:self%own(2) - self%own(1) + 1) => field
+    rows(1:n_col, 1:n) => wider
+    call self%fields%fetch(self%n_row, own, self%rows(1), rows)
+  end subroutine widen
+
+  !> Take the own rows of a field.
+  pure subroutine narrow(self, wider, field)
+    class(edge_extension_t), intent(in) :: self
+    real(sp), intent(in), contiguous :: wider(:)
+    real(sp), intent(inout), contiguous :: field(:)
+    integer :: start
+
+    start = size(field)/(self%own(2) - self%own(1) + 1)*(self%own(1) - self%rows(1))
+    field = wider(start + 1:start + size(field))
+  end subroutine narrow
+
+  !> Continue a field in the rows of the rings.
+  subroutine extend_rings(self, field, own, first)
+    class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
     !> Share of their own value at the nodes of the rings, to which the rest of the continuation is added: absent, 0 (n)
@@ -336,10 +479,31 @@ contains
       end associate
     end do
     !$omp end parallel
-  end subroutine extend
+  end subroutine extend_rings
 
   !> Apply the transpose of `extend`; the values on the rings have no meaning afterwards, but for those of `own`.
   subroutine fold(self, field, own, first)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the own rows (n)
+    real(sp), intent(inout), contiguous, target :: field(:)
+    !> Share of their own value at the nodes of the rings: absent, 0 (n)
+    real(sp), intent(in), optional, contiguous, target :: own(:)
+    !> Height of the continuation in the first ring; absent: 1
+    real(sp), intent(in), optional :: first
+    real(sp), allocatable :: wider(:), wider_own(:)
+
+    if (self%fields%ranks%size == 1) then
+      call self%fold_rings(field, own, first)
+      return
+    end if
+    call widen(self, field, wider)
+    if (present(own)) call widen(self, own, wider_own)
+    call self%fold_rings(wider, wider_own, first)
+    call narrow(self, wider, field)
+  end subroutine fold
+
+  !> Fold a field in the rows of the rings.
+  subroutine fold_rings(self, field, own, first)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
@@ -378,7 +542,7 @@ contains
       end associate
     end do
     !$omp end parallel
-  end subroutine fold
+  end subroutine fold_rings
 
   !> Take the values of a field at the nodes of a ring, by the threads of a parallel region.
   subroutine take_up(from, to, node, field, value)

@@ -10,7 +10,7 @@ module hc_flexibility
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t, check_lattice
-  use hc_field_space, only: most_threads
+  use hc_field_space, only: field_space_t, most_threads
   use hc_elastic_medium, only: elastic_medium_t
   use hc_fftw, only: good_size
   implicit none
@@ -27,6 +27,8 @@ module hc_flexibility
     type(lattice_t) :: lattice
     !> The two bodies
     class(elastic_medium_t), allocatable :: medium
+    !> Space of the fields, of which each rank holds its own rows
+    type(field_space_t) :: space
     !> Products so far, in full 3x3 applications: every component that acts or is wanted counts 1/6
     real(wp) :: applications = 0.0_wp
   contains
@@ -128,8 +130,10 @@ contains
     !> Allocated if they do not fit
     type(error_t), allocatable, intent(out) :: error
 
-    if (any(shape(traction) /= [self%lattice%extent, size(from)]) .or. &
-        any(shape(displacement) /= [self%lattice%extent, size(onto)])) then
+    integer :: extent(2)
+
+    extent = self%space%own_extent(self%lattice%extent)
+    if (any(shape(traction) /= [extent, size(from)]) .or. any(shape(displacement) /= [extent, size(onto)])) then
       call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
     end if
   end subroutine check

@@ -82,6 +82,7 @@ contains
     if (allocated(error)) return
     shared = space_over(lattice%extent)
     if (present(space)) shared = space
+    operator%space = shared
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
     operator%lattice = lattice
@@ -146,7 +147,7 @@ contains
       do b = 1, convolution%n_block
         allocate (block(n(2), n_block_wanted))
         do column = 1, width
-          f = (b - 1)*width + column - 1
+          f = convolution%before + (b - 1)*width + column - 1
           if (f > n(1)/2) exit
           call symbols%column(f, block)
           convolution%spectrum((column - 1)*n(2) + 1:column*n(2), b, :) = block(:, transformed(:n_kernel))/product(real(n, wp))

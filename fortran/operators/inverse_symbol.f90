@@ -46,8 +46,8 @@ module hc_inverse_symbol
     real(wp), private :: self_compliance = 0.0_wp
     !> Of the tangential flexibility
     logical, private :: tangential = .false.
-    !> Columns, rows and components of the fields
-    integer, private :: shape(3) = 0
+    !> Columns, rows of this rank and components of the fields; columns and rows of the window
+    integer, private :: shape(3) = 0, extent(2) = 0
     !> Lengths of the transforms
     integer, private :: length(2) = 0
     !> Cost of one application in applications of the full flexibility operator
@@ -102,7 +102,8 @@ contains
 
     if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
-    self%shape = [lattice%extent, n_component]
+    self%shape = [space%own_extent(lattice%extent), n_component]
+    self%extent = lattice%extent
     length = good_size(lattice%extent)
     if (lattice%is_periodic()) length = lattice%extent
     self%length = length
@@ -264,10 +265,10 @@ contains
     integer :: block, i
 
     self%loose = 0.0_wp
-    if (.not. any(active .and. compliance > 0.0_wp)) return
+    if (self%convolution%space%count(active .and. compliance > 0.0_wp) == 0) return
     if (.not. allocated(self%sprung)) then
       allocate (self%sprung, self%share(size(compliance)), self%stiffness(size(compliance)))
-      call new_convolution(self%sprung, self%shape(:2), self%length, 1, 1, self%convolution%space, error)
+      call new_convolution(self%sprung, self%extent, self%length, 1, 1, self%convolution%space, error)
       if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
       if (allocated(error)) then
         ! without memory for it: the symbol without springs still is a preconditioner
@@ -275,7 +276,7 @@ contains
         return
       end if
     end if
-    stiffest = minval(compliance, mask=active .and. compliance > 0.0_wp)
+    stiffest = self%convolution%space%min(compliance, active .and. compliance > 0.0_wp)
     elastic = options%wave_of_nodes*self%self_compliance + options%wave_of_springs*stiffest
     self%loose = max(self%self_compliance, (1.0_wp + negligible)*stiffest)
     self%height = real(self%self_compliance/(self%self_compliance + stiffest), sp)

@@ -25,6 +25,9 @@ module hc_pressure_kernel
     integer(int64) :: medium(n_word) = 0
     !> Closing at offsets (i, j) with i j >= 0, and at (i, -j)
     real(wp), allocatable :: same(:, :), opposite(:, :)
+    !> On several ranks there is no table of all rows: influence on the lattice of this basis
+    class(influence_t), allocatable :: influence
+    real(wp) :: basis(2, 2) = 0.0_wp
   contains
     !> Tabulate the kernel, unless the table covers the window
     procedure :: cover
@@ -50,6 +53,13 @@ contains
 
     n = lattice%extent - 1
     call medium%reduce(lattice%spacing(), reduced)
+    if (allocated(self%influence)) deallocate (self%influence)
+    if (space%ranks%size > 1) then
+      self%basis = lattice%unit_basis()
+      call reduced%new_influence(self%basis, self%influence)
+      self%equilateral = self%influence%is_hexagonal()
+      return
+    end if
     associate (word => reduced%key_words(normal=.true., tangential=.false.))
       if (allocated(self%same)) then
         if (all(n <= ubound(self%same)) .and. all(self%medium == word)) return
@@ -97,6 +107,10 @@ contains
     integer :: i, n
 
     n = size(k, 2)/2
+    if (allocated(self%influence)) then
+      call evaluate_row(self, j, k)
+      return
+    end if
     k(1, n + 1:) = self%same(:n, j)
     do i = 1, n
       if (j == 0) then
@@ -109,5 +123,30 @@ contains
       end if
     end do
   end subroutine kernel_row
+
+  !> Evaluate a row of offsets at the points that the table has.
+  pure subroutine evaluate_row(self, j, k)
+    class(normal_kernel_t), intent(in) :: self
+    integer, intent(in) :: j
+    real(wp), intent(out) :: k(:, :)
+    real(wp), dimension(size(k, 2)) :: x, y, closing
+    integer :: i, n, at(2)
+
+    n = size(k, 2)/2
+    do i = -n, n
+      at = [i, j]
+      if (i < 0 .and. j == 0) at = [-i, 0]
+      if (self%equilateral) then
+        if (i < 0 .and. j > 0) at = [abs(-i - j), min(-i, j)]                  ! a turn by 60 degrees
+        at = [maxval(at), minval(at)]
+      else if (i < 0 .and. j > 0) then
+        at = [-i, -j]
+      end if
+      x(n + 1 + i) = at(1)*self%basis(1, 1) + at(2)*self%basis(1, 2)
+      y(n + 1 + i) = at(1)*self%basis(2, 1) + at(2)*self%basis(2, 2)
+    end do
+    call self%influence%closing(x, y, closing)
+    k(1, :) = closing
+  end subroutine evaluate_row
 
 end module hc_pressure_kernel

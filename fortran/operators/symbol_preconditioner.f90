@@ -28,7 +28,7 @@ module hc_symbol_preconditioner
   type, extends(preconditioner_t), abstract :: symbol_preconditioner_t
     type(inverse_symbol_t) :: inverse
     type(preconditioner_options_t) :: options
-    !> Columns and rows of the window
+    !> Columns and rows of a field in the memory of this rank
     integer :: extent(2) = 0
     !> Neighbours at the ends of short edges
     logical :: beside(6) = .true.
@@ -81,13 +81,13 @@ contains
     integer, intent(in), optional :: more
     integer(int64) :: n
 
-    n = lattice%size()
+    n = product(space%own_extent(lattice%extent))
     if (present(tangential)) n = merge(2*n, n, tangential)
     if (present(more)) n = n + more
     call new_inverse_symbol(self%inverse, lattice, medium, space, error, tangential, cache, beside=n*(storage_size(1.0_sp)/8))
     if (present(more)) self%n_more = more
     self%unit = self%inverse%unit
-    self%extent = lattice%extent
+    self%extent = space%own_extent(lattice%extent)
     self%space = space
     self%options = options
     self%beside = lattice%near_neighbors()

@@ -9,6 +9,7 @@ module hc_f2py_handles
   use hc_error, only: error_t, status, raise
   use hc_lock, only: lock, unlock, handle_table
   use hc_memory, only: require_memory
+  use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_flexibility, only: flexibility_t
@@ -29,6 +30,7 @@ module hc_f2py_handles
   private
 
   public :: slot_t, take_slot, enter, leave, free_object, hold, hold_wear, find_state, find_wear, kernel_cache, own_cache, report
+  public :: ranks
   public :: bodies_of, find_coated, coated_t, add_springs, friction_of, normal_law_of
 
   !> Object of a handle: one of these.
@@ -70,6 +72,9 @@ module hc_f2py_handles
   type(entry_t), allocatable :: entries(:)
   !> First free entry, 0: none
   integer :: free_entry = 0
+
+  !> Ranks that solve problems together: one, unless MPI is started.
+  type(communicator_t) :: ranks
 
   !> Spectra of kernels that all problems share.
   type(kernel_cache_t), pointer :: kernel_cache => null()

@@ -4,7 +4,7 @@ module hc_f2py_problems
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_memory, only: require_memory
-  use hc_f2py_handles, only: slot_t, take_slot, free_object, hold, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, free_object, hold, kernel_cache, ranks
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_elastic_medium, only: elastic_medium_t
@@ -16,6 +16,7 @@ module hc_f2py_problems
   use hc_contact_state, only: contact_state_t, allocate_fields, field_of, n_load
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
+  use hc_shared_contact, only: shared_contact_t, new_shared_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
@@ -90,7 +91,7 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_operator
 
-  !> Create a frictionless contact problem.
+  !> Create a frictionless contact problem: by FFT on all ranks, of which the first one has gap and candidates.
   subroutine new_pressed(method, lattice, bodies, gap, candidate, law, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
@@ -107,14 +108,23 @@ contains
     type(field_space_t) :: space
     type(direct_contact_t), pointer :: dense
     type(normal_contact_t), pointer :: fft
+    type(shared_contact_t), pointer :: shared
     integer(c_int64_t) :: bytes
+    logical :: is_shared
 
+    is_shared = method == fft_based .and. ranks%size > 1
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
     if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
+    if (is_shared) bytes = bytes/ranks%size*ranks%on_node
     call take_window(lattice, bytes, threads, slot, handle, error)
+    if (is_shared) call ranks%agree(error)
     if (.not. allocated(error)) then
-      if (method == fft_based) then
+      if (is_shared) then
+        allocate (shared)
+        slot%pressed => shared
+        call new_shared_contact(shared, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law, ranks)
+      else if (method == fft_based) then
         allocate (fft)
         slot%pressed => fft
         call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law)

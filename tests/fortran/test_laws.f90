@@ -2,7 +2,6 @@
 module test_laws
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_options, only: options_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
   use hc_transfer, only: restrict_field
@@ -177,31 +176,30 @@ contains
   !> Parts around the contact, then around overlapping nodes too, then none.
   subroutine test_next_part(error)
     type(error_t), allocatable, intent(out) :: error
-    type(lattice_t) :: lattice
+    type(friction_problem_t) :: problem
     type(contact_state_t) :: state
-    type(options_t) :: options
-    logical :: candidate(200, 200), found
+    logical :: found
     integer :: low(2), high(2)
 
-    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [200, 200], error)
+    call new_lattice(problem%lattice, equilateral_basis(1.0_wp), [0, 0], [200, 200], error)
     if (allocated(error)) return
-    call new_friction_state(state, lattice)
+    call new_friction_state(state, problem%lattice)
     state%pressure(90:100, 90:100) = 1.0_wp
     state%gap(130, 95) = -1.0_wp
     state%gap(2, 2) = -1.0_wp
-    candidate = .true.
-    candidate(2, 2) = .false.
-    call next_part(1, options%multilevel, lattice, candidate, state, low, high, found)
+    allocate (problem%candidate(200, 200), source=.true.)
+    problem%candidate(2, 2) = .false.
+    call next_part(1, problem, state, low, high, found)
     call check_true(error, found .and. all(low < 90) .and. all(high > 100) .and. high(1) < 130, 'around the contact')
     if (allocated(error)) return
-    call next_part(2, options%multilevel, lattice, candidate, state, low, high, found)
+    call next_part(2, problem, state, low, high, found)
     call check_true(error, found .and. high(1) > 130 .and. all(low > 10), 'around nodes that overlap and may touch')
     if (allocated(error)) return
-    call next_part(4, options%multilevel, lattice, candidate, state, low, high, found)
+    call next_part(4, problem, state, low, high, found)
     call check_true(error, .not. found, 'not for ever')
     if (allocated(error)) return
     state%pressure(10:190, 10:190) = 1.0_wp
-    call next_part(1, options%multilevel, lattice, candidate, state, low, high, found)
+    call next_part(1, problem, state, low, high, found)
     call check_true(error, .not. found, 'not almost the whole window')
   end subroutine test_next_part
 

@@ -1,9 +1,24 @@
 """Runs that a launcher of MPI starts as several processes."""
 
+import contextlib
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
+import netCDF4
+import numpy as np
 import pytest
-from commands import DECK, inside
+from commands import DECK, ENVIRONMENT, PATIENCE, inside, wait_for
+
+from hexcontact.core import flat
+from hexcontact.result.journal import journal_of
+
+PRESSED = DECK.replace("[friction]\ncoefficient = 0.2\n", "").replace(
+    "nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]"
+)
+with_mpi = pytest.mark.skipif("MPI: yes" not in flat.BUILT, reason="this build has no MPI")
 
 
 @pytest.mark.parametrize(
@@ -30,3 +45,83 @@ def test_one_process_of_a_launcher_runs(
     monkeypatch.setenv(variable, "1")
     monkeypatch.setenv("SLURM_NTASKS", "4")  # as in a script of sbatch
     assert inside(tmp_path, "run", "sphere.toml", "--quiet").returncode == 0
+
+
+def launched(folder: Path, ranks: int, *words: str) -> subprocess.Popen[str]:
+    """Start the command in several processes."""
+    launcher = "mpirun.mpich" if "mpich" in os.environ.get("FC", "") else "mpirun.openmpi"
+    environment = ENVIRONMENT | {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+        "OMPI_MCA_hwloc_base_binding_policy": "none",
+        "OMPI_MCA_mpi_yield_when_idle": "1",
+    }
+    command = [launcher, "-n", str(ranks), sys.executable, "-m", "hexcontact", *words]
+    return subprocess.Popen(
+        command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+@with_mpi
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_several_processes_write_the_file_of_one(ranks: int, tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED)
+    assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
+    process = launched(tmp_path, ranks, "run", "sphere.toml", "--output", "all.nc")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert out.count("written: all.nc") == 1
+    with netCDF4.Dataset(tmp_path / "one.nc") as one, netCDF4.Dataset(tmp_path / "all.nc") as several:
+        assert set(one.variables) == set(several.variables)
+        for name in set(one.variables) - {"seconds"}:
+            np.testing.assert_array_equal(one[name][:], several[name][:], err_msg=name)
+
+
+@with_mpi
+def test_friction_is_refused_by_several_processes(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    process = launched(tmp_path, 2, "run", "sphere.toml")
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert err.count("friction: several processes solve contacts without friction") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.toml"]
+
+
+@with_mpi
+def test_a_killed_process_ends_all_and_leaves_the_finished_steps(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 400"))
+    process = launched(tmp_path, 3, "run", "sphere.toml", "--quiet")
+    journal = journal_of(tmp_path / "sphere.nc")
+    wait_for(lambda: journal.is_dir() and len(list(journal.iterdir())) > 3)
+    started = wait_for(lambda: ranks_of(process.pid, 3))
+    os.kill(started[-1], signal.SIGKILL)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode != 0
+    wait_for(lambda: not any(map(runs, started)))
+    done = inside(tmp_path, "info", str(journal))
+    assert done.returncode == 0, done.stderr
+
+
+def ranks_of(launcher: int, count: int) -> list[int]:
+    """Return the processes of Python below a launcher, once they are so many."""
+    children: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = stat.read_text().rpartition(")")[2].split()
+            children.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    found, below = [], [launcher]
+    while below:
+        below += children.get(pid := below.pop(), [])
+        with contextlib.suppress(OSError):
+            if "python" in os.readlink(f"/proc/{pid}/exe"):
+                found.append(pid)
+    return sorted(found) if len(found) == count else []
+
+
+def runs(pid: int) -> bool:
+    """Test whether a process has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..core.ranks import refuse_copies
+from ..core import ranks
 from ..errors import DeckError
 from ..solve.interruption import signal_pipe
 from . import frame
@@ -35,25 +35,29 @@ def run(
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
     from ..solve import log, restart
-    from ..solve.run import metadata_of
+    from ..solve.run import metadata_of, require_shareable
     from .solving import Messages, overview, picture_beside, solved
 
-    refuse_copies()
     if again and overwrite:
         raise DeckError("--resume: expected no --overwrite with it")
     messages = Messages("run", quiet, as_json, log_file, log_level)
-    with messages.logging(deck, *([output] if output else [])):
-        case = frame.case_of(deck, settings)
-        target = frame.target_of(case, deck, output)
-        log.refuse_same(log_file, [target])
-        if plot:  # refuses before the run
-            picture_beside(target)
-        if again and restart.was_begun(target, case):
-            return _resumed(target, plot, messages, case=case)
-        with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
-            extent = solved(case, store, pipe, deck.stem, messages)
-        picture = overview(target) if plot else None
-    return messages.conclude(case, store, extent, target, picture)
+    with ranks.together() as first:
+        if not first:
+            return None
+        with messages.logging(deck, *([output] if output else [])):
+            case = frame.case_of(deck, settings)
+            require_shareable(case)
+            target = frame.target_of(case, deck, output)
+            log.refuse_same(log_file, [target])
+            if plot:  # refuses before the run
+                picture_beside(target)
+            if again and restart.was_begun(target, case):
+                ranks.refuse_copies("run --resume")
+                return _resumed(target, plot, messages, case=case)
+            with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
+                extent = solved(case, store, pipe, deck.stem, messages)
+            picture = overview(target) if plot else None
+        return messages.conclude(case, store, extent, target, picture)
 
 
 @frame.command("hexcontact resume fretting.nc")
@@ -75,7 +79,7 @@ def resume(
     """
     from .solving import Messages
 
-    refuse_copies()
+    ranks.refuse_copies("resume")
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     with messages.logging(file):
         return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal, TypeVar
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, reals
 from ..errors import DeckError, RimWarning, warn
-from . import flat, kernel_cache
+from . import flat, kernel_cache, ranks
 from .calls import checked
 from .handles import Handle, HeldState, Solved
 from .lattice import Lattice
@@ -328,7 +328,12 @@ class NormalContact(Contact):
         interface: Interface = UNILATERAL,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
+        self._number: int | None = None  # of a problem of all ranks
         given = *self._surfaces, *checked(interface=interface, threads=threads)
+        if method == "fft" and ranks.count > 1:
+            self._number = ranks.numbered(self)
+            # without arrays that the lattice keeps
+            ranks.order("create", self._number, replace(lattice), *given[1:2], *given[4:])
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -349,6 +354,8 @@ class NormalContact(Contact):
         driven = {"approach": approach} if normal_load is None else {"normal_load": normal_load}
         target, *limits = checked(**driven, tolerance=tolerance, max_sweeps=max_sweeps)
         control = 2 if normal_load is None else 1
+        if self._number is not None:
+            ranks.order("press", self._number, control, target, *limits)
         solution = self._found(NormalSolution, self.called(flat.press, control, target, *limits))
         solution.gap[~self._mask] += self._gap[~self._mask]
         self._warn_of_rim(solution)
@@ -369,7 +376,9 @@ def memory_needed(
     """Return the memory (bytes) of a frictionless problem on a window, which may repeat."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
+    needed = int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
+    shared = method == "fft" and part == "problem"
+    return needed * ranks.on_node // ranks.count if shared else needed
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:

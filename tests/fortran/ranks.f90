@@ -1,0 +1,328 @@
+!> Tests of what several ranks do together; mpirun starts this program with some numbers of ranks.
+program ranks_tester
+  use, intrinsic :: iso_c_binding, only: c_loc
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_communicator, only: communicator_t, start_ranks, end_ranks
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
+  use hc_field_space, only: field_space_t, space_over
+  use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
+  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_power_interface, only: power_interface_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use testing, only: test_t, new_test, suite_t, new_suite, run_suites, check, check_true
+  implicit none
+
+  type(communicator_t) :: ranks
+  integer :: n_failed
+
+  call start_ranks(ranks)
+  ranks%least_nodes = 1
+  call run_suites([new_suite('ranks', collect)], n_failed)
+  call end_ranks(ranks)
+  if (n_failed > 0) stop 1, quiet=.true.
+  stop 0, quiet=.true.
+
+contains
+
+  subroutine collect(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('slabs', test_slabs), &
+      new_test('reductions', test_reductions), &
+      new_test('rows', test_rows), &
+      new_test('errors', test_errors), &
+      new_test('products', test_products), &
+      new_test('contact', test_contact), &
+      new_test('part_of_the_window', test_part), &
+      new_test('compliant_layer', test_layer), &
+      new_test('approach', test_approach), &
+      new_test('rough', test_rough) &
+    ]
+  end subroutine collect
+
+  !> All rows belong to one rank each; slabs begin with odd rows.
+  subroutine test_slabs(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(communicator_t) :: some
+    integer :: n, r, next
+
+    do n = 2, 40
+      do r = 1, n/2
+        some%size = r
+        next = 1
+        do while (some%rank < some%size)
+          call check_true(error, some%first_row(n) == next .and. modulo(next, 2) == 1 .and. some%last_row(n) > next - 1, 'slabs')
+          if (allocated(error)) return
+          next = some%last_row(n) + 1
+          some%rank = some%rank + 1
+        end do
+        some%rank = 0
+        call check_true(error, next == n + 1, 'all rows')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_slabs
+
+  !> Sums are those of one rank to the bit.
+  subroutine test_reductions(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(field_space_t) :: space
+    real(wp) :: field(37, 41), largest(2)
+    integer :: i, rows(2), counts(1)
+
+    field = reshape([(exp(20.0_wp*sin(1.7_wp*i)), i=1, size(field))], shape(field))
+    space%ranks = ranks
+    rows = space%own_rows(size(field, 2))
+    associate (own => field(:, rows(1):rows(2)))
+      call check(error, space%sum(own), field_sum(field), 0.0_wp, 'sum')
+      if (allocated(error)) return
+      call check(error, space%max(own), maxval(field), 0.0_wp, 'max')
+      if (allocated(error)) return
+      call check(error, space%min(own, own > 0.0_wp), minval(field), 0.0_wp, 'min')
+      if (allocated(error)) return
+      call check_true(error, space%count(own > 1.0_wp) == count(field > 1.0_wp), 'count')
+      if (allocated(error)) return
+    end associate
+    largest = [real(ranks%rank, wp), -real(ranks%rank, wp)]
+    call space%most(largest)
+    call check_true(error, nint(largest(1)) == ranks%size - 1 .and. nint(largest(2)) == 0, 'largest of several')
+    if (allocated(error)) return
+    counts = ranks%rank + 1
+    call ranks%add_counts(counts)
+    call check_true(error, counts(1) == ranks%size*(ranks%size + 1)/2, 'sum of counts')
+  end subroutine test_reductions
+
+  !> Sum a field as one rank does.
+  real(wp) function field_sum(field)
+    real(wp), intent(in), contiguous :: field(:, :)
+    type(field_space_t) :: alone
+
+    field_sum = alone%sum(field)
+  end function field_sum
+
+  !> Each rank takes other rows, of reals and of masks, from all and from the first rank.
+  subroutine test_rows(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(field_space_t) :: space
+    real(wp), target :: field(5, 23)
+    real(wp), allocatable, target :: some(:, :)
+    logical, allocatable :: mask(:, :)
+    integer :: i, rows(2), first, last
+
+    field = reshape([(real(i, wp), i=1, size(field))], shape(field))
+    space%ranks = ranks
+    rows = space%own_rows(size(field, 2))
+    first = 1 + 2*ranks%rank
+    last = 23 - ranks%rank
+    allocate (some(5, last - first + 1), mask(5, last - first + 1))
+    call space%fetch(size(field, 2), field(:, rows(1):rows(2)), first, some)
+    call check_true(error, all(abs(some - field(:, first:last)) <= 0.0_wp), 'rows')
+    if (allocated(error)) return
+    call space%fetch(size(field, 2), field(:, rows(1):rows(2)) > 50.0_wp, first, mask)
+    call check_true(error, all(mask .eqv. field(:, first:last) > 50.0_wp), 'rows of a mask')
+    if (allocated(error) .or. ranks%size == 1) return
+    some = 0.0_wp
+    if (ranks%rank > 0) field = -1.0_wp
+    call ranks%fetch(10, 23, c_loc(field), [first, last], c_loc(some), on_first=.true.)
+    call check_true(error, all(nint(some) == reshape([(i, i=5*first - 4, 5*last)], shape(some))), 'rows of the first rank')
+  end subroutine test_rows
+
+  !> An error of one rank is one of all, and names it.
+  subroutine test_errors(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: found
+
+    call ranks%agree(found)
+    call check_true(error,.not. allocated(found), 'no error')
+    if (allocated(error) .or. ranks%size == 1) return
+    if (ranks%rank == 1) call raise(found, status%resources, 'not enough memory')
+    call ranks%agree(found)
+    call check_true(error, allocated(found), 'an error')
+    if (allocated(error)) return
+    call check_true(error, found%code == status%resources .and. found%message == 'rank 1: not enough memory', found%message)
+  end subroutine test_errors
+
+  !> A product is that of one rank to the bit: even and odd numbers of rows, like and unlike materials.
+  subroutine test_products(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_pair_t) :: pair
+    type(lattice_t) :: lattice
+    integer :: k
+
+    do k = 0, 3
+      call new_elastic_pair(pair, material_t(2.0_wp, 0.25_wp), material_t(5.0_wp, merge(0.1_wp, 0.25_wp, k > 1)), error)
+      if (allocated(error)) return
+      call new_lattice(lattice, merge(oblique_basis(0.5_wp, 0.9_wp, 1.1_wp), equilateral_basis(0.5_wp), k == 3), &
+                       [-4, -3], [33 - k, 30 + k], error)
+      if (allocated(error)) return
+      call compare_products(lattice, pair, k > 0, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_products
+
+  subroutine compare_products(lattice, pair, all_of_them, error)
+    type(lattice_t), intent(in) :: lattice
+    type(elastic_pair_t), intent(in) :: pair
+    !> All components
+    logical, intent(in) :: all_of_them
+    type(error_t), allocatable, intent(out) :: error
+    type(fft_flexibility_t) :: alone, shared
+    type(field_space_t) :: space
+    real(wp), allocatable :: traction(:, :, :), expected(:, :, :), answer(:, :, :)
+    integer, parameter :: components(3) = [normal, along_x, along_y]
+    integer :: i, rows(2), n
+
+    n = merge(3, 1, all_of_them)
+    allocate (traction(lattice%extent(1), lattice%extent(2), n), expected(lattice%extent(1), lattice%extent(2), n))
+    traction = reshape([(sin(1.3_wp*i), i=1, size(traction))], shape(traction))
+    space = space_over(lattice%extent, 1)
+    call new_fft_flexibility(alone, lattice, pair, error, normal_only=.not. all_of_them, space=space)
+    if (allocated(error)) return
+    space%ranks = ranks
+    rows = space%own_rows(lattice%extent(2))
+    allocate (answer(lattice%extent(1), rows(2) - rows(1) + 1, n))
+    call new_fft_flexibility(shared, lattice, pair, error, normal_only=.not. all_of_them, space=space)
+    if (allocated(error)) return
+    call alone%apply(components(:n), traction, components(:n), expected, error)
+    if (allocated(error)) return
+    call shared%apply(components(:n), traction(:, rows(1):rows(2), :), components(:n), answer, error)
+    if (allocated(error)) return
+    call check(error, maxval(abs(answer - expected(:, rows(1):rows(2), :))), 0.0_wp, 0.0_wp, 'product')
+    call ranks%agree(error)
+  end subroutine compare_products
+
+  !> Compare pressure, gap, numbers and work with those of one rank, to the bit.
+  subroutine compare_contacts(lattice, gap, candidate, law, control, value, tolerance, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: gap(:, :)
+    logical, intent(in) :: candidate(:, :)
+    class(normal_law_t), intent(in) :: law
+    integer, intent(in) :: control
+    real(wp), intent(in) :: value, tolerance
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_pair_t) :: pair
+    type(normal_contact_t) :: alone, shared
+    type(contact_state_t) :: expected, found
+    integer :: rows(2)
+
+    call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.3_wp), error)
+    if (allocated(error)) return
+    rows = [ranks%first_row(lattice%extent(2)), ranks%last_row(lattice%extent(2))]
+    call new_normal_contact(alone, lattice, pair, gap, candidate, error, 1, law=law)
+    if (.not. allocated(error)) call alone%solve(control, value, tolerance, 200, expected, error)
+    if (allocated(error)) return
+    call new_normal_contact(shared, lattice, pair, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), error, 1, law=law, &
+                            ranks=ranks)
+    if (.not. allocated(error)) call shared%solve(control, value, tolerance, 200, found, error)
+    if (allocated(error)) return
+    call compare_states(expected, found, rows, error)
+    call ranks%agree(error)
+  end subroutine compare_contacts
+
+  !> Compare own rows.
+  subroutine compare_states(expected, found, rows, error)
+    type(contact_state_t), intent(in) :: expected, found
+    !> First and last row
+    integer, intent(in) :: rows(2)
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_true(error, expected%converged .and. found%converged, 'converged')
+    if (allocated(error)) return
+    call check_true(error, found%sweeps == expected%sweeps, 'iterations')
+    if (allocated(error)) return
+    call check(error, maxval(abs(found%pressure - expected%pressure(:, rows(1):rows(2)))), 0.0_wp, 0.0_wp, 'pressure')
+    if (allocated(error)) return
+    call check(error, maxval(abs(found%gap - expected%gap(:, rows(1):rows(2)))), 0.0_wp, 0.0_wp, 'gap')
+    if (allocated(error)) return
+    call check_true(error, all(found%zone == expected%zone(:, rows(1):rows(2))), 'zone')
+    if (allocated(error)) return
+    call check(error, [found%load(normal), found%motion(normal), found%residual_normal, found%operator_applications], &
+               [expected%load(normal), expected%motion(normal), expected%residual_normal, expected%operator_applications], &
+               0.0_wp, 'numbers')
+    if (allocated(error)) return
+    call check_true(error, found%clipped .eqv. expected%clipped, 'rim')
+  end subroutine compare_states
+
+  !> Compute the gap of a sphere of 10 mm on a plane.
+  subroutine sphere(lattice, gap)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(out) :: gap(:, :)
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    allocate (x(lattice%extent(1), lattice%extent(2)), y(lattice%extent(1), lattice%extent(2)))
+    call lattice%coordinates(x, y)
+    gap = (x**2 + y**2)/0.02_wp
+  end subroutine sphere
+
+  !> A sphere whose contact fills the window, on even and odd numbers of rows.
+  subroutine test_contact(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n
+
+    do n = 64, 65
+      call press_sphere(n, 1.0e-5_wp, unilateral_t(), force_control, 120.0_wp, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_contact
+
+  !> A small contact in a large window.
+  subroutine test_part(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_sphere(121, 1.0e-5_wp, unilateral_t(), force_control, 20.0_wp, error)
+  end subroutine test_part
+
+  !> A compliant layer.
+  subroutine test_layer(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_sphere(64, 1.0e-5_wp, power_interface_t(1.0e15_wp, 1.0_wp), force_control, 60.0_wp, error)
+    if (allocated(error)) return
+    call press_sphere(64, 1.0e-5_wp, power_interface_t(1.0e20_wp, 2.0_wp), force_control, 60.0_wp, error)
+  end subroutine test_layer
+
+  !> An approach in place of a load.
+  subroutine test_approach(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_sphere(70, 1.0e-5_wp, unilateral_t(), displacement_control, 4.0e-6_wp, error)
+  end subroutine test_approach
+
+  subroutine press_sphere(n, spacing, law, control, value, error)
+    integer, intent(in) :: n, control
+    real(wp), intent(in) :: spacing, value
+    class(normal_law_t), intent(in) :: law
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp) :: gap(n, n - 3)
+    logical :: candidate(n, n - 3)
+
+    call new_lattice(lattice, equilateral_basis(spacing), [-n/2, -n/2], [n, n - 3], error)
+    if (allocated(error)) return
+    call sphere(lattice, gap)
+    candidate = .true.
+    call compare_contacts(lattice, gap, candidate, law, control, value, 1.0e-12_wp, error)
+  end subroutine press_sphere
+
+  !> A wavy surface, with nodes that cannot touch: many small contacts.
+  subroutine test_rough(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp), dimension(90, 87) :: gap, x, y
+    logical :: candidate(90, 87)
+
+    call new_lattice(lattice, oblique_basis(1.0e-5_wp, 1.0_wp, 1.5_wp), [0, 0], [90, 87], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    gap = 1.0e-7_wp*(2.0_wp + sin(7.0e4_wp*x) + cos(5.0e4_wp*y + 3.0e4_wp*x)) + ((x - 4.0e-4_wp)**2 + (y - 4.0e-4_wp)**2)/0.4_wp
+    candidate = .not. (abs(x - 3.0e-4_wp) < 3.0e-5_wp)
+    call compare_contacts(lattice, gap, candidate, unilateral_t(), force_control, 40.0_wp, 1.0e-9_wp, error)
+  end subroutine test_rough
+
+end program ranks_tester

@@ -167,7 +167,7 @@ def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
         if name not in attributes:
             return f"it has no attribute {name}"
         if not fits(attributes[name]):
-            return f"its attribute {name} is not what it should be"
+            return f"its attribute {name} is wrong"
     return ""
 
 

@@ -7,10 +7,10 @@ set -euo pipefail
 study=$1
 name=$(basename "$study" .toml)
 
-hexcontact study "$study" --slurm > "$name.sh"
-if ! grep -q '^#SBATCH --array=' "$name.sh"; then
+script=$(hexcontact study "$study" --slurm)
+if [[ $script != *"#SBATCH --array="* ]]; then # no case is missing
   exec hexcontact study "$study" --collect
 fi
-array=$(sbatch --parsable "$name.sh")
+array=$(sbatch --parsable <<< "$script")
 sbatch --dependency="afterany:$array" --job-name="$name-collect" --output="$name-collect.log" --time=10 \
   --wrap="exec hexcontact study $(printf %q "$study") --collect"

@@ -1,6 +1,7 @@
 #!/bin/bash
 # One run on the disk of its node, copied back when it ends or is interrupted:  sbatch scratch.sh fretting.toml
-# A failure of the node loses the steps since the last copy. Signals and requeue: run.sh.
+# A failure of the node loses the steps since the last copy. Run one job at a time for a deck: none sees the locks of
+# another. Signals and requeue: run.sh.
 #SBATCH --nodes=1 --ntasks=1 --cpus-per-task=8 --mem=16G
 #SBATCH --time=24:00:00 --signal=USR1@300
 #SBATCH --requeue --open-mode=append --output=%x-%j.log

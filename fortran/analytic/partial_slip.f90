@@ -192,7 +192,7 @@ contains
     semicircles = sqrt(max(a**2 - x**2, 0.0_wp)) - sqrt(max(c**2 - x**2, 0.0_wp))
   end function semicircles
 
-  !> Find the turning points of a load history that a contact of constant size remembers; the last is the load now.
+  !> Find the turning points of a load history that still act on a contact of constant size; the last one is the present load.
   !>
   !> A contact in partial slip follows Masing's rules: a new slip zone that has grown as large as an older one
   !> wipes out the memory of it.

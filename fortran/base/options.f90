@@ -222,7 +222,7 @@ module hc_options
     !> Near an edge on a lattice gap^(2/3) closes as (gap + g_0)^(2/3), g_0 this times the closing that the pressure at the
     !> edge makes at a node: fitted to the moments at which nodes enter a Hertzian contact
     real(wp) :: edge_gap = 0.11_wp
-    !> The part C is found too small by this much of D, which is known from the first node outside on: fitted likewise
+    !> The computed part C is too small by this share of D, which follows from the first node outside: fitted likewise
     real(wp) :: missed_share = 0.12_wp
     !> Spacings along the edge over which C is found
     integer :: along_edge = 3
@@ -250,7 +250,7 @@ module hc_options
     real(wp) :: added_share = 0.5_wp
     !> Share of a change of the stick area from which on it is that of the step itself, not of those before
     real(wp) :: own_share = 0.25_wp
-    !> An attempt that leaves more than this share of the excess of the one before was of no use
+    !> An attempt is useless if it leaves more than this share of the excess of the previous attempt
     real(wp) :: useful_share = 0.8_wp
     !> Least excess that a factor is found from, and rounding errors of sizes
     real(wp) :: least_excess = 1.0e-9_wp, size_rounding = 1.0e-9_wp

@@ -1,8 +1,8 @@
 !> Contribution of a coarser lattice to a load step: the change that it finds, or an initial guess.
 !>
 !> The coarse problem is set up so that the present fine state, at the coarse
-!> nodes, solves it exactly under the present loads: what coarse tractions
-!> displace too much or too little is put into the initial gap and into the relative
+!> nodes, solves it exactly under the present loads: the error of the displacements
+!> by the coarse tractions is added to the initial gap and to the relative
 !> displacement at the beginning of the step,
 !>
 !>     h_c = g + approach - w_c,     s_c = u_c - shift - twist x r - (s - s^n).

@@ -188,8 +188,8 @@ contains
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
 
-  !> Compute what the tractions of a state displace, by any operator: w into its gap, u into its relative displacement, from
-  !> which `complete_state` goes on.
+  !> Compute the displacements by the tractions of a state, with any operator: w in its gap, u in its relative displacement, from
+  !> which `complete_state` continues.
   subroutine displace(self, flexibility, state, error)
     class(friction_problem_t), intent(in) :: self
     !> Flexibility operator over the window

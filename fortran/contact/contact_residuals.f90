@@ -216,7 +216,7 @@ contains
     end if
   end function force_residual
 
-  !> Return a missing load relative to a scale; any at all is too much where the scale vanishes.
+  !> Return a missing load relative to a scale; huge if the scale vanishes and the load does not.
   elemental real(wp) function relative(missing, scale)
     real(wp), intent(in) :: missing, scale
 

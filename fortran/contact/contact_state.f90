@@ -379,7 +379,7 @@ contains
     if (fits) fits = all(shape(state%traction) == [lattice%extent, 2]) .and. &
                      all(shape(state%relative_displacement) == [lattice%extent, 2])
     if (.not. fits) then
-      call raise(error, status%invalid_input, 'the state to go on from does not have the shape of the lattice window')
+      call raise(error, status%invalid_input, 'the initial state does not have the shape of the lattice window')
       return
     end if
     fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy, state%path_error]))
@@ -389,7 +389,7 @@ contains
              .and. all(ieee_is_finite(state%accumulated_slip(:, row))) &
              .and. all(ieee_is_finite(state%dissipation_density(:, row)))
     end do
-    if (.not. fits) call raise(error, status%invalid_input, 'the state to go on from: finite numbers expected')
+    if (.not. fits) call raise(error, status%invalid_input, 'the initial state: finite numbers expected')
   end subroutine check_state
 
 end module hc_contact_state

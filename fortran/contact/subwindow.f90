@@ -1,9 +1,9 @@
 !> The part of the window around the contact, and its enlargement where it fails: one policy for all solvers.
 !>
-!> Where the contact that is known fills much less than the window, a problem is solved on the part around it, and judged by
+!> If the present contact is much smaller than the window, a problem is solved on the part around it, and checked by
 !> one product over the window (docs/theory/multilevel.md, "Part of the window"). A part that has a solution fails where
 !> the bodies overlap outside of it: the next part is around these nodes, too. The whole window is next where a part has no
-!> solution, where it is not worth it any more, or after some parts.
+!> solution, where it saves no work, or after some parts.
 module hc_subwindow
   use hc_precision, only: wp
   use hc_error, only: error_t

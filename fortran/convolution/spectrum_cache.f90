@@ -125,7 +125,7 @@ contains
     if (associated(spectrum)) return
     if (allocated(path)) call read_kernels(path, key, maker, shared, spectrum, complaint)
     call lock(kernel_table)
-    if (allocated(complaint)) call complain(self, complaint//': the kernels are worked out anew')
+    if (allocated(complaint)) call complain(self, complaint//': the kernels are computed again')
     if (associated(spectrum)) then
       self%read = self%read + 1
       call insert(self, key, spectrum)

@@ -32,7 +32,7 @@ module hc_area_factors
 
   !> An area that is to be factorized.
   type :: factored_area_t
-    !> Nodes in contact; those that stick, and which of these are sure to go on doing so; those that slip with a spring across
+    !> Nodes in contact; those that stick, and which of these certainly remain in stick; those that slip with a spring across
     integer, allocatable :: contact(:), stuck(:)
     logical, allocatable :: is_core(:)
     integer, allocatable :: sliding(:)
@@ -132,7 +132,7 @@ contains
   !> Tell whether the rows of L serve another area.
   pure logical function is_kept(self, most_exchanged, contact, stuck, is_here)
     type(area_factors_t), intent(in) :: self
-    !> Share of the rows that may have come or gone
+    !> Largest share of rows that were added or deleted
     real(wp), intent(in) :: most_exchanged
     !> Nodes in contact and those that stick; which of the window are in contact
     integer, intent(in) :: contact(:), stuck(:)

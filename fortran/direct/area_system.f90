@@ -2,7 +2,7 @@
 !>
 !> The unknowns are packed: p of all nodes, q_x and q_y of those that stick, tau of those that slide. Products are those of a
 !> flexibility operator over the window, in full precision; the factors are of single precision and leave out the coupling
-!> of pressure and shear, what the pressure of a slipping node carries along, and the direction in the shear tractions' matrix.
+!> of pressure and shear, the friction of slipping nodes, and the direction in the matrix of the shear tractions.
 !> Each direction of GMRES then leaves about a tenth of the error.
 !>
 !> Equations: docs/theory/friction.md, (F7), (F11) and "Direct method".
@@ -86,7 +86,7 @@ contains
     system%area => area
     allocate (area%change(size(area%load)), source=0.0_wp)
     associate (x => area%unknown(:, 0))
-      ! motions that no unknown resists stay as they are
+      ! motions that no unknown resists do not change
       determined = pack([(k, k=1, size(area%load))], [(any(abs(area%rhs(:, k)) > 0.0_wp), k=1, size(area%load))])
       constraints%columns = area%rhs(:, determined)
       constraints%rows = area%resultant(:, determined)

@@ -112,7 +112,7 @@ contains
     real(wp), intent(in) :: tolerance
     !> Active sets that may be tried
     integer, intent(in) :: max_sweeps
-    !> Solution; `converged` tells whether the residuals are within the tolerance
+    !> Solution; `converged`: the residuals are within the tolerance
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure: a target that cannot be solved for, not enough memory, a matrix that is not positive definite
     type(error_t), allocatable, intent(out) :: error

@@ -7,7 +7,7 @@
 !> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
 !>
-!> A step starts from what the same method finds on the lattice of every second node (hc_coarse_change), or from the last
+!> A step starts from the solution on the lattice of every second node (hc_coarse_change), or from the last
 !> contact area with a ring of nodes around it.
 !>
 !> Equations: docs/theory/friction.md, (F7).
@@ -129,7 +129,7 @@ contains
 
   contains
 
-    !> Iterate on this lattice, and count what it takes.
+    !> Iterate on this lattice, and count the work.
     subroutine attempt(from)
       !> State to start from
       type(contact_state_t), intent(in) :: from
@@ -268,7 +268,7 @@ contains
     do sweep = 1, step%max_sweeps
       if (allocated(error)) return
       before = it
-      ! while stick and slip are wrong, iterating the contact area to its end costs more than it saves
+      ! with wrong zones of stick and slip, full convergence of the contact area costs more than it saves
       call find_area(self, step%target, merge(1, sweep, is_near), it, error)
       if (allocated(error)) return
       if (is_unsupported(self%problem, it)) then

@@ -304,7 +304,7 @@ contains
 
   !> Find the motions whose loads are prescribed from these loads.
   !>
-  !> Motions that the loads do not determine stay as they are (without a node in stick, say).
+  !> Motions that the loads do not determine, as without a node in stick, do not change.
   subroutine satisfy_loads(problem, area, it, error)
     !> The contact problem
     type(friction_problem_t), intent(in) :: problem

@@ -35,7 +35,7 @@ module hc_dissertation_iteration
 
   public :: iterate_as_written
 
-  !> Arrangements of area, zones and directions that have been solved for: two sums of each tell them apart.
+  !> Solved arrangements of area, zones and directions; two sums identify each of them.
   type :: arrangements_t
     real(wp), allocatable :: sums(:, :)
   contains

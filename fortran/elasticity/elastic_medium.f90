@@ -1,4 +1,4 @@
-!> Two elastic bodies that touch, as contact solvers know them.
+!> Two elastic bodies in contact: the interface of all contact solvers.
 !>
 !> A medium answers with the displacements by one pyramid of traction: their values by distance, their transform on a lattice,
 !> and the numbers that follow from them. The displacements depend on the distance of two nodes only, and the operator is
@@ -56,7 +56,7 @@ module hc_elastic_medium
     !> Their transform on a periodic grid, to the accuracy of a preconditioner; to rounding errors
     procedure(medium_symbols), deferred :: find_symbols
     procedure(medium_block_symbols), deferred :: new_block_symbols
-    !> Words that tell the reduced medium from all others, for the keys of spectra
+    !> Text that identifies the reduced medium, for the keys of spectra
     procedure(medium_words), deferred :: key_words
     !> Coupling of normal and tangential displacements over the normal ones: Dundurs' beta for half-spaces
     procedure(medium_number), deferred :: coupling

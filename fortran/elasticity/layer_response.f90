@@ -5,7 +5,7 @@
 !>     u_z = C_zz p + i D q_L        u_L = -i D p + C_LL q_L        u_T = C_TT q_T
 !>
 !> with real C and D. One layer has closed forms (T.C. O'Sullivan, R.B. King, J. Tribology 110, 1988, for C_zz). Several layers
-!> are added one by one from the bottom: a 2 x 2 compliance of what lies below becomes that of what lies below the next surface,
+!> are added one by one from the bottom: the 2 x 2 compliance below a layer becomes the one below its surface,
 !> with exponentials that only decay. The amplitudes in each layer, from the top down, give displacement and stress at any depth.
 !>
 !> Equations: docs/theory/coatings.md, (J1) to (J4), (J8).
@@ -131,7 +131,7 @@ contains
     if (x > -1.0_wp) expm1 = 2.0_wp*exp(0.5_wp*x)*sinh(0.5_wp*x)
   end function expm1
 
-  !> Replace the compliance of what lies below a layer by that of what lies below its surface, (J3) and (J4).
+  !> Replace the compliance below a layer by the compliance below its surface, (J3) and (J4).
   pure subroutine add_layer(layer, x, c, s)
     type(layer_t), intent(in) :: layer
     !> Wave number times thickness

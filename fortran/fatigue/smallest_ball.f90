@@ -14,7 +14,7 @@ module hc_smallest_ball
 
   !> Relative size below which a number counts as zero: the number of points is small, and so are the systems.
   real(wp), parameter :: nothing = 1.0e-11_wp
-  !> Moves of the center for each point and dimension, after which the ball is taken as it is.
+  !> Largest number of moves of the center for each point and dimension.
   integer, parameter :: most_moves = 4
 
 contains

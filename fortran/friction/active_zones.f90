@@ -197,7 +197,7 @@ contains
     end do
   end subroutine find_constraints
 
-  !> Find the displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
+  !> Find the prescribed part of the displacements of sticking nodes: their old position, and the motions that
   !> are prescribed.
   subroutine find_prescribed_displacement(now, frame)
     !> Iterate

@@ -13,8 +13,8 @@ module hc_displacement_check
 
 contains
 
-  !> Fail where `w`, `closing` and `u` are not what the tractions cause: every step of the algorithm has to
-  !> leave them so. The products are not counted.
+  !> Fail if `w`, `closing` and `u` are not the displacements by the tractions, which every step of the algorithm
+  !> preserves. The products are not counted.
   subroutine check_displacements(now, error)
     !> Iterate
     type(friction_iterate_t), intent(inout) :: now

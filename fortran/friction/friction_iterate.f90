@@ -24,7 +24,7 @@ module hc_friction_iterate
 
   public :: friction_iterate_t
 
-  !> Tractions and what they cause, as vectors over all nodes; two components one after the other.
+  !> Tractions and their displacements, as vectors over all nodes; two components one after the other.
   type :: friction_iterate_t
     !> Pressure and the closing of the gap that it causes
     real(wp), allocatable :: p(:), w(:)
@@ -105,7 +105,7 @@ contains
     self%share_of_r = max(factor*self%share_of_r, self%problem%options%newton%least_share_of_r)
   end subroutine cut_parameter
 
-  !> Set tractions and motions from those of a state, and find what they displace.
+  !> Set tractions and motions from those of a state, and compute the displacements.
   subroutine set_start(self, problem, operators, start, step, error, estimate)
     class(friction_iterate_t), intent(inout), target :: self
     !> The problem

@@ -298,7 +298,7 @@ contains
                                           step%max_sweeps), coarser, error, known, as_start=.true.)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
-        ! what is no solution is no start
+        ! a start from an unconverged solution saves nothing
         if (coarser%converged) cycle
         deallocate (coarser%pressure)
         if (allocated(known)) deallocate (known)

@@ -19,7 +19,7 @@
 !>    same conjugate gradients; where nothing resists a load, nodes are fixed in stick;
 !> 4. the closing of the gap by the shear traction, cut to the cone, and the residuals R_n and R_t, which take no product more.
 !>
-!> Linear problems are solved no more accurately than the sets deserve; the numbers are those of `newton_options_t`.
+!> The tolerance of linear problems is loose while the sets change; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
@@ -132,7 +132,7 @@ contains
     end do
   end subroutine solve_pressure
 
-  !> Compute R_n, and tell whether the pressure may stay as it is.
+  !> Compute R_n, and decide whether the pressure remains.
   subroutine judge_pressure(now, estimated, gap, accurate, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now

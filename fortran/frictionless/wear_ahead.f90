@@ -1,9 +1,9 @@
-!> What a jump of many cycles wears off, with the pressure after the jump.
+!> Wear of a jump of many cycles, with the pressure at its end.
 !>
 !> A node that slips by S in a cycle wears by n k S p in n cycles. With the pressure p at the end of the jump this is a spring of
 !> compliance C = n k S at each node, and that pressure is the one of a frictionless contact on these springs, (V4): wear
 !> never takes more than there is pressure left to take away, however long the jump. The change from the
-!> pressure of the cycle is all that is solved for, so that shear tractions and bulk strains, which stay, need not be known.
+!> pressure of the cycle is the only unknown, so that shear tractions and bulk strains, which are constant, do not enter.
 !>
 !> Equations: docs/theory/wear.md, (V3), (V4).
 module hc_wear_ahead

@@ -1,4 +1,4 @@
-!> The recurrence of preconditioned conjugate gradients, whatever its vectors are and wherever they lie.
+!> The recurrence of preconditioned conjugate gradients, for vectors of any kind and storage.
 !>
 !>     d <- z + (r^T z)/(r^T z of the last direction) d,     x <- x + (r^T z)/(d^T A d) d,     z = M r
 !>

@@ -1,6 +1,6 @@
 !> A linear system on a set of active nodes, with linear constraints.
 !>
-!> Find the unknowns on the active nodes (the others stay as they are),
+!> Find the unknowns on the active nodes (the others do not change),
 !>
 !>     A x - B m = rhs   on the active nodes,     C^T x = as at the start,
 !>
@@ -44,7 +44,7 @@ module hc_linear_system
   type :: constraints_t
     !> B, along which the multipliers act, and M B
     real(wp), allocatable :: columns(:, :), mb(:, :)
-    !> C at the first active nodes, as far as it is not B
+    !> C at the first active nodes, where it differs from B
     real(wp), allocatable :: rows(:, :)
     !> Multipliers m
     real(wp), allocatable :: multiplier(:)
@@ -63,7 +63,7 @@ module hc_linear_system
     real(wp) :: tolerance = 0.0_wp, residual = huge(1.0_wp)
     !> Iterations allowed, and made
     integer :: most = 0, made = 0
-    !> GMRES: directions that are stored; after as many the iteration begins anew with the residual that is left
+    !> GMRES: stored directions, after which it restarts with the present residual
     integer :: most_directions = 0
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)
@@ -161,7 +161,7 @@ contains
     real(wp), intent(in) :: missing(:)
     !> Unknowns, over all nodes if `nodes` are given
     real(wp), intent(inout), contiguous :: x(:)
-    !> False where the constraints depend on each other: x is left alone
+    !> False if the constraints are linearly dependent: x does not change
     logical, intent(out) :: independent
     !> Nodes to which C and M B belong; absent: all
     type(active_set_t), intent(in), optional :: nodes

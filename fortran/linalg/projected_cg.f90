@@ -38,7 +38,7 @@ contains
 
   !> Solve by preconditioned conjugate gradients with projection on the constraints.
   !>
-  !> The drift is a bound of the rounding errors of the largest residual on the way
+  !> The drift bounds the rounding errors of the largest residual so far
   !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551); the norm of a residual is its largest element.
   subroutine projected_cg(system, nodes, constraints, rhs, x, ax, iteration, error)
     !> Operator and preconditioner

@@ -216,8 +216,8 @@ contains
 
   !> Return squares of the pressure that are good to interpolate linearly (n_col, n_row) [Pa^2].
   !>
-  !> At nodes in contact the layer of the lattice next to the edge is taken off; beyond the edge the squares go on below
-  !> zero. They are NaN away from the edge, and where nothing is known about it.
+  !> At nodes in contact the layer of the lattice next to the edge is subtracted; beyond the edge the squares continue below
+  !> zero. They are NaN away from the edge, and where it is not defined.
   pure function squares(self) result(field)
     class(contact_edges_t), intent(in) :: self
     real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
@@ -250,7 +250,7 @@ contains
     logical, intent(in) :: zone(:, :), around(:, :)
     !> Squares at the nodes of the band, and their distances from the edge
     real(wp), intent(in) :: square(:), distance(:)
-    !> Distances of nodes beyond the edge are known by themselves, and not by the direction of the edge from those inside
+    !> Distances of nodes beyond the edge are given, and do not follow from the direction of the edge at nodes inside
     logical, intent(in) :: known_beyond
     real(wp) :: field(size(zone, 1), size(zone, 2))
     type(one_sided_t) :: seen

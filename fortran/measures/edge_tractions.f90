@@ -4,7 +4,7 @@
 !> Joined linearly, the nodal tractions end one link beyond the last nodes in contact, while the true ones vanish like a
 !> square root between the nodes. The shape between the nodes is taken from the edge; hats stand for it as well as they
 !> can, and the tractions of the nodes inside are solved for again, so that the displacements of the nodes in contact stay
-!> what they are. The edge then follows anew from what comes of it. The corrected tractions have the load of the nodal ones,
+!> unchanged. The edge then follows from the corrected tractions. These have the load of the nodal ones,
 !> and single nodes beyond the edge carry small ones of either sign.
 !>
 !> Equations: docs/theory/interior.md, (I16) to (I18).
@@ -142,7 +142,7 @@ contains
     end do
   end subroutine correct_at_edges
 
-  !> Sample what the shape has beyond the hats, between the nodes and at them.
+  !> Sample the difference of the shape from its hats, between the nodes and at them.
   pure subroutine sample(shape_of, samples, n, residue, at_nodes)
     !> The shape
     type(traction_field_t), intent(in) :: shape_of
@@ -174,7 +174,7 @@ contains
     end do
   end subroutine sample
 
-  !> Compute the change of the nodal tractions that leaves the displacements of the nodes in contact as they are, (I18).
+  !> Compute the change of the nodal tractions that preserves the displacements of the nodes in contact, (I18).
   subroutine solve_again(system, medium, residue, contact, shape_of, hats, change, error)
     !> Elastic operator
     type(elastic_part_t), intent(inout) :: system

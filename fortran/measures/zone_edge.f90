@@ -315,7 +315,7 @@ contains
 
   !> Fill a zone with triangles up to its edge, and carry a field there.
   !>
-  !> At the edge the field vanishes, or goes on linearly from the two nodes before it on its line of nodes. Half-way to a
+  !> At the edge the field vanishes, or is extrapolated from the last two nodes on its line of nodes. Half-way to a
   !> node that can never touch it is that of the node inside.
   pure function mesh_of_zone(lattice, candidate, zone, band, distance, field, vanishes) result(mesh)
     !> Lattice and window

@@ -1,7 +1,7 @@
 !> The flexibility operator: tractions on the lattice -> relative surface displacements.
 !>
 !> The sum over all pyramids is a convolution, since the lattice is the same everywhere. w is the closing of the gap, (s_x, s_y)
-!> the tangential displacement of body 1 over body 2; the bodies (hc_elastic_medium) know the blocks.
+!> the tangential displacement of body 1 over body 2; the bodies (hc_elastic_medium) define the blocks.
 !>
 !> The complete operator is symmetric (Betti) and positive definite.
 !>

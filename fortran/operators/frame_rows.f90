@@ -102,7 +102,7 @@ contains
 
     !$omp simd private(moved, stretch, left, sprung)
     do i = 1, n
-      ! what the spring gives way under that traction
+      ! displacement of the spring under that traction
       stretch = compliance(i)*sqrt(qx(i)**2 + qy(i)**2)
       moved = sqrt(ux(i)**2 + uy(i)**2)
       sprung = merge(1.0_wp, 0.0_wp, stretch > 0.0_wp)
@@ -154,7 +154,7 @@ contains
     integer, intent(in) :: n
     !> Sign, and directions e
     real(wp), intent(in) :: sign, direction(2, n)
-    !> Components, and what is added to
+    !> Components, and the sums to which they are added
     real(sp), intent(in) :: a(n), b(n)
     real(wp), intent(inout) :: total(n)
     integer :: i

@@ -172,7 +172,7 @@ contains
     call self%clear()
   end subroutine reset
 
-  !> Free what the preconditioners store for the active nodes.
+  !> Free the arrays of the preconditioners for the active nodes.
   subroutine clear(self)
     class(operators_t), intent(inout) :: self
 

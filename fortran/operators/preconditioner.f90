@@ -26,7 +26,7 @@ module hc_preconditioner
     procedure(apply_packed), deferred :: apply_packed
     !> The same over all nodes, in single precision
     procedure :: apply_single
-    !> Forget the active nodes, and free what was stored for them
+    !> Remove the active nodes, and free their arrays
     procedure :: clear
   end type preconditioner_t
 

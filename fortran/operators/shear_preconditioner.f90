@@ -5,7 +5,7 @@
 !>
 !>     r^T (T + D)^-1 r = min over u of u^T T^-1 u + (r - u)^T D^-1 (r - u),
 !>
-!> u what the bodies take of the displacement r and r - u what the springs take; where nothing is known of u, along the direction
+!> u is the share of the bodies in the displacement r, and r - u that of the springs; where u is not given, along the direction
 !> of slip and off the contact, it is free. Any linear u = U r gives a symmetric M >= (T + D)^-1,
 !>
 !>     M = U^T T^-1 U + (I - U)^T D^-1 (I - U).
@@ -195,7 +195,7 @@ contains
     real(wp), intent(in), contiguous :: displacement(:)
     real(wp), intent(inout), contiguous :: traction(:)
     real(wp), intent(inout) :: work
-    !> Along t: what the bodies take of the displacement, and the traction of the springs under the rest
+    !> Along t: share of the bodies in the displacement, and the traction of the springs under the rest
     real(wp), allocatable :: across(:), rest(:)
 
     if (self%slips) then
@@ -381,7 +381,7 @@ contains
     self%mean(1 - margin:n + margin, 1:2) => fields(2*(n + 2*margin) + 1:)
   end subroutine take_fields
 
-  !> Forget the active nodes, and free what was stored for them.
+  !> Remove the active nodes, and free their arrays.
   subroutine clear_sheared(self)
     class(shear_preconditioner_t), intent(inout) :: self
     type(active_set_t) :: none

@@ -101,7 +101,7 @@ contains
 
     if (present(compliance)) then
       call self%inverse%set_springs(self%options, compliance, active)
-      ! displacements go on beyond the nodes on stiff springs
+      ! displacements continue beyond the nodes on stiff springs
       call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
     else
       call self%continue_beyond(self%extent, active)

@@ -152,7 +152,7 @@ contains
     parts = [0.5_wp*(self%attempt%start + self%attempt%end), self%attempt%end]
   end function parts
 
-  !> Go on after a load step of given size: both paths are one, and nothing is known about changes.
+  !> Continue after a load step of given size: both paths coincide, and there are no earlier changes.
   pure subroutine forget(self)
     class(adaptive_steps_t), intent(inout) :: self
     type(step_control_t) :: control
@@ -252,7 +252,7 @@ contains
     class(adaptive_steps_t), intent(inout) :: self
     !> Method
     class(friction_solver_t), intent(inout) :: solver
-    !> State to go on from
+    !> Initial state
     type(contact_state_t), intent(in) :: state
     !> Loads or motions at its end
     type(load_target_t), intent(in) :: target

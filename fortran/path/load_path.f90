@@ -62,7 +62,7 @@ contains
   subroutine advance(solver, state, target, settings, next, error)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
-    !> State to go on from
+    !> Initial state
     type(contact_state_t), intent(in), target :: state
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
@@ -170,7 +170,7 @@ contains
   subroutine check_step(solver, state, target, settings, error)
     !> Method
     class(friction_solver_t), intent(in) :: solver
-    !> State to go on from
+    !> Initial state
     type(contact_state_t), intent(in) :: state
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target

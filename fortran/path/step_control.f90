@@ -220,7 +220,7 @@ contains
 
     excess = [self%options%stick_safety*abs(change%stick)/max(tolerance, change%lattice, self%options%stick_safety*self%traction), &
               change%added/(self%options%added_share*tolerance), 0.0_wp]
-    ! the energy of the step, or that of all steps, is known to the tolerance
+    ! the energy of the step, or that of all steps, is accurate to the tolerance
     if (change%turned > 0.0_wp) excess(3) = min(change%turned/change%spent, &
                                                 (self%turned + change%turned)/(self%spent + change%spent))/tolerance
   end function excess

@@ -77,7 +77,7 @@ contains
   !> Bound the change of the wear of a cycle by further repetitions, over the largest of a node, (V9).
   !>
   !> Changes fade like 1/n**2 in the n-th repetition, which leaves n times the last one; n follows from the last two. A
-  !> geometric series leaves less. Until three cycles are known, the bound follows from the shear tractions, which are back where
+  !> geometric series leaves less. Before the third cycle the bound follows from the shear tractions, which are back where
   !> they were when a cycle is closed.
   pure real(wp) function wear_left(energies, traction, pressure, friction) result(left)
     !> Dissipated energy of the last cycles, at most three, by area (n_col, n_row, :) [J/m^2]

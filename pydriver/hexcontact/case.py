@@ -241,7 +241,7 @@ class Case(Problem):
         ----------
         output : path, optional
             netCDF file to write; each step is on the disk before the next begins. Without it the result is in
-            memory only, whatever the deck says.
+            memory only, also if the deck names one.
         overwrite : bool
             Replace an output that exists.
         on_step : callable, optional

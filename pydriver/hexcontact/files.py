@@ -26,7 +26,7 @@ LARGEST_TEXT = 1 << 25  # bytes; 100,000 load steps of six loads each fit
 MADE_BY = f"made by hexcontact {__version__}"  # in pictures and pages
 _HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of HDF5 begin, and netCDF-4 is one
 _MARK = MADE_BY.removesuffix(__version__).encode()
-_QUIET = 5.0  # seconds after which nobody writes to a temporary file any more
+_QUIET = 5.0  # seconds without a write, after which a temporary file is abandoned
 _ENDS = 1 << 16  # bytes at the beginning and at the end of a file, in one of which the mark is
 
 
@@ -128,7 +128,7 @@ def require_kinds(values: Any, **kinds: type) -> None:
         raise ValueError("it holds no table")
     for name, kind in kinds.items():
         if not isinstance(values[name], kind):
-            raise ValueError(f"its {name} is not what it should be")
+            raise ValueError(f"its {name} has the wrong type")
 
 
 def made(kind: Callable[..., _T], values: Any) -> _T:
@@ -157,7 +157,7 @@ def require_replaceable(path: Path, begins: str = "") -> None:
             return
         if not begins and (_MARK in head or _MARK in file.read(_ENDS)):
             return
-    raise DeckError(f"{path} is there and was not made by hexcontact; delete it or choose another name")
+    raise DeckError(f"{path} exists and was not made by hexcontact; delete it or choose another name")
 
 
 @contextlib.contextmanager

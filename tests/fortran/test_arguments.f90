@@ -367,7 +367,7 @@ contains
         state%pressure = virgin%pressure(2:, :)
       end select
       call advance(contact, state, target, step_settings_t(), next, caught)
-      call check_raised(error, caught, status%invalid_input, 'state to go on from')
+      call check_raised(error, caught, status%invalid_input, 'initial state')
       if (allocated(error)) return
     end do
   end subroutine test_states

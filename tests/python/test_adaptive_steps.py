@@ -1,4 +1,4 @@
-"""Load steps that are chosen on the way: their error is measured, bounded, and as small as was asked for."""
+"""Load adaptive load steps: their error is measured, bounded, and as small as was asked for."""
 
 import contextlib
 import io
@@ -330,7 +330,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
     result = case.run(out, progress=Lines(stream))
     first, doubt, *lines = stream.getvalue().splitlines()
-    assert first == "Demo: steps that are chosen on the way"
+    assert first == "Demo: adaptive load steps"
     assert doubt.startswith("warning: 5 spacings in the contact radius")
     assert lines[0].startswith("step   1 (") and "(100%)" in lines[-1]
     assert " ± " in lines[-1]
@@ -340,7 +340,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     console = Console(file=io.StringIO(), width=150)
     console.print(printed.pairs("", preview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "chosen on the way in 2 segments (step_tolerance 0.1)" in text
+    assert "adaptive in 2 segments (step_tolerance 0.1)" in text
     assert "uncertain by a factor of 3" in preview.work(case)
     assert result.dataset.attrs["planned_steps"] == len(result)
     assert result.dataset.attrs["step_tolerance"] == 0.1

@@ -175,7 +175,7 @@ def test_a_record_that_was_written_again_is_refused(out: Path, what: str) -> Non
         text = arrays["about"].tobytes().replace(b'"seconds": 0.5', b'"seconds": 0.6')
         arrays["about"] = np.frombuffer(text, "u1")
     np.savez(record, **arrays)
-    with pytest.raises(DeckError, match=r"000001\.npz is damaged: its content is not what was written"):
+    with pytest.raises(DeckError, match=r"000001\.npz is damaged: its checksum differs"):
         open_result(out)
 
 

@@ -266,7 +266,7 @@ def test_files_of_others_are_not_replaced(
     content = target.read_bytes()
     code, out, err = export(folder / "sheared.nc", *words, "-o", tmp_path)
     assert (code, out) == (2, "")
-    assert f"{name} is there and was not made by hexcontact; delete it or choose another name" in err
+    assert f"{name} exists and was not made by hexcontact; delete it or choose another name" in err
     assert target.read_bytes() == content
     assert [path.name for path in tmp_path.iterdir()] == [name]
     target.write_text("")

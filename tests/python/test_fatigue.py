@@ -440,7 +440,7 @@ def test_tables_are_exported_as_csv(finished: Path) -> None:
     target = finished / "deck_export/deck_line.csv"
     target.write_text("mine,1\n")
     code, text = command(finished, "export", "deck.nc", "--csv")
-    assert code == 2 and "deck_line.csv is there and was not made by hexcontact" in text
+    assert code == 2 and "deck_line.csv exists and was not made by hexcontact" in text
     assert target.read_text() == "mine,1\n"
     target.unlink()
 

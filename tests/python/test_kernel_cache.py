@@ -262,7 +262,7 @@ def test_damaged_file_is_made_anew_with_one_warning(damage: Damage, tmp_path: Pa
     with pytest.warns(KernelFolderWarning) as told:
         assert_array_equal(normal(), before)
     assert [re.sub(r"\S*/", "", str(w.message)) for w in told] == [
-        f"{victim.name} is damaged, or was made by something else: the kernels are worked out anew"
+        f"{victim.name} is damaged, or was made by something else: the kernels are computed again"
     ]
     start = kernel_cache.statistics()
     assert_array_equal(quietly(), before)
@@ -290,7 +290,7 @@ def test_file_that_is_no_file_is_passed_over(tmp_path: Path) -> None:
     for path in tmp_path.iterdir():
         path.unlink()
         os.mkfifo(path)  # to open it would wait for somebody who writes
-    with pytest.warns(KernelFolderWarning, match="cannot be read: the kernels are worked out anew"):
+    with pytest.warns(KernelFolderWarning, match="cannot be read: the kernels are computed again"):
         assert_array_equal(normal(), before)
     assert_array_equal(quietly(), before)
 
@@ -347,7 +347,7 @@ def test_file_of_another_user_is_not_believed(change: Change, tmp_path: Path) ->
     with pytest.warns(KernelFolderWarning) as said:
         assert_array_equal(normal(), before)
     assert [str(w.message) for w in said] == [
-        f"{victim} may have been written by another user: the kernels are worked out anew"
+        f"{victim} may have been written by another user: the kernels are computed again"
     ]
     start = kernel_cache.statistics()
     assert_array_equal(quietly(), before)

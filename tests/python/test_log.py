@@ -271,7 +271,7 @@ def test_a_log_in_the_output_that_the_deck_names_is_refused(deck: Path, monkeypa
     assert command("run", deck, "-q")[0] == 0
     whole = Path("a.nc").read_bytes()
     code, _, error = command("run", deck, "--overwrite", "--log-file", "a.nc")
-    assert (code, "a.nc: is there and no log" in error) == (2, True)
+    assert (code, "a.nc: exists and is no log" in error) == (2, True)
     assert Path("a.nc").read_bytes() == whole
     Path("a.nc").unlink()
     code, _, error = command("run", deck, "--log-file", "a.nc")
@@ -306,7 +306,7 @@ def test_resume_goes_on_in_the_same_log(deck: Path) -> None:
         (("--log-file", "."), r"--log-file \.: cannot be written: Is a directory"),
         (("--log-file", "deck.toml"), "--log-file deck.toml: expected a file of its own, not .*deck.toml"),
         (("--log-file", "link.toml"), "--log-file link.toml: expected a file of its own, not .*deck.toml"),
-        (("--log-file", "other.txt"), "--log-file other.txt: is there and no log; expected a new file, or"),
+        (("--log-file", "other.txt"), "--log-file other.txt: exists and is no log; expected a new file, or"),
         (("--log-file", "out.nc"), "--log-file out.nc: expected a file of its own, not .*out.nc"),
         (("--quiet", "--log-level", "info"), "--log-level: expected --log-file with it"),
         (("--log-level", "loud"), "loud"),

@@ -313,7 +313,7 @@ def test_only_own_pictures_are_replaced(folder: Path, tmp_path: Path, kind: str)
     foreign = picture.read_bytes()
     code, _, err = plot(folder / "pressed.nc", "-w", "section", "-o", picture)
     assert code == 2 and picture.read_bytes() == foreign
-    assert f"{picture} is there and was not made by hexcontact" in err
+    assert f"{picture} exists and was not made by hexcontact" in err
 
 
 def test_a_run_does_not_replace_a_foreign_picture_or_page(tmp_path: Path) -> None:
@@ -323,7 +323,7 @@ def test_a_run_does_not_replace_a_foreign_picture_or_page(tmp_path: Path) -> Non
     picture.write_text("a photograph")
     words = ["run", str(deck), "-o", str(out), "--plot", "-q", "--overwrite"]
     done = CliRunner().invoke(app, words)
-    assert done.exit_code == 2 and "hertz.png is there and was not made by hexcontact" in done.stderr
+    assert done.exit_code == 2 and "hertz.png exists and was not made by hexcontact" in done.stderr
     assert not out.exists()  # it is said before the work, not after it
     picture.unlink()
     for _ in range(2):
@@ -331,5 +331,5 @@ def test_a_run_does_not_replace_a_foreign_picture_or_page(tmp_path: Path) -> Non
         assert CliRunner().invoke(app, ["report", str(out), "-o", str(page)]).exit_code == 0
     page.write_text("<p>made by hand</p>")
     done = CliRunner().invoke(app, ["report", str(out), "-o", str(page)])
-    assert done.exit_code == 2 and "hertz.html is there and was not made by hexcontact" in done.stderr
+    assert done.exit_code == 2 and "hertz.html exists and was not made by hexcontact" in done.stderr
     assert page.read_text() == "<p>made by hand</p>"

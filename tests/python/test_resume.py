@@ -572,7 +572,7 @@ def test_a_signal_ends_the_run_and_resume_goes_on(
     same(tmp_path / "a sphere.nc", whole)
     again = hexcontact_(tmp_path, "resume", "a sphere.nc", "--plot")
     assert (again.returncode, again.stderr) == (0, "")
-    assert "a sphere.nc is finished, all its load steps are there; written: " in again.stdout
+    assert "a sphere.nc is finished and has all its load steps; written: " in again.stdout
     assert (tmp_path / "a sphere.png").exists()
 
 
@@ -594,7 +594,7 @@ def test_a_run_resumes_where_there_is_something_to_resume(tmp_path: Path) -> Non
 
     before = content(tmp_path)
     again = commands.inside(tmp_path, *words)
-    assert again.returncode == 0 and "all its load steps are there" in again.stdout
+    assert again.returncode == 0 and "has all its load steps" in again.stdout
     other = commands.inside(tmp_path, "run", "other.toml", *words[2:])
     assert other.returncode == 2 and "their decks differ" in other.stderr
     assert content(tmp_path) == before

@@ -105,7 +105,7 @@ class Messages:
             return written | summary.as_run()
         if not self.quiet:
             drawn = f"; written: {picture}" if picture else ""
-            print_output(f"{file} is finished, all its load steps are there{drawn}")
+            print_output(f"{file} is finished and has all its load steps{drawn}")
         return None
 
 

@@ -182,7 +182,7 @@ class Series(_Rows):
 
     @property
     def missing(self) -> dict[str, int]:
-        """Number of rows that leave a load or motion as it is, of each that other rows have."""
+        """Number of rows without a value of each load or motion that other rows have."""
         arrays = {key: array for key in DRIVEN if (array := getattr(self, key)) is not None}
         other = {one: two for pair in LOADS.values() for one, two in (pair, pair[::-1])}
         counts = {

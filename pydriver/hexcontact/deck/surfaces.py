@@ -106,7 +106,7 @@ class Surface(Argument):
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
     as_given: ClassVar[bool] = False
-    """Whether its heights count as they are given, wherever it would first touch."""
+    """Whether its heights are used unshifted, wherever it would touch first."""
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the height (m) at points of the plane.

@@ -163,7 +163,7 @@ class Loaded:
         if integer(self.body, "body") not in (1, 2):
             raise DeckError(f"body = {self.body}: expected 1 or 2")
         if not self.bodies:
-            raise NotInResult("the result does not say what the bodies are made of")
+            raise NotInResult("the result has no elastic constants of the bodies")
         one = self.bodies[self.body - 1]
         if one.rigid and not one.coating:
             raise NotInResult(f"body {self.body} is rigid: there is no stress to compute in it")

@@ -250,11 +250,11 @@ def _history(case: Problem) -> str:
         given = len(case.load_steps) - chosen
         where = f"{chosen} segment{'s' * (chosen > 1)}"
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
-        return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}{gaps}"
+        return f"adaptive in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}{gaps}"
     wears = ""
     if wear := case.deck.wear:
         auto = isinstance(wear.jump, str)
-        solved = 'a number that shows on the way (jump "auto")' if auto else f"{cycles(case):,}"
+        solved = 'a number that the run finds (jump "auto")' if auto else f"{cycles(case):,}"
         wears = f", then {solved} of {wear.cycles:,} cycles, with {1 + len(case.cycle)} each"
     return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears + gaps
 
@@ -401,7 +401,7 @@ def work(case: Problem) -> str:
         words += "; adaptive load steps: uncertain by a factor of 3"
     if wear := case.deck.wear:
         chosen = isinstance(wear.jump, str)
-        words += f"; {cycles(case)} cycles are guessed, since jumps are chosen on the way" * chosen
+        words += f"; {cycles(case)} cycles are guessed, since jumps are adaptive" * chosen
         repeated = "; unlike bodies repeat the unworn cycle until it closes, 3 to some 40 times"
         words += repeated * case.coupled
     return words

@@ -241,7 +241,7 @@ def to_ugrid(
     _make(target.parent)
     ours = {"content", "hexcontact_version"} <= netcdf_library.attributes(target).keys()
     if target.is_file() and target.stat().st_size and not ours:
-        raise DeckError(f"{target} is there and was not made by hexcontact; delete it or choose another name")
+        raise DeckError(f"{target} exists and was not made by hexcontact; delete it or choose another name")
     with replacing(target) as path, netcdf_library.opened(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs
         named = {name: known[name] for name in ("title", "source", "history") if name in known}

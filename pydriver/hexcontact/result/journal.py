@@ -55,7 +55,7 @@ _KIND = "a record of a journal"
 LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _COMPANION = "companion."  # before the names of restart data
 _PARTS = {"run": str, "index": int, **dict.fromkeys(("lattice", "history", "control"), dict)}
-_CHANGED = "{} is damaged: its content is not what was written"
+_CHANGED = "{} is damaged: its checksum differs"
 
 
 def journal_of(path: Path) -> Path:

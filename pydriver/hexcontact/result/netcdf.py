@@ -136,7 +136,7 @@ def _faults(dataset: Dataset) -> Iterator[str]:
         if name not in attributes:
             yield f"it has no attribute {name}"
         elif not _fits(name, attributes[name], rule):
-            yield f"its attribute {name} is not what it should be"
+            yield f"its attribute {name} is wrong"
     for name in (name for name in VARIABLES if name in dataset.variables):
         found, wanted = dataset.variables[name].dtype, VARIABLES[name].dtype
         if found.kind not in "OSU" if wanted == "str" else found != np.dtype(wanted):

@@ -179,7 +179,7 @@ def _opened(file: Path, spare: Sequence[Path]) -> _File:
                 raise DeckError(f"--log-file {file}: {unknown}: {error.strerror}") from None
             if not re.match(rb"\d{4}-\d\d-\d\dT|$", begins):  # empty, or begins with a time
                 expected = "expected a new file, or a log to append to"
-                raise DeckError(f"--log-file {file}: is there and no log; {expected}")
+                raise DeckError(f"--log-file {file}: exists and is no log; {expected}")
         if file.is_fifo():  # OSError without a reader, for which open would wait
             os.close(os.open(file, os.O_WRONLY | os.O_NONBLOCK))
         return _File(file, encoding="utf-8", errors="backslashreplace")

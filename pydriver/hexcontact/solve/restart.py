@@ -165,9 +165,9 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
                 return None, None
             planned = output.dataset.attrs["planned_steps"] or "an open number of"
             raise DeckError(
-                f"{path} has {len(output)} of {planned} load steps, but its "
-                f"journal {journal_of(path)} is not there, which the next step would start from; run "
-                "it again with --overwrite (overwrite=True in Python)"
+                f"{path} has {len(output)} of {planned} load steps, but its journal "
+                f"{journal_of(path)} is not there, which has the restart data; run it again with --overwrite "
+                "(overwrite=True in Python)"
             )
     raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
 

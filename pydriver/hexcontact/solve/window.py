@@ -166,7 +166,7 @@ class Window:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
             found["mean_gap"] = float(solution.gap.mean())
         else:
-            del found["contact_area_error"]  # refinement tells it
+            del found["contact_area_error"]  # refinement has its own
         return found
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
@@ -259,7 +259,7 @@ class FrictionWindow(Window):
     # --- history ------------------------------------------------------------------------------------------
 
     def _history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
-        static = self.case.solver.algorithm == "static"  # nothing has gone before
+        static = self.case.solver.algorithm == "static"  # without history
         spent_before = 0.0 if before is None or static else before.dissipated_energy
         spent = solution.dissipated_energy - spent_before
         history = {**super()._history(solution, before), "dissipated_energy_step": spent}

@@ -265,7 +265,7 @@ def test_influence_of_flat_cells(ratio: int, col: int, row: int) -> None:
 
 
 def test_counted_work_of_slender_contacts() -> None:
-    """Beside a round contact of as many nodes: the same up to 3:1, a fifth more at 4.4:1, half more at 12:1."""
+    """Beside a round contact of as many nodes: the same up to 3:1, a fifth more at 4.4:1."""
     cases = [
         slender(radius, "0 deg", lattice="rectangular", nodes_in_radius=47)[0]
         for radius in (0.01, 0.042, 0.05, 0.1, 0.5)

@@ -250,7 +250,7 @@ contains
     logical :: near(6)
 
     associate (edges => norm2(matmul(self%basis, real(neighbors, wp)), dim=1))
-      near = edges < 2.5_wp*minval(edges)
+      near = edges < 5.0_wp*minval(edges)
     end associate
   end function near_neighbors
 

@@ -298,12 +298,11 @@ class FrictionalContact(Contact):
         Each row of creepages (x, y, spin) starts from the row before it, the first from `state`. The loads
         are along x and y, and the torque; the last state is that of the last row.
         """
-        tolerance, *_ = checked(tolerance=tolerance)
         motions = reals(creepages, "creepages", (len(np.atleast_1d(creepages)), 3))
         kinds = [CONTROLS[control], *[CONTROLS["displacement"]] * 3]
         loads, work, solved, handle = self.called(
-            *(flat.creep_loads, kinds, [value, *[0.0] * 6], motions, tolerance, MAX_SWEEPS, MAX_CUTS),
-            *(rolling.ahead(self.lattice), self._held(state)),
+            *(flat.creep_loads, kinds, [value, *[0.0] * 6], motions, *checked(tolerance=tolerance)),
+            *(MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice), self._held(state)),
         )
         return loads[:solved], work[:solved], self.solution(handle)
 

@@ -402,7 +402,9 @@ def test_help_and_version(tmp_path: Path) -> None:
     assert hexcontact_(tmp_path, "--version").stdout == f"hexcontact {hexcontact.__version__}\n"
     told = hexcontact_(tmp_path, "--version", "--verbose").stdout
     assert re.search(
-        r"FFT: (fftw3|pocketfft) \d.*BLAS: \w+ \d.*OpenMP: (yes|no)\n  threads: \d+\n", told, re.DOTALL
+        r"FFT: (fftw3|pocketfft) \d.*BLAS: \w+ \d.*OpenMP: (yes|no)\n  MPI: (yes|no)\n  threads: \d+\n",
+        told,
+        re.DOTALL,
     )
     assert f"numpy {np.__version__}\n" in told
     overall = hexcontact_(tmp_path, "--help").stdout

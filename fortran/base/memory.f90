@@ -10,12 +10,19 @@ module hc_memory
   implicit none
   private
 
-  public :: require_memory
+  public :: require_memory, give_back
 
   !> Bytes that do not depend on the window: plans, lists, messages.
   integer(int64), parameter :: margin = 8000000
 
+  !> Values of a vector from which holes between vectors are worth the time of the system.
+  integer, parameter :: worth_giving = 500000
+
   interface
+    !> Return memory that is free to the system
+    subroutine return_free() bind(c, name='hexcontact_give_back')
+    end subroutine return_free
+
     !> Return 1 if the system grants as many bytes, else 0
     integer(c_int) function can_map(bytes) bind(c, name='hexcontact_can_map')
       import :: c_size_t, c_int
@@ -48,5 +55,14 @@ contains
     call raise(error, status%resources, 'not enough memory: '//trim(megabytes)//' MB more are needed; '// &
                'choose a smaller window')
   end subroutine require_memory
+
+  !> Return free memory between the fields of a large problem, once a solver has its vectors: others that come do not fit
+  !> into the holes, which would stay.
+  subroutine give_back(n)
+    !> Values of a vector
+    integer, intent(in) :: n
+
+    if (n >= worth_giving) call return_free()
+  end subroutine give_back
 
 end module hc_memory

@@ -2,6 +2,9 @@
    written a file. */
 #include <errno.h>
 #include <fcntl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -24,6 +27,14 @@ int hexcontact_can_map(size_t size)
   if (start == MAP_FAILED) return 0;
   munmap(start, size);
   return 1;
+}
+
+/* Return memory that is free to the system, where the C library knows how. */
+void hexcontact_give_back(void)
+{
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 /* Bytes of the stack that a new thread gets. */

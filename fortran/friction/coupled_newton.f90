@@ -19,7 +19,7 @@
 !>
 !> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
@@ -49,6 +49,8 @@ module hc_coupled_newton
     type(iteration_t) :: iteration
     !> Some node sticks
     logical :: sticks = .false.
+  contains
+    procedure :: determined
   end type coupled_step_t
 
 contains
@@ -80,7 +82,7 @@ contains
     if (allocated(error)) return
     ! where all nodes slip, only their directions resist a load: limit the step along them
     failed = .not. step%iteration%independent
-    if (.not. failed .and. size(step%driven%motion) > 0 .and. .not. step%sticks) then
+    if (.not. (failed .or. step%determined())) then
       associate (n => size(now%p))
         failed = step%system%space%max_abs(step%x(n + 1:2*n)) > now%problem%options%newton%most_across*now%traction_scale()
       end associate
@@ -92,6 +94,13 @@ contains
       call take_solution(now, step, error)
     end if
   end subroutine coupled_sweep
+
+  !> Return whether the solution is taken however large: nodes stick, or no load drives a motion.
+  pure logical function determined(self)
+    class(coupled_step_t), intent(in) :: self
+
+    determined = self%sticks .or. size(self%driven%motion) == 0
+  end function determined
 
   !> Find contact, stick, slip, directions and compliances that the present tractions call for.
   subroutine linearize(now, shear_active)
@@ -187,50 +196,37 @@ contains
     real(wp), allocatable, intent(out) :: missing(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: shear_columns(:, :), part(:, :), column(:), plane(:)
-    integer :: n, m, k, n_shear
+    real(wp), allocatable :: ones(:, :), along(:), plane(:)
+    real(sp), allocatable :: punch(:, :)
+    integer :: n, k
 
     n = size(now%p)
-    associate (nodes => step%nodes, sheared => step%sheared, c => step%constraints)
-      call find_constraints(now, sheared, step%driven, shear_columns, missing)
-      n_shear = size(missing)
+    associate (c => step%constraints)
+      c%n_before = step%pressed%n_active
+      call find_constraints(now, step%sheared, step%driven, c%columns, missing)
       c%multiplier = step%driven%multipliers(now%motion)
-      m = n_shear + merge(1, 0, now%target%control(normal) == force_control)
-      call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
+      call find_rigid_traction(now, step%sheared, c%columns, .false., c%mb, error)
       if (allocated(error)) return
-      ! one by one: over all nodes they are large
-      allocate (c%columns(nodes%n_active, m), c%mb(nodes%n_active, m), c%rows(step%pressed%n_active, m), column(3*n), plane(2*n))
-      do k = 1, n_shear
-        column = 0.0_wp
-        call sheared%unpack(part(:, k), column(n + 1:))
-        call nodes%pack(column, c%mb(:, k))
-        column = 0.0_wp
-        call sheared%unpack(shear_columns(:, k), column(n + 1:))
-        call nodes%pack(column, c%columns(:, k))
-        ! the traction mu p e belongs to the pressure
+      ! the traction mu p e belongs to the pressure
+      allocate (c%rows(step%pressed%n_active, size(missing)), along(n))
+      do k = 1, size(missing)
         plane = reshape(step%driven%direction(k, now%problem), [2*n])
-        column(:n) = step%system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
-        call step%pressed%pack(column(:n), c%rows(:, k))
+        along = step%system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+        call step%pressed%pack(along, c%rows(:, k))
       end do
-      deallocate (part, shear_columns, plane)
-      if (m == n_shear) return
+      if (now%target%control(normal) /= force_control) return
       missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - step%system%space%sum(now%p)]
       c%multiplier = [c%multiplier, now%motion(normal)]
-      allocate (shear_columns(step%pressed%n_active, 1), source=1.0_wp)
-      call find_punch_pressure(now, step%pressed, shear_columns, part, error)
+      allocate (ones(step%pressed%n_active, 1), source=1.0_wp)
+      call find_punch_pressure(now, step%pressed, ones, punch, error)
       if (allocated(error)) return
-      column = 0.0_wp
-      call step%pressed%unpack(part(:, 1), column(:n))
-      call nodes%pack(column, c%mb(:, m))
-      column(:n) = merge(1.0_wp, 0.0_wp, now%contact)
-      call nodes%pack(column, c%columns(:, m))
-      c%rows(:, m) = 1.0_wp
+      c%of_sum = punch(:, 1)
     end associate
   end subroutine constrain
 
   !> Solve (F7) by GMRES, preconditioned block by block and projected as in (F11).
   subroutine solve(now, step, error)
-    !> Tractions and motions; its displacements are freed
+    !> Tractions and motions; its displacements are freed, and its tractions where the solution is taken in any case
     type(friction_iterate_t), intent(inout) :: now
     !> The step
     type(coupled_step_t), intent(inout), target :: step
@@ -270,6 +266,7 @@ contains
         iteration%weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(p_max)*iteration%weight(1)
       end if
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
+      if (step%determined()) deallocate (now%p, now%q)
       residual = min(residual, 1.0_wp)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
                                 options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
@@ -278,7 +275,11 @@ contains
       call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
       if (allocated(error)) return
       now%outcome = iteration%outcome
-      if (iteration%drift > options%displacement_rounding) call system%product(step%x, step%ax, error)
+      now%rounding = iteration%rounding
+      if (iteration%drift > options%displacement_rounding) then
+        now%rounding = 0.0_wp
+        call system%product(step%x, step%ax, error)
+      end if
     end associate
   end subroutine solve
 
@@ -293,7 +294,7 @@ contains
     real(wp) :: rounding
     integer :: n, n_shear
 
-    n = size(now%p)
+    n = size(step%x)/3
     n_shear = size(step%driven%motion)
     associate (x => step%x, ax => step%ax, system => step%system, multiplier => step%constraints%multiplier)
       call step%driven%set_motions(multiplier(:n_shear), now%motion)

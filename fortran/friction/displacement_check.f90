@@ -44,23 +44,21 @@ contains
       now%operators%flexibility%applications = applications
       ! what sticks moves little: pressure and shear traction cancel there
       largest = maxval(abs(by_pressure(n + 1:))) + maxval(abs(moved(n + 1:)))
-      if (.not. (agree(now%w, w, maxval(abs(w)), rounding) .and. &
-                 agree(now%closing, moved(:size(now%closing)), maxval(abs(w)), rounding) .and. &
-                 (agree(now%u, u, largest, rounding) .or. .not. now%problem%friction%resists()))) then
+      if (.not. (agree(now%w, w, rounding*maxval(abs(w)) + now%rounding) .and. &
+                 agree(now%closing, moved(:size(now%closing)), rounding*maxval(abs(w))) .and. &
+                 (agree(now%u, u, rounding*largest + now%rounding) .or. .not. now%problem%friction%resists()))) then
         call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
       end if
     end associate
   end subroutine check_displacements
 
   !> Return whether two fields agree but for rounding errors.
-  pure logical function agree(one, other, scale, rounding)
+  pure logical function agree(one, other, rounding)
     real(wp), intent(in) :: one(:), other(:)
-    !> Size of what they belong to
-    real(wp), intent(in) :: scale
-    !> Share of it that rounding errors may make up
+    !> What rounding errors may make up
     real(wp), intent(in) :: rounding
 
-    agree = all(abs(one - other) <= rounding*scale)
+    agree = all(abs(one - other) <= rounding)
   end function agree
 
 end module hc_displacement_check

@@ -6,7 +6,7 @@
 !> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
@@ -18,6 +18,7 @@ module hc_friction_iterate
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_linear_system, only: solution_accurate
   use hc_active_set, only: find_span
+  use hc_packed_fields, only: packed_fields_t
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -35,6 +36,8 @@ module hc_friction_iterate
     !> It is that of the traction cut to the cone, as a staggered sweep leaves it; or it is part of `w`, and
     !> `closing` is zero, as after a coupled sweep
     logical :: cut = .false., joint = .false.
+    !> Bound of the error of these displacements off the contact by directions of single precision [m]
+    real(wp) :: rounding = 0.0_wp
     !> Nodes in contact
     logical, allocatable :: contact(:)
     !> Approach, shifts and twist
@@ -64,7 +67,7 @@ module hc_friction_iterate
     integer :: n_shear = 0
     !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
     !> each rigid motion, components along x and y: they correct tractions that do not carry the prescribed loads
-    real(sp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
+    type(packed_fields_t), allocatable :: punch_pressure, rigid_traction
     !> How the linear solutions of the last sweep ended, the worst of them
     integer :: outcome = solution_accurate
     !> The start had no contact
@@ -239,6 +242,7 @@ contains
     space = self%operators%space
     self%cut = .false.
     self%joint = .false.
+    self%rounding = 0.0_wp
     if (.not. allocated(self%w)) call allocate_displacements(self)
     if (.not. allocated(self%shear%compliance)) call self%shear%reset_frames()
     allocate (moved(3*n))

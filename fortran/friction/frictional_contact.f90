@@ -144,22 +144,23 @@ contains
     n_shear = max(n_force - 1, 1)
     ! all that GMRES may store but one, since mostly a few are enough
     directions = options%max_directions - 1
-    ! iterate; traction estimates; shear system
-    everywhere = 6*field + half + (1 + 2*n_shear)*half + 3*field
-    ! packed: weights of the preconditioner of the shear traction, what it turns into the frames; its fields are in the memory of
-    ! the transforms
-    inside = 2*half + 2*field
+    ! iterate; shear system
+    everywhere = 6*field + half + 3*field
+    ! packed: traction estimates; weights of the preconditioner of the shear traction, what it turns into the frames; its fields
+    ! are in the memory of the transforms
+    inside = (1 + 2*n_shear)*half + 2*half + 2*field
     if (coupled) then
-      ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction; the products of all
-      ! directions off the contact; without the displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 - 4)*field + 3*directions*field
-      ! packed: both of all directions, residuals, constraints twice, and their rows for the pressure; without the products there
-      inside = inside + 3*(2*directions + 2 + 2*n_force)*field + n_force*field - 3*directions*field
+      ! slope; unknowns, their products and that of a direction; those of all directions off the contact; without tractions
+      ! and displacements of the iterate
+      everywhere = everywhere + (1 + 3 + 3 + 3 - 6)*field + 3*directions*half
+      ! packed: both of all directions, a residual; constraints with their estimates, and their rows for the pressure; without
+      ! the products there
+      inside = inside + 3*(2*directions + 1)*field + n_shear*(3*field + 2*half) + half - 3*directions*half
     else
       ! product of a direction
       everywhere = everywhere + 2*field
-      ! packed: traction before, vectors of conjugate gradients, constraints twice
-      inside = inside + 2*(1 + 4 + 2*n_shear)*field
+      ! packed: traction before, vectors of conjugate gradients, constraints with their estimates
+      inside = inside + 2*(1 + 4)*field + 2*n_shear*(field + half)
     end if
     friction_step_memory = n*everywhere + n_contact*inside
   end function friction_step_memory

@@ -218,7 +218,8 @@ contains
     !$omp end parallel do
   end subroutine collect
 
-  !> Bound the displacement by what the recorded tractions lack of those of the iterate, as a residual.
+  !> Bound the displacement by what the recorded tractions lack of those of the iterate, and what rounded directions do, as a
+  !> residual.
   !>
   !> No distribution of a traction that is nowhere larger than t, and in the sum T, displaces more than the disc of radius
   !> (T/(pi t))^1/2 on which it is t.
@@ -244,7 +245,7 @@ contains
     end do
     !$omp end parallel do
     displaced = 2.0_wp*now%problem%medium%largest_point(now%problem%lattice%spacing()) &
-                *sqrt(pi*now%problem%lattice%cell_area()*total*largest)
+                *sqrt(pi*now%problem%lattice%cell_area()*total*largest) + now%rounding
     cut_off = displaced/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
     if (.not. now%problem%friction%resists()) return
     displaced = displaced + now%problem%medium%spring_compliance()*largest

@@ -11,7 +11,7 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
@@ -121,7 +121,7 @@ contains
     !> Displacement along t and e at these nodes
     real(wp), intent(in), contiguous :: along_t(:), along_e(:)
     !> Its traction if all nodes stuck, along x and y (2 n)
-    real(sp), intent(in), contiguous :: plane(:)
+    real(wp), intent(in), contiguous :: plane(:)
     !> The traction along t and e at these nodes
     real(wp), intent(inout), contiguous :: traction_t(:), traction_e(:)
     real(wp), dimension(most) :: q_t, q_e, u_e

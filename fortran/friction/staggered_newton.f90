@@ -23,6 +23,7 @@
 module hc_staggered_newton
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
+  use hc_memory, only: give_back
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
@@ -30,6 +31,7 @@ module hc_staggered_newton
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
   use hc_active_set, only: active_set_t, new_active_set
+  use hc_packed_fields, only: new_packed_fields
   use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
   use hc_step_equation, only: solve_step_equation
   implicit none
@@ -269,6 +271,7 @@ contains
       now%q = 0.0_wp
       return
     end if
+    call give_back(2*n)
     call relax_fronts(now)
     call keep_traction(now, loaded, before)
     highest = now%traction_scale()
@@ -410,8 +413,12 @@ contains
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
     call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
     if (allocated(error)) return
-    if (iteration%drift > options%displacement_rounding*scale) call displace(now, found%x, found%ax, error)
-    if (allocated(error)) return
+    now%rounding = iteration%rounding
+    if (iteration%drift > options%displacement_rounding*scale) then
+      now%rounding = 0.0_wp
+      call displace(now, found%x, found%ax, error)
+      if (allocated(error)) return
+    end if
     now%outcome = max(now%outcome, iteration%outcome)
   end subroutine solve_in_frames
 
@@ -489,28 +496,31 @@ contains
     !> One at these nodes; or no constraint at all (n_active, 1 or 0)
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> The pressure there (n_active, 1 or 0)
-    real(wp), allocatable, intent(out) :: mb(:, :)
+    real(sp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: pressure(:)
+    real(wp), allocatable :: pressure(:), column(:)
     integer :: k
 
-    allocate (pressure(merge(size(now%p), 0, size(constraint, 2) > 0)))
+    allocate (pressure(merge(size(now%p), 0, size(constraint, 2) > 0)), column(size(constraint, 1)))
     if (.not. allocated(now%punch_pressure)) then
       call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb, error)
       if (allocated(error)) return
-      allocate (now%punch_pressure(size(pressure), size(mb, 2)))
+      allocate (now%punch_pressure)
+      call new_packed_fields(now%punch_pressure, nodes, size(mb, 2), now%pressure%space)
       do k = 1, size(mb, 2)
         call now%pressure%space%fill(pressure, 0.0_wp)
-        call nodes%unpack(mb(:, k), pressure)
-        now%punch_pressure(:, k) = real(pressure, sp)
+        column = mb(:, k)
+        call nodes%unpack(column, pressure)
+        call now%punch_pressure%keep(k, pressure)
       end do
       return
     end if
-    allocate (mb, mold=constraint)
+    allocate (mb(size(constraint, 1), size(constraint, 2)))
     do k = 1, size(mb, 2)
-      pressure = now%punch_pressure(:, k)
-      call nodes%pack(pressure, mb(:, k))
+      call now%punch_pressure%restore(k, pressure)
+      call nodes%pack(pressure, column)
+      mb(:, k) = real(column, sp)
     end do
   end subroutine find_punch_pressure
 
@@ -525,35 +535,42 @@ contains
     !> Make it again
     logical, intent(in) :: afresh
     !> The traction there (n_active, number of constraints)
-    real(wp), allocatable, intent(out) :: mb(:, :)
+    real(sp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: plane(:)
+    type(active_set_t) :: touching
+    real(wp), allocatable :: plane(:), column(:)
     integer :: n, k, n_t
     logical :: known
 
     n = size(now%p)
     n_t = nodes%pairs%n_first
     known = allocated(now%rigid_traction) .and. .not. afresh
-    if (known) known = size(now%rigid_traction, 2) == size(constraint, 2)
-    if (known) then
-      allocate (mb, mold=constraint)
-      do k = 1, size(mb, 2)
-        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), now%rigid_traction(:, k), &
-                                             mb(:n_t, k), mb(n_t + 1:, k))
-      end do
-    else
+    if (known) known = now%rigid_traction%n_field == size(constraint, 2)
+    if (.not. known) then
       call precondition_constraints(now%shear, nodes, 2*n, constraint, mb, error)
       if (allocated(error)) return
       if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
-      allocate (now%rigid_traction(2*n, size(mb, 2)))
-      if (size(mb, 2) > 0) allocate (plane(2*n))
-      do k = 1, size(mb, 2)
-        call now%shear%space%fill(plane, 0.0_wp)
-        call now%shear%put_in_plane(nodes%pairs, mb(:n_t, k), mb(n_t + 1:, k), plane)
-        now%rigid_traction(:, k) = real(plane, sp)
-      end do
+      allocate (now%rigid_traction)
+      call new_active_set(touching, [now%contact, now%contact], now%shear%space)
+      call new_packed_fields(now%rigid_traction, touching, size(mb, 2), now%shear%space)
+    else
+      allocate (mb(size(constraint, 1), size(constraint, 2)))
     end if
+    if (size(mb, 2) > 0) allocate (plane(2*n), column(size(mb, 1)))
+    do k = 1, size(mb, 2)
+      if (known) then
+        call now%rigid_traction%restore(k, plane)
+        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane, column(:n_t), &
+                                             column(n_t + 1:))
+        mb(:, k) = real(column, sp)
+      else
+        call now%shear%space%fill(plane, 0.0_wp)
+        column = mb(:, k)
+        call now%shear%put_in_plane(nodes%pairs, column(:n_t), column(n_t + 1:), plane)
+        call now%rigid_traction%keep(k, plane)
+      end if
+    end do
   end subroutine find_rigid_traction
 
 end module hc_staggered_newton

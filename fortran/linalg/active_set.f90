@@ -4,7 +4,7 @@
 !> as much of the work on them. Active nodes come in runs along the rows of the window, so
 !> that packing is a copy of a few hundred pieces.
 module hc_active_set
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -35,11 +35,11 @@ module hc_active_set
     type(paired_runs_t) :: pairs
   contains
     !> The active nodes of a field
-    procedure :: pack => pack_field
+    generic :: pack => pack_field, pack_single
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
     !> Add a multiple of them to the field
-    procedure :: add => add_to_field
+    generic :: add => add_to_field, add_single
     !> Those of a part of the nodes
     procedure :: slice
     !> Pair the components of a field that has two
@@ -48,6 +48,7 @@ module hc_active_set
     procedure :: complement
     !> Is it a given set?
     procedure :: is_set
+    procedure, private :: pack_field, pack_single, add_to_field, add_single
   end type active_set_t
 
   !> Find the first and the last of some nodes, 1 and 0 if there are none: those that are active, or those with a value above zero
@@ -203,6 +204,25 @@ contains
     !$omp end parallel do
   end subroutine pack_field
 
+  !> Gather the active nodes of a field in single precision.
+  subroutine pack_single(self, field, packed)
+    class(active_set_t), intent(in) :: self
+    !> Field over all nodes
+    real(wp), intent(in), contiguous :: field(:)
+    !> Its values at the active nodes (n_active)
+    real(sp), intent(inout), contiguous :: packed(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        packed(i + shift) = real(field(i), sp)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine pack_single
+
   !> Scatter values to the active nodes of a field.
   subroutine unpack_field(self, packed, field)
     class(active_set_t), intent(in) :: self
@@ -242,6 +262,27 @@ contains
     end do
     !$omp end parallel do
   end subroutine add_to_field
+
+  !> Add a multiple of values in single precision to the active nodes of a field.
+  subroutine add_single(self, factor, packed, field)
+    class(active_set_t), intent(in) :: self
+    !> The multiple
+    real(wp), intent(in) :: factor
+    !> Values at the active nodes (n_active)
+    real(sp), intent(in), contiguous :: packed(:)
+    !> Field over all nodes
+    real(wp), intent(inout), contiguous :: field(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        field(i) = field(i) + factor*packed(i + shift)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine add_single
 
   !> Return the nodes that are not active.
   pure type(active_set_t) function complement(self, n) result(others)

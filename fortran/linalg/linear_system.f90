@@ -10,10 +10,10 @@
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_linear_system
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
-  use hc_field_space, only: field_space_t
+  use hc_field_space, only: field_space_t, sum_block
   use hc_active_set, only: active_set_t
   implicit none
   private
@@ -40,12 +40,18 @@ module hc_linear_system
     procedure :: precondition_packed
   end type linear_system_t
 
-  !> Linear constraints on the unknowns; at the active nodes (n_active, number of constraints, may be 0).
+  !> Linear constraints on the unknowns (nodes, number of constraints, may be 0).
   type :: constraints_t
-    !> B, along which the multipliers act, and M B
-    real(wp), allocatable :: columns(:, :), mb(:, :)
-    !> C at the first active nodes, where it differs from B
+    !> Active nodes at whose unknowns B and M B are zero, the first ones
+    integer :: n_before = 0
+    !> B, along which the multipliers act, at the active nodes after them
+    real(wp), allocatable :: columns(:, :)
+    !> M B there; vectors that nearly are M B serve as well
+    real(sp), allocatable :: mb(:, :)
+    !> C at the first active nodes, as far as it is not B
     real(wp), allocatable :: rows(:, :)
+    !> M B of one more constraint, the last: the sum of the unknowns at the nodes before
+    real(sp), allocatable :: of_sum(:)
     !> Multipliers m
     real(wp), allocatable :: multiplier(:)
   contains
@@ -55,6 +61,10 @@ module hc_linear_system
     procedure :: invert
     !> C^T x
     procedure :: resultants
+    !> Add B or M B times factors
+    procedure :: add_columns, add_mb
+    !> Number of constraints
+    procedure :: number
   end type constraints_t
 
   !> An iteration: how far it may go, and how it ended.
@@ -73,6 +83,8 @@ module hc_linear_system
     logical :: independent = .true.
     !> Bound of the rounding errors in the product A x, which is carried along
     real(wp) :: drift = 0.0_wp
+    !> GMRES: bound of the error of the product off the active nodes, where directions are of single precision
+    real(wp) :: rounding = 0.0_wp
   end type iteration_t
 
   abstract interface
@@ -138,15 +150,17 @@ contains
     !> Constraint vectors B at these nodes (n_active, number of constraints)
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> M B there
-    real(wp), allocatable, intent(out) :: mb(:, :)
+    real(sp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: column(:)
     integer :: m
 
-    allocate (mb, mold=constraint)
+    allocate (mb(size(constraint, 1), size(constraint, 2)), column(size(constraint, 1)))
     do m = 1, size(constraint, 2)
-      call system%precondition_packed(nodes, n, constraint(:, m), mb(:, m), error)
+      call system%precondition_packed(nodes, n, constraint(:, m), column, error)
       if (allocated(error)) return
+      mb(:, m) = real(column, sp)
     end do
   end subroutine precondition_constraints
 
@@ -173,11 +187,11 @@ contains
     if (.not. independent) return
     factor = [(dot_product(inverse(m, :), missing), m=1, size(missing))]
     if (.not. present(nodes)) then
-      call space%add_columns(self%mb, factor, x)
+      call self%add_mb(space, factor, x)
     else if (size(missing) > 0) then
       allocate (values(nodes%n_active))
       call nodes%pack(x, values)
-      call space%add_columns(self%mb, factor, values)
+      call self%add_mb(space, factor, values)
       call nodes%unpack(values, x)
     end if
   end subroutine satisfy
@@ -210,11 +224,11 @@ contains
     call nodes%pack(rhs, r)
     call nodes%pack(ax, z)
     r = r - z
-    call system%space%add_columns(constraints%columns, constraints%multiplier, r)
+    call constraints%add_columns(system%space, constraints%multiplier, r)
     call system%precondition_packed(nodes, size(x), r, z, error)
     if (allocated(error)) return
     share = -matmul(inverse, constraints%resultants(system%space, z))
-    call system%space%add_columns(constraints%mb, share, z)
+    call constraints%add_mb(system%space, share, z)
     call nodes%pack(x, r)
     r = r + length*z
     call nodes%unpack(r, x)
@@ -229,14 +243,21 @@ contains
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
-    real(wp) :: gram(size(inverse, 1), size(inverse, 1)), scale(size(inverse, 1))
+    real(wp), dimension(size(inverse, 1), size(inverse, 1)) :: gram, unit
+    real(wp) :: scale(size(inverse, 1))
+    real(wp), allocatable :: column(:)
     integer :: m
 
     independent = .true.
     inverse = 0.0_wp
     if (size(scale) == 0) return
+    unit = 0.0_wp
+    allocate (column(self%n_before + size(self%mb, 1)))
     do m = 1, size(scale)
-      gram(:, m) = self%resultants(space, self%mb(:, m))
+      unit(m, m) = 1.0_wp
+      call space%fill(column, 0.0_wp)
+      call self%add_mb(space, unit(:, m), column)
+      gram(:, m) = self%resultants(space, column)
       scale(m) = gram(m, m)
     end do
     independent = all(scale > 0.0_wp)
@@ -252,6 +273,66 @@ contains
     if (.not. independent) inverse = 0.0_wp
   end subroutine invert
 
+  !> Return the number of constraints.
+  pure integer function number(self)
+    class(constraints_t), intent(in) :: self
+
+    number = size(self%columns, 2) + merge(1, 0, allocated(self%of_sum))
+  end function number
+
+  !> Add x <- x + B factor.
+  subroutine add_columns(self, space, factor, x)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> A factor for each constraint
+    real(wp), intent(in) :: factor(:)
+    !> Values at the active nodes
+    real(wp), intent(inout), contiguous :: x(:)
+    integer :: i
+
+    associate (n => self%n_before)
+      call space%add_columns(self%columns, factor(:size(self%columns, 2)), x(n + 1:))
+      if (.not. allocated(self%of_sum)) return
+      !$omp parallel do simd schedule(static) num_threads(space%threads)
+      do i = 1, n
+        x(i) = x(i) + factor(size(factor))
+      end do
+      !$omp end parallel do simd
+    end associate
+  end subroutine add_columns
+
+  !> Add x <- x + M B factor.
+  subroutine add_mb(self, space, factor, x)
+    class(constraints_t), intent(in) :: self
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> A factor for each constraint
+    real(wp), intent(in) :: factor(:)
+    !> Values at the active nodes
+    real(wp), intent(inout), contiguous :: x(:)
+    integer :: i, m, from, to
+
+    associate (n => self%n_before)
+      !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to)
+      do from = 1, size(self%mb, 1), sum_block
+        to = min(from + sum_block - 1, size(self%mb, 1))
+        do m = 1, size(self%mb, 2)
+          do i = from, to
+            x(n + i) = x(n + i) + factor(m)*self%mb(i, m)
+          end do
+        end do
+      end do
+      !$omp end parallel do
+      if (.not. allocated(self%of_sum)) return
+      !$omp parallel do simd schedule(static) num_threads(space%threads)
+      do i = 1, n
+        x(i) = x(i) + factor(size(factor))*self%of_sum(i)
+      end do
+      !$omp end parallel do simd
+    end associate
+  end subroutine add_mb
+
   !> Compute C^T x of values at the active nodes.
   function resultants(self, space, x)
     class(constraints_t), intent(in) :: self
@@ -259,20 +340,17 @@ contains
     type(field_space_t), intent(in) :: space
     !> The values
     real(wp), intent(in), contiguous :: x(:)
-    real(wp) :: resultants(size(self%columns, 2))
-
+    real(wp) :: resultants(self%number())
     integer :: n, m
 
-    if (allocated(self%rows)) then
-      n = size(self%rows, 1)
-      resultants = space%dots(self%rows, x(:n))
-      if (n == size(x)) return
-      do m = 1, size(resultants)
-        resultants(m) = resultants(m) + space%dot(self%columns(n + 1:, m), x(n + 1:))
-      end do
-    else
-      resultants = space%dots(self%columns, x)
-    end if
+    n = self%n_before
+    resultants = 0.0_wp
+    if (allocated(self%rows)) n = size(self%rows, 1)
+    do m = 1, size(self%columns, 2)
+      if (n < size(x)) resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:))
+      if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
+    end do
+    if (allocated(self%of_sum)) resultants(size(resultants)) = space%sum(x(:self%n_before))
   end function resultants
 
 end module hc_linear_system

@@ -9,7 +9,7 @@
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_cg
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_active_set, only: active_set_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
@@ -159,17 +159,18 @@ contains
     real(wp), intent(in) :: step
     real(wp), intent(in), contiguous :: ad(:)
     !> Change of the multipliers, B and C
-    real(wp), intent(in), contiguous :: change(:), b(:, :), c(:, :)
+    real(wp), intent(in), contiguous :: change(:), b(:, :)
+    real(sp), intent(in), contiguous :: c(:, :)
     !> Residual
     real(wp), intent(inout), contiguous :: r(:)
     !> C^T r
     real(wp), intent(out) :: along(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: part(size(change), (size(r) + block - 1)/block)
+    real(wp) :: part(size(change), (size(r) + block - 1)/block), column(block)
     integer :: k, m, from, to, n
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, n)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, n, column)
     do k = 1, size(part, 2)
       from = (k - 1)*block + 1
       to = min(k*block, size(r))
@@ -179,7 +180,8 @@ contains
         if (abs(change(m)) > 0.0_wp) call add_multiple(n, change(m), b(from:to, m), r(from:to))
       end do
       do m = 1, size(change)
-        part(m, k) = ddot(n, c(from:to, m), 1, r(from:to), 1)
+        column(:n) = c(from:to, m)
+        part(m, k) = ddot(n, column, 1, r(from:to), 1)
       end do
     end do
     !$omp end parallel do
@@ -215,7 +217,8 @@ contains
   !> Project z <- z + M B share, and compute r^T z.
   subroutine project(share, m_b, r, z, rz, space)
     !> Shares of the constraints, and M B
-    real(wp), intent(in), contiguous :: share(:), m_b(:, :)
+    real(wp), intent(in), contiguous :: share(:)
+    real(sp), intent(in), contiguous :: m_b(:, :)
     !> Residual, and its preconditioned projection
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
@@ -223,15 +226,16 @@ contains
     real(wp), intent(out) :: rz
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: part((size(r) + block - 1)/block)
+    real(wp) :: part((size(r) + block - 1)/block), column(block)
     integer :: k, m, from, to
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, column)
     do k = 1, size(part)
       from = (k - 1)*block + 1
       to = min(k*block, size(r))
       do m = 1, size(share)
-        call add_multiple(to - from + 1, share(m), m_b(from:to, m), z(from:to))
+        column(:to - from + 1) = m_b(from:to, m)
+        call add_multiple(to - from + 1, share(m), column, z(from:to))
       end do
       part(k) = ddot(to - from + 1, r(from:to), 1, z(from:to), 1)
     end do

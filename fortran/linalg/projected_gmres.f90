@@ -12,9 +12,10 @@
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
+  use hc_memory, only: give_back
   use hc_field_space, only: field_space_t
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, iterations_used_up, &
     solution_broke_off
@@ -22,6 +23,9 @@ module hc_projected_gmres
   private
 
   public :: projected_gmres
+
+  !> Directions whose memory is about the largest that a load step takes
+  integer, parameter :: many = 4
 
 contains
 
@@ -47,14 +51,16 @@ contains
 
     type :: direction_t
       !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
-      !> nodes; the product A z on the others
-      real(wp), allocatable :: v(:), z(:), beyond(:)
+      !> nodes
+      real(wp), allocatable :: v(:), z(:)
+      !> The product A z on the others
+      real(sp), allocatable :: beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
     type(active_set_t) :: others
-    !> On the active nodes; a product over all nodes
-    real(wp), allocatable :: packed(:), image(:)
+    !> A product over all nodes
+    real(wp), allocatable :: image(:)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(iteration%weight))
     !> H, and after rotations
@@ -72,6 +78,7 @@ contains
     iteration%made = 0
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
+    iteration%rounding = 0.0_wp
     iteration%outcome = solution_broke_off
     call constraints%invert(space, inverse, iteration%independent)
     if (.not. iteration%independent) return
@@ -91,6 +98,8 @@ contains
     !> Compute the weighted residual of the start, the first direction.
     subroutine begin()
       type(active_set_t) :: of_part
+      real(wp), allocatable :: packed(:)
+      real(wp) :: unit(size(along))
       integer :: i, part
 
       others = nodes%complement(size(x))
@@ -102,7 +111,10 @@ contains
         last(i) = last(i - 1) + of_part%n_active
       end do
       do i = 1, size(along)
-        packed = constraints%columns(:, i)
+        unit = 0.0_wp
+        unit(i) = 1.0_wp
+        packed = 0.0_wp
+        call constraints%add_columns(space, unit, packed)
         call weigh(iteration%weight, packed)
         along(i) = sqrt(space%dot(packed, packed))
       end do
@@ -110,7 +122,7 @@ contains
       deallocate (rhs)
       call nodes%pack(ax, packed)
       basis(1)%v = basis(1)%v - packed
-      call space%add_columns(constraints%columns, constraints%multiplier, basis(1)%v)
+      call constraints%add_columns(space, constraints%multiplier, basis(1)%v)
       call weigh(iteration%weight, basis(1)%v)
       length = sqrt(space%dot(basis(1)%v, basis(1)%v))
       iteration%residual = length
@@ -133,6 +145,7 @@ contains
       do k = 1, most
         stat = 0
         if (.not. allocated(basis(k)%z)) then
+          if (k == many) call give_back(size(x))
           allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
         end if
         if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
@@ -140,17 +153,18 @@ contains
           call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
           return
         end if
-        call space%copy(basis(k)%v, packed)
-        call weigh(1.0_wp/iteration%weight, packed)
-        call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
+        ! the memory of the next direction serves for the residual without its weights
+        call space%copy(basis(k)%v, basis(k + 1)%v)
+        call weigh(1.0_wp/iteration%weight, basis(k + 1)%v)
+        call system%precondition_packed(nodes, size(x), basis(k + 1)%v, basis(k)%z, error)
         if (allocated(error)) return
         share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k)%z))
-        call space%add_columns(constraints%mb, share(:, k), basis(k)%z)
+        call constraints%add_mb(space, share(:, k), basis(k)%z)
         call system%product_packed(nodes, basis(k)%z, image, error)
         if (allocated(error)) return
         call nodes%pack(image, basis(k + 1)%v)
         call others%pack(image, basis(k)%beyond)
-        call space%add_columns(constraints%columns, -share(:, k), basis(k + 1)%v)
+        call constraints%add_columns(space, -share(:, k), basis(k + 1)%v)
         call weigh(iteration%weight, basis(k + 1)%v)
         do i = 1, k
           h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
@@ -181,8 +195,11 @@ contains
 
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
+      real(wp), allocatable :: packed(:)
       integer :: i
 
+      if (allocated(image)) deallocate (image)
+      allocate (packed(nodes%n_active))
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do
@@ -200,11 +217,12 @@ contains
         packed = packed - left(i)*basis(i)%v
       end do
       call weigh(1.0_wp/iteration%weight, packed)
-      call space%add_columns(constraints%columns, matmul(share(:, :directions), y(:directions)), packed)
+      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), packed)
       call nodes%add(1.0_wp, packed, ax)
       do i = 1, directions
         call nodes%add(y(i), basis(i)%z, x)
         call others%add(y(i), basis(i)%beyond, ax)
+        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*max(maxval(abs(basis(i)%beyond)), 0.0_sp)
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return

@@ -71,7 +71,8 @@ contains
     high = low + lattice%extent - 1
     extended = state
     deallocate (extended%pressure, extended%gap, extended%zone, extended%traction, extended%relative_displacement, &
-                extended%slip_increment, extended%accumulated_slip, extended%dissipation_density)
+                extended%accumulated_slip, extended%dissipation_density)
+    if (allocated(extended%slip_increment)) deallocate (extended%slip_increment)
     call add_fields(extended, solver%problem%lattice, solver%problem%space)
     call add_history(extended)
     extended%pressure(low(1):high(1), low(2):high(2)) = state%pressure
@@ -88,7 +89,6 @@ contains
     where (.not. solver%problem%candidate) extended%gap = 0.0_wp
     extended%zone(low(1):high(1), low(2):high(2)) = state%zone
     extended%relative_displacement(low(1):high(1), low(2):high(2), :) = state%relative_displacement
-    extended%slip_increment(low(1):high(1), low(2):high(2), :) = state%slip_increment
     extended%accumulated_slip(low(1):high(1), low(2):high(2)) = state%accumulated_slip
     extended%dissipation_density(low(1):high(1), low(2):high(2)) = state%dissipation_density
     extended%clipped = .false.

@@ -29,8 +29,8 @@ module hc_f2py_handles
   implicit none
   private
 
-  public :: slot_t, take_slot, enter, leave, free_object, hold, hold_wear, find_state, find_wear, kernel_cache, own_cache, report
-  public :: ranks
+  public :: slot_t, take_slot, enter, leave, free_object, free_slip, hold, hold_wear, find_state, find_wear
+  public :: kernel_cache, own_cache, report, ranks
   public :: bodies_of, find_coated, coated_t, add_springs, friction_of, normal_law_of
 
   !> Object of a handle: one of these.
@@ -168,6 +168,18 @@ contains
     if (associated(slot%wear)) deallocate (slot%wear)
     deallocate (slot)
   end subroutine free_object
+
+  !> Free the slip of the last step in a state, from which no step starts; a stale handle is ignored.
+  subroutine free_slip(handle)
+    !> Handle of the state
+    integer(c_int64_t), intent(in) :: handle
+    type(slot_t), pointer :: slot
+
+    slot => slot_of(handle)
+    if (.not. associated(slot)) return
+    if (.not. associated(slot%state)) return
+    if (allocated(slot%state%slip_increment)) deallocate (slot%state%slip_increment)
+  end subroutine free_slip
 
   !> Look up an operator or a problem and mark it as in use.
   subroutine enter(handle, kind, extent, slot, error)

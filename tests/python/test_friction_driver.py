@@ -427,6 +427,45 @@ def test_a_state_behind_a_stale_handle_is_an_error(monkeypatch: pytest.MonkeyPat
         problem.advance(problem.virgin(), *loads)
 
 
+def test_the_slip_of_a_step_goes_with_its_last_array() -> None:
+    """From it no step starts."""
+    lattice = Lattice(0.1, -6, -6, 13, 13)
+    gap = 0.5 * (lattice.x**2 + lattice.y**2)
+    problem = FrictionalContact(lattice, ElasticPair(1.0, 0.3, 1.0), gap, friction_coefficient=0.3)
+    kinds = ["force"] * 3 + ["displacement"]
+    state = problem.advance(problem.virgin(), kinds, (0.003, 0.0005, 0.0, 0.0))
+    ahead = problem.advance(state, kinds, (0.003, -0.0005, 0.0, 0.0))
+    slip, kept, held = state.slip_increment_x, state.slip_increment_x.copy(), state.held
+    assert np.abs(kept).max() > 0.0
+    start = state.as_start()
+    del state
+    gc.collect()
+    assert_array_equal(held.view("slip_increment_x"), kept)
+    del slip
+    gc.collect()
+    with pytest.raises(HexcontactError, match="the state has no field slip_increment_x"):
+        held.view("slip_increment_x")
+    same(problem.advance(start, kinds, (0.003, -0.0005, 0.0, 0.0)), ahead)
+
+
+def test_a_run_into_a_file_holds_no_slip_of_the_step_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts, advance = [], FrictionWindow.advance
+
+    def watched(window: FrictionWindow, state: ContactState | None, *given: Any) -> ContactState:
+        if state is not None:
+            starts.append(state)
+            with pytest.raises(HexcontactError, match="no field slip_increment_x"):
+                state.held.view("slip_increment_x")
+        return advance(window, state, *given)
+
+    monkeypatch.setattr(FrictionWindow, "advance", watched)
+    monkeypatch.setattr("hexcontact.result.journal.LARGE", 0)  # the store keeps small steps
+    sphere(loads=MIXED[:4]).run(tmp_path / "out.nc")
+    assert len(starts) > 3
+
+
 def test_a_step_without_friction_holds_no_such_state() -> None:
     [step] = solve.steps(sphere(friction_coefficient=None, loads=[{"normal_load": 31.5}]))
     with pytest.raises(ValueError, match=r"step 1 holds no state .* it lacks accumulated_slip"):

@@ -237,6 +237,10 @@ class NormalSolution(Solved):
     operator_applications: float = 0.0
     stopped: str = ""
 
+    def as_start(self) -> NormalSolution | None:
+        """Return what the next load step starts from."""
+        return None
+
 
 S = TypeVar("S", bound=NormalSolution)
 

@@ -162,6 +162,11 @@ class ContactState(NormalSolution):
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
+    def as_start(self) -> ContactState:
+        """Return what the next load step starts from: the state without the slip of the last one."""
+        none = np.broadcast_to(0.0, self.pressure.shape)
+        return dataclasses.replace(self, slip_increment_x=none, slip_increment_y=none).behind(self.known)
+
 
 class FrictionalContact(Contact):
     """A contact problem with friction; `advance` solves the step from one load to the next.

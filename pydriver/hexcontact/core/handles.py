@@ -27,11 +27,20 @@ class Handle:
         kernel_cache.warn_of_faults()
 
 
+class _Slip:
+    """The slip of the last step in a state, which is freed with the last array that is a view of it."""
+
+    def __init__(self, state: HeldState) -> None:
+        self.state = state
+        weakref.finalize(self, flat.free_slip, state.handle).atexit = False
+
+
 class HeldState:
     """A state in the memory of the core, which is freed with the last array that is a view of it."""
 
     def __init__(self, handle: int, shape: tuple[int, ...]) -> None:
         self.handle, self.shape = handle, shape
+        self._slip: Callable[[], _Slip | None] = lambda: None
         # at the end of the process arrays may still be in use
         weakref.finalize(self, flat.free_object, handle).atexit = False
 
@@ -42,9 +51,16 @@ class HeldState:
 
     def view(self, name: str) -> NDArray[Any]:
         """Return a field, which is no copy."""
+        owner: Any = self
+        if name.startswith("slip_increment"):
+            owner = self._slip() or _Slip(self)
+            self._slip = weakref.ref(owner)
+        return self._array(name, owner)
+
+    def _array(self, name: str, owner: Any) -> NDArray[Any]:
         number, kind = (ctypes.c_int, "i4") if name == "zone" else (ctypes.c_double, "f8")
         memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
-        memory.held = self
+        memory.held = owner
         return np.frombuffer(memory, dtype=kind).reshape(self.shape)
 
     @classmethod
@@ -54,7 +70,7 @@ class HeldState:
         history = flat.History(**{name: numbers.get(name, 0.0) for name in CORE["numbers"]})
         held = cls(flat.new_state(shape[1], shape[0], history), shape)
         for name, field in fields.items():
-            held.view(name)[:] = field
+            held._array(name, held)[:] = field
         return held
 
 

@@ -98,8 +98,9 @@ class AdaptivePath(GivenPath):
                 "step_limited": int(now.verdict == core.LIMITED),
                 "segment_fraction": now.end,
             }
-            state = reached
-            yield self._placed(dataclasses.replace(step, history=history)), state
+            yield self._placed(dataclasses.replace(step, history=history)), reached
+            state = reached.as_start()
+            del step, reached
 
     def _placed(self, step: Step) -> Step:
         """Return a load step with the restart data of the next one."""

@@ -165,6 +165,7 @@ def _record_steps(case: Problem, store: Store, listener: Listener, before: Seque
             if not isinstance(error, HexcontactError):  # to which the store adds it
                 error.add_note(store.kept)
             raise
+        del step  # its memory goes before the next one is solved
 
 
 def write_stresses(output: Path, case: Problem | None = None, listener: Listener | None = None) -> list[Path]:

@@ -77,6 +77,7 @@ def steps(
         case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
         yield step
         done = step.number
+        del step
     listener.said("finished", steps=done, seconds=time.perf_counter() - started)
 
 
@@ -115,8 +116,9 @@ def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]
         for step, reached in path.steps(state, target, begun):
             _warn_of_path(path.case, step, state, path.window.listener)
             # before the step is written, so that the memory of the state before it goes
-            state, reached_by_now = reached, _standing(step.history)
+            state, reached_by_now = reached.as_start(), _standing(step.history)
             yield step
+            del step, reached  # the next step has no use of them
     yield from path.after(state)
 
 

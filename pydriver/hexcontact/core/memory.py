@@ -66,10 +66,10 @@ def threads() -> int:
 
 def require(needed: int, what: str, advice: str, there: int | None = None) -> None:
     """Raise an error if memory is short."""
-    from . import kernel_cache
+    from .kernel_cache import limit_growth
 
     there = available() if there is None else there
-    kernel_cache.limit_growth(there - needed)  # spectra of other cases give way to this one
+    limit_growth(there - needed)  # spectra of other cases give way to this one
     if needed > there:
         there = available()
     if needed > there:

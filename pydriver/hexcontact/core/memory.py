@@ -12,15 +12,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import ResourceError
+from .cores import CGROUPS, PROCESS, cores, folders_of_groups, read
 
 GB = 1e9
 # Bytes of address space: of the netCDF library, and of its buffers for fifty variables; of the second thread
 # of a run, for its stack and 64 MiB of malloc.
 _LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
 _NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
-
-
-CGROUPS, PROCESS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def available(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
@@ -31,7 +29,7 @@ def available(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
 def resident() -> int:
     """Return the resident memory (bytes) of this process, with the interpreter and all libraries."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        return int(_read("/proc/self/statm").split()[1]) * mmap.PAGESIZE
+        return int(read("/proc/self/statm").split()[1]) * mmap.PAGESIZE
     return _taken("rss")
 
 
@@ -44,18 +42,6 @@ def _taken(name: str) -> int:
     with contextlib.suppress(psutil.Error, OSError):  # without /proc
         return int(getattr(psutil.Process().memory_info(), name, 0))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-def cores(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
-    """Return the number of cores that this process is bound to, within the quotas of its control groups."""
-    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(bound, _quota(cgroups, process))
-
-
-def limit_threads() -> None:
-    """Make OpenMP and BLAS, which know no quotas, start no more threads than a quota allows."""
-    if _quota(CGROUPS, PROCESS) < (os.cpu_count() or 1):
-        os.environ.setdefault("OMP_NUM_THREADS", str(cores()))
 
 
 def threads() -> int:
@@ -92,7 +78,7 @@ def claim(needed: int) -> None:
 def _left_on_machine() -> int:
     """Return the memory (bytes) that the machine has left, by Linux itself or else by psutil."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        return int(_read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
+        return int(read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
     import psutil
 
     with contextlib.suppress(psutil.Error, OSError):
@@ -124,7 +110,7 @@ def _left_in_limits() -> Iterator[int]:
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
     """Yield the free bytes of each control group (version 1 or 2) that limits this process."""
     with contextlib.suppress(OSError):
-        for files in _files_of_groups(cgroups, _read(process)):
+        for files in _files_of_groups(cgroups, read(process)):
             if (left := _left_in_group(*files)) is not None:
                 yield left
 
@@ -133,7 +119,7 @@ def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
 def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, bytes]]:
     """Return limit, usage and statistics of each control group, and the key of the file cache in these."""
     found = []
-    for controllers, folder in _folders_of_groups(cgroups, groups):
+    for controllers, folder in folders_of_groups(cgroups, groups):
         limit, usage, cache = "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file"
         if not controllers:
             limit, usage, cache = "memory.max", "memory.current", b"inactive_file"
@@ -143,46 +129,13 @@ def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, 
     return found
 
 
-@functools.cache
-def _quota(cgroups: Path, process: Path) -> int:
-    """Return the processor time that the control groups of a process allow, in whole cores, at least one."""
-    least = float(1 << 20)
-    with contextlib.suppress(OSError):
-        for controllers, folder in _folders_of_groups(cgroups, _read(process)):
-            names = ["cpu.cfs_quota_us", "cpu.cfs_period_us"] if controllers else ["cpu.max"]
-            with contextlib.suppress(OSError, ValueError):  # without the controller; "max" is no quota
-                quota, period = (int(number) for name in names for number in _read(folder / name).split())
-                if quota > 0 < period:
-                    least = min(least, quota / period)
-    return max(1, int(least))
-
-
-@functools.cache
-def _folders_of_groups(cgroups: Path, groups: bytes) -> list[tuple[list[str], Path]]:
-    """Return the folders of the control groups of a process, with their controllers (version 2: none)."""
-    found = []
-    for line in os.fsdecode(groups).splitlines():
-        _, names, group = line.split(":", 2)
-        controllers = names.split(",") if names else []
-        root = next((cgroups / name for name in ("memory", "cpu") if name in controllers), cgroups)
-        if controllers and root == cgroups:
-            continue
-        # in a container, the own group may be the root and others missing
-        own = root / group.lstrip("/")
-        for folder in (own, *own.parents):
-            found.append((controllers, folder))
-            if folder == root:
-                break
-    return found
-
-
 def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
     """Return limit less usage, without the file cache, which the kernel frees on demand."""
     allowed = _number_in(limit)
     if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is more than any machine has
         return None
     try:
-        used, known = _number_in(usage), _read(statistics).split()
+        used, known = _number_in(usage), read(statistics).split()
     except OSError:
         return None
     freed = dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0)
@@ -192,12 +145,6 @@ def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int
 def _number_in(path: str | Path) -> int | None:
     """Return the number in a file of the kernel; None if there is none."""
     try:
-        return int(_read(path))
+        return int(read(path))
     except (OSError, ValueError):
         return None
-
-
-def _read(path: str | Path) -> bytes:
-    """Read a file of the kernel, without buffers and text, which take longer than the file."""
-    with open(path, "rb", buffering=0) as file:
-        return file.read()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import functools
 import mmap
 import os
 import threading
@@ -12,15 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import ResourceError
+from .cores import CGROUPS, PROCESS, cores, folders_of_groups, read
 
 GB = 1e9
 # Bytes of address space: of the netCDF library, and of its buffers for fifty variables; of the second thread
 # of a run, for its stack and 64 MiB of malloc.
 _LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
 _NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
-
-
-CGROUPS, PROCESS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def available(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
@@ -31,7 +28,7 @@ def available(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
 def resident() -> int:
     """Return the resident memory (bytes) of this process, with the interpreter and all libraries."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        return int(_read("/proc/self/statm").split()[1]) * mmap.PAGESIZE
+        return int(read("/proc/self/statm").split()[1]) * mmap.PAGESIZE
     return _taken("rss")
 
 
@@ -46,18 +43,6 @@ def _taken(name: str) -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def cores(cgroups: Path = CGROUPS, process: Path = PROCESS) -> int:
-    """Return the number of cores that this process is bound to, within the quotas of its control groups."""
-    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(bound, _quota(cgroups, process))
-
-
-def limit_threads() -> None:
-    """Make OpenMP and BLAS, which know no quotas, start no more threads than a quota allows."""
-    if _quota(CGROUPS, PROCESS) < (os.cpu_count() or 1):
-        os.environ.setdefault("OMP_NUM_THREADS", str(cores()))
-
-
 def threads() -> int:
     """Return the number of threads of the core on large windows."""
     wanted = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
@@ -66,10 +51,10 @@ def threads() -> int:
 
 def require(needed: int, what: str, advice: str, there: int | None = None) -> None:
     """Raise an error if memory is short."""
-    from . import kernel_cache
+    from .kernel_cache import limit_growth
 
     there = available() if there is None else there
-    kernel_cache.limit_growth(there - needed)  # spectra of other cases give way to this one
+    limit_growth(there - needed)  # spectra of other cases give way to this one
     if needed > there:
         there = available()
     if needed > there:
@@ -92,7 +77,7 @@ def claim(needed: int) -> None:
 def _left_on_machine() -> int:
     """Return the memory (bytes) that the machine has left, by Linux itself or else by psutil."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        return int(_read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
+        return int(read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
     import psutil
 
     with contextlib.suppress(psutil.Error, OSError):
@@ -124,53 +109,15 @@ def _left_in_limits() -> Iterator[int]:
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
     """Yield the free bytes of each control group (version 1 or 2) that limits this process."""
     with contextlib.suppress(OSError):
-        for controllers, folder in _folders_of_groups(cgroups, _read(process)):
+        for controllers, folder in folders_of_groups(cgroups, read(process)):
             limit, usage, cache = "memory.limit_in_bytes", "memory.usage_in_bytes", b"total_inactive_file"
             if not controllers:
                 limit, usage, cache = "memory.max", "memory.current", b"inactive_file"
             with contextlib.suppress(OSError, ValueError):  # without the controller; "max" is no limit
-                allowed = int(_read(folder / limit))
+                allowed = int(read(folder / limit))
                 if allowed <= _NO_LIMIT:
-                    used, known = int(_read(folder / usage)), _read(folder / "memory.stat").split()
+                    used, known = int(read(folder / usage)), read(folder / "memory.stat").split()
                     # the kernel frees the file cache on demand
                     freed = int(dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0))
                     yield max(0, allowed - used + freed)
 
-
-@functools.cache
-def _quota(cgroups: Path, process: Path) -> int:
-    """Return the processor time that the control groups of a process allow, in whole cores, at least one."""
-    least = float(1 << 20)
-    with contextlib.suppress(OSError):
-        for controllers, folder in _folders_of_groups(cgroups, _read(process)):
-            names = ["cpu.cfs_quota_us", "cpu.cfs_period_us"] if controllers else ["cpu.max"]
-            with contextlib.suppress(OSError, ValueError):  # without the controller; "max" is no quota
-                quota, period = (int(number) for name in names for number in _read(folder / name).split())
-                if quota > 0 < period:
-                    least = min(least, quota / period)
-    return max(1, int(least))
-
-
-@functools.cache
-def _folders_of_groups(cgroups: Path, groups: bytes) -> list[tuple[list[str], Path]]:
-    """Return the folders of the control groups of a process, with their controllers (version 2: none)."""
-    found = []
-    for line in os.fsdecode(groups).splitlines():
-        _, names, group = line.split(":", 2)
-        controllers = names.split(",") if names else []
-        root = next((cgroups / name for name in ("memory", "cpu") if name in controllers), cgroups)
-        if controllers and root == cgroups:
-            continue
-        # in a container, the own group may be the root and others missing
-        own = root / group.lstrip("/")
-        for folder in (own, *own.parents):
-            found.append((controllers, folder))
-            if folder == root:
-                break
-    return found
-
-
-def _read(path: str | Path) -> bytes:
-    """Read a file of the kernel, without buffers and text, which take longer than the file."""
-    with open(path, "rb", buffering=0) as file:
-        return file.read()

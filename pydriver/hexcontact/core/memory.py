@@ -120,4 +120,3 @@ def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
                     # the kernel frees the file cache on demand
                     freed = int(dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0))
                     yield max(0, allowed - used + freed)
-

@@ -108,17 +108,17 @@ def deck_of(cases: NDArray[np.float64], tolerance: float) -> str:
     for number, (x, y, spin) in enumerate(MU * unit * cases):
         new, last = number == 0, number == len(cases) - 1
         lines += [
-            f" {2 * new}03100  P-B-T-N-F-S",
+            " 203100  P-B-T-N-F-S",
             f" 0{2 * new}{2 * new}0{2 * new}0  L-D-C-M-Z-E",
             f" 000{int(not new)}0{2 * last}0{int(last)}  X-H-G-I-A-O-W-R",
             f" 999 100 50 1 {tolerance:g}  MAXGS MAXIN MAXNR MAXOUT EPS",
             f" {load:.15g} {x:.15g} {y:.15g} {spin / a:.15g}  FN CKSI CETA CPHI",
             f" {MU} {MU}  FSTAT FKIN",
-            f" 0 {spacing:.15g} 1  CHI DQ VELOC",
         ]
         if new:
             corner, width = -spacing * SIDE / 2, f"{spacing:.15g} {spacing:.15g}"
             lines += [
+                f" 0 {spacing:.15g} 1  CHI DQ VELOC",
                 f" {RATIO} {RATIO} {modulus:.15g} {modulus:.15g}  POISS GG",
                 " 1  IPOTCN",
                 f" {SIDE} {SIDE} {corner:.15g} {corner:.15g} {width}  MX MY XL YL DX DY",

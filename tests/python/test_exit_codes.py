@@ -1,7 +1,5 @@
 """What a run exits with when signals come, and what a job that puts itself in line again makes of it."""
 
-import os
-import re
 import shutil
 import signal
 import subprocess
@@ -155,37 +153,18 @@ def complete(out: Path) -> None:
         complete,
     ],
 )
-def test_the_job_of_the_documentation_works_in_every_state(
-    tmp_path: Path, state: Callable[[Path], None]
-) -> None:
-    page = Path(__file__).parents[2] / "docs" / "restart.md"
-    if not page.exists():
-        pytest.skip("needs the documentation")
-    [script] = re.findall(r"```sh\n(#!/bin/bash\n.*?)```", page.read_text(), re.DOTALL)
-    (tmp_path / "job.sh").write_text(script)
+def test_one_command_starts_and_resumes_in_every_state(tmp_path: Path, state: Callable[[Path], None]) -> None:
     (tmp_path / "fretting.toml").write_text(DECK)
-    programs = {
-        "srun": 'exec "$@"',
-        "scontrol": 'echo "$@" >> requeued',
-        "hexcontact": f'exec "{sys.executable}" -m hexcontact "$@"',
-    }
-    (tmp_path / "bin").mkdir()
-    for name, line in programs.items():
-        (tmp_path / "bin" / name).write_text(f"#!/bin/sh\n{line}\n")
-        (tmp_path / "bin" / name).chmod(0o755)
     state(tmp_path / "fretting.nc")
-    slurm = {"SLURM_CPUS_PER_TASK": "1", "SLURM_JOB_ID": "7"}
-    path = os.pathsep.join([str(tmp_path / "bin"), ENVIRONMENT["PATH"]])
     done = subprocess.run(
-        ["bash", "job.sh"],
+        [sys.executable, "-m", "hexcontact", "run", "fretting.toml", "--resume"],
         cwd=tmp_path,
-        env=ENVIRONMENT | slurm | {"PATH": path},
+        env=ENVIRONMENT,
         capture_output=True,
         text=True,
         timeout=120,
     )
     assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "requeued").exists()
     assert open_result(tmp_path / "fretting.nc").complete
     assert not journal_of(tmp_path / "fretting.nc").exists()
 

@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..core import ranks
 from ..errors import DeckError
 from ..solve.interruption import signal_pipe
 from . import frame
 
 if TYPE_CHECKING:
+    from ..problem.problem import Problem
     from .solving import Messages
 
 
@@ -33,8 +33,9 @@ def run(
     settings: frame.Settings = None,
 ) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
+    from ..core import ranks
     from ..result.store import Store
-    from ..solve import log, restart
+    from ..solve import log
     from ..solve.run import metadata_of, require_shareable
     from .solving import Messages, overview, picture_beside, solved
 
@@ -51,7 +52,7 @@ def run(
             log.refuse_same(log_file, [target])
             if plot:  # refuses before the run
                 picture_beside(target)
-            if again and restart.was_begun(target, case):
+            if again and _was_begun(target, case):
                 ranks.refuse_copies("run --resume")
                 return _resumed(target, plot, messages, case=case)
             with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
@@ -77,12 +78,20 @@ def resume(
 
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
+    from ..core import ranks
     from .solving import Messages
 
     ranks.refuse_copies("resume")
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     with messages.logging(file):
         return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
+
+
+def _was_begun(target: Path, case: Problem) -> bool:
+    """Return whether a run left finished steps or a result."""
+    from ..solve.restart import was_begun
+
+    return was_begun(target, case)
 
 
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:

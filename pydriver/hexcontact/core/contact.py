@@ -334,7 +334,7 @@ class NormalContact(Contact):
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
         self._number: int | None = None  # of a problem of all ranks
         given = *self._surfaces, *checked(interface=interface, threads=threads)
-        if method == "fft" and ranks.count > 1:
+        if ranks.count > 1 and method == "fft":
             self._number = ranks.numbered(self)
             # without arrays that the lattice keeps
             ranks.order("create", self._number, replace(lattice), *given[1:2], *given[4:])

@@ -297,7 +297,7 @@ class History:
         problems = list(self._problems.values())
         if all(step.z.value < SMALLEST for step in self.steps):
             sentence = "expected a normal load or an approach above zero somewhere in the history"
-            if self._period:
+            if self._period and math.isfinite(self._period.mean_height):
                 height = quantity(self._period.mean_height, "m")
                 sentence = (
                     "expected a mean pressure above zero somewhere in the history, or a mean gap below "

@@ -23,6 +23,11 @@ module hc_interior_points
 
   public :: fields_at_points, check_body
 
+  !> Error at one of several depths, which threads compute.
+  type :: fault_t
+    type(error_t), allocatable :: error
+  end type fault_t
+
 contains
 
   !> Displacement and stress at points for a history of load steps.
@@ -132,7 +137,7 @@ contains
     type(depth_fields_t), allocatable, intent(out) :: fields(:)
     !> Allocated on failure: layers that images do not describe
     type(error_t), allocatable, intent(out) :: error
-    type(error_t), allocatable :: raised
+    type(fault_t), allocatable :: fault(:)
     integer, allocatable :: first(:)
     integer :: i, n
 
@@ -145,17 +150,15 @@ contains
       first(n) = i
       level(i) = n
     end do
-    allocate (fields(n))
-    !$omp parallel do schedule(dynamic) private(raised)
+    allocate (fields(n), fault(n))
+    !$omp parallel do schedule(dynamic)
     do i = 1, n
-      call new_depth_fields(fields(i), inside, depth(first(i)), raised)
-      if (allocated(raised)) then
-        !$omp critical
-        error = raised
-        !$omp end critical
-      end if
+      call new_depth_fields(fields(i), inside, depth(first(i)), fault(i)%error)
     end do
     !$omp end parallel do
+    do i = 1, n
+      if (allocated(fault(i)%error)) error = fault(i)%error
+    end do
   end subroutine find_levels
 
   !> Refuse the number of a body that there is not.

@@ -1,4 +1,4 @@
-"""Load adaptive load steps: their error is measured, bounded, and as small as was asked for."""
+"""Adaptive load steps: their error is measured, bounded, and as small as was asked for."""
 
 import contextlib
 import io
@@ -330,7 +330,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
     result = case.run(out, progress=Lines(stream))
     first, doubt, *lines = stream.getvalue().splitlines()
-    assert first == "Demo: adaptive load steps"
+    assert first == "Demo: load steps chosen during the run"
     assert doubt.startswith("warning: 5 spacings in the contact radius")
     assert lines[0].startswith("step   1 (") and "(100%)" in lines[-1]
     assert " ± " in lines[-1]

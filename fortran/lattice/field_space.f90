@@ -26,7 +26,7 @@ module hc_field_space
     !> Number of threads
     integer :: threads = 1
     !> Ranks that share the rows of the window; by default this one holds all
-    type(communicator_t) :: ranks
+    type(communicator_t) :: ranks = communicator_t()
     !> Memory that the transforms of a solver share; not there: each has its own
     type(scratch_t), pointer :: scratch => null()
   contains

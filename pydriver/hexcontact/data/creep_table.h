@@ -20,13 +20,13 @@ typedef struct {
   double *axis[3], *loads;
 } creep_table;
 
-static void creep_table_free(creep_table *table) {
+static inline void creep_table_free(creep_table *table) {
   for (int d = 0; d < 3; d++) free(table->axis[d]);
   free(table->loads);
 }
 
 /* Return 0, or 1 if the file cannot be read. */
-static int creep_table_read(creep_table *table, const char *path) {
+static inline int creep_table_read(creep_table *table, const char *path) {
   FILE *file = fopen(path, "r");
   int c, good;
   if (!file) return 1;
@@ -53,7 +53,7 @@ static int creep_table_read(creep_table *table, const char *path) {
 }
 
 /* Weights of four values from the returned index on. */
-static int creep_table_weights(const double *axis, int count, double at, double weight[4]) {
+static inline int creep_table_weights(const double *axis, int count, double at, double weight[4]) {
   int left = 0, first, j;
   for (int m = 0; m < 4; m++) weight[m] = 0.0;
   while (left < count - 2 && at >= axis[left + 1]) left++;
@@ -75,7 +75,7 @@ static int creep_table_weights(const double *axis, int count, double at, double 
 }
 
 /* Loads along x and y [N] and torque [N m] on body 1. */
-static void creep_table_loads(const creep_table *table, double creepage_x, double creepage_y, double spin, double loads[3]) {
+static inline void creep_table_loads(const creep_table *table, double creepage_x, double creepage_y, double spin, double loads[3]) {
   double at[3] = {creepage_x - spin * table->pole[1], creepage_y + spin * table->pole[0], spin};
   double sign_x = 1.0, sign = 1.0, over = 1.0, weight[3][4];
   int first[3];

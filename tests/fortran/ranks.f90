@@ -1,9 +1,9 @@
-!> Tests of what several ranks do together; mpirun starts this program with some numbers of ranks.
-program ranks_tester
+!> Tests of what several ranks do together.
+module ranks_tests
   use, intrinsic :: iso_c_binding, only: c_loc
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_communicator, only: communicator_t, start_ranks, end_ranks
+  use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
@@ -13,18 +13,14 @@ program ranks_tester
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
-  use testing, only: test_t, new_test, suite_t, new_suite, run_suites, check, check_true
+  use testing, only: test_t, new_test, check, check_true
   implicit none
+  private
 
+  public :: collect, ranks
+
+  !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
-  integer :: n_failed
-
-  call start_ranks(ranks)
-  ranks%least_nodes = 1
-  call run_suites([new_suite('ranks', collect)], n_failed)
-  call end_ranks(ranks)
-  if (n_failed > 0) stop 1, quiet=.true.
-  stop 0, quiet=.true.
 
 contains
 
@@ -325,4 +321,21 @@ contains
     call compare_contacts(lattice, gap, candidate, unilateral_t(), force_control, 40.0_wp, 1.0e-9_wp, error)
   end subroutine test_rough
 
+end module ranks_tests
+
+!> Run them; mpirun starts this program with some numbers of ranks.
+program ranks_tester
+  use hc_communicator, only: start_ranks, end_ranks
+  use testing, only: new_suite, run_suites
+  use ranks_tests, only: collect, ranks
+  implicit none
+
+  integer :: n_failed
+
+  call start_ranks(ranks)
+  ranks%least_nodes = 1
+  call run_suites([new_suite('ranks', collect)], n_failed)
+  call end_ranks(ranks)
+  if (n_failed > 0) stop 1, quiet=.true.
+  stop 0, quiet=.true.
 end program ranks_tester

@@ -22,6 +22,7 @@ module hc_layered_pair
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
   use hc_layer_response, only: layer_t, layered_body_t, n_response, of_normal, of_along, of_across, of_coupling
   use hc_image_fit, only: image_depths, wave_numbers, fit_images
+  use hc_periodic_symbol, only: sinc
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_fields, only: n_derivative, psi, chi_x, chi_y, omega_xx, omega_xy, omega_yy
   implicit none
@@ -522,13 +523,5 @@ contains
     block(0, 1) = compliance(1)
     if (size(block, 2) > 1) block(0, [2, 4]) = compliance(2)
   end subroutine column
-
-  !> Compute sin(x)/x.
-  elemental real(wp) function sinc(x)
-    real(wp), intent(in) :: x
-
-    sinc = 1.0_wp
-    if (abs(x) > 1.0e-8_wp) sinc = sin(x)/x
-  end function sinc
 
 end module hc_layered_pair

@@ -22,7 +22,7 @@ module hc_periodic_symbol
   implicit none
   private
 
-  public :: periodic_symbols_t, new_periodic_symbols, n_symbol
+  public :: periodic_symbols_t, new_periodic_symbols, sinc, n_symbol
 
   !> Symbols of K1, K_xx, K_xy, and those of K_x and K_y over i.
   integer, parameter :: n_symbol = 5

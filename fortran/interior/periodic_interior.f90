@@ -25,6 +25,7 @@ module hc_periodic_interior
   use hc_depth_fields, only: depth_fields_t
   use hc_interior_fields, only: n_derivative, xx, yy, zz, xy, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
+  use hc_periodic_symbol, only: sinc
   !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
@@ -581,13 +582,5 @@ contains
       end do
     end associate
   end subroutine transform_near
-
-  !> Compute sin(x)/x.
-  elemental real(wp) function sinc(x)
-    real(wp), intent(in) :: x
-
-    sinc = 1.0_wp
-    if (abs(x) > 1.0e-8_wp) sinc = sin(x)/x
-  end function sinc
 
 end module hc_periodic_interior

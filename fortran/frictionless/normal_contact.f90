@@ -96,6 +96,9 @@ contains
     if (present(cache)) self%cache => cache
     if (present(options)) self%options = options
     call check_operator(lattice, medium, error, n_threads)
+    if (lattice%is_periodic() .and. self%ranks%size > 1 .and. .not. allocated(error)) then
+      call raise(error, status%invalid_input, 'a window that repeats: expected one process, since several do not solve it')
+    end if
     if (allocated(error)) return
     allocate (self%level(level_count(lattice, self%options%multilevel%smallest_side)))
     allocate (self%scratch)

@@ -6,6 +6,7 @@ module hc_window_growth
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, add_fields, add_history, normal
   use hc_contact_solver, only: friction_solver_t
   implicit none
@@ -20,16 +21,23 @@ module hc_window_growth
 contains
 
   !> Return a window with more nodes on each side that a contact reaches.
-  pure type(lattice_t) function grown_window(lattice, contact) result(larger)
+  type(lattice_t) function grown_window(lattice, contact, space) result(larger)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Nodes in contact (n_col, n_row)
+    !> Nodes in contact (n_col, own rows)
     logical, intent(in) :: contact(:, :)
-    integer :: more(2), low(2), high(2)
+    !> Space of the fields; absent: one rank
+    type(field_space_t), intent(in), optional :: space
+    type(field_space_t) :: own
+    integer :: more(2), low(2), high(2), reached(4)
 
+    if (present(space)) own = space
+    reached = merge(1, 0, [any(contact(1, :)), any(contact(:, 1)) .and. own%ranks%rank == 0, any(contact(size(contact, 1), :)), &
+                           any(contact(:, size(contact, 2))) .and. own%ranks%rank == own%ranks%size - 1])
+    call own%ranks%add_counts(reached)
     more = max(fewest, ceiling(growth*lattice%extent))
-    low = merge(more, 0, [any(contact(1, :)), any(contact(:, 1))])
-    high = merge(more, 0, [any(contact(size(contact, 1), :)), any(contact(:, size(contact, 2)))])
+    low = merge(more, 0, reached(:2) > 0)
+    high = merge(more, 0, reached(3:) > 0)
     larger = lattice
     larger%first = lattice%first - low
     larger%extent = lattice%extent + low + high

@@ -53,7 +53,6 @@ def run(
             if plot:  # refuses before the run
                 picture_beside(target)
             if again and _was_begun(target, case):
-                ranks.refuse_copies("run --resume")
                 return _resumed(target, plot, messages, case=case)
             with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
                 extent = solved(case, store, pipe, deck.stem, messages)
@@ -81,10 +80,12 @@ def resume(
     from ..core import ranks
     from .solving import Messages
 
-    ranks.refuse_copies("resume")
     messages = Messages("resume", quiet, as_json, log_file, log_level)
-    with messages.logging(file):
-        return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
+    with ranks.together() as first:
+        if not first:
+            return None
+        with messages.logging(file):
+            return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
 
 
 def _was_begun(target: Path, case: Problem) -> bool:
@@ -97,10 +98,12 @@ def _was_begun(target: Path, case: Problem) -> bool:
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
     """Resume the run of an output, with the case or the overrides of `restart.reopened`."""
     from ..solve import restart
+    from ..solve.run import require_shareable
     from .solving import overview, picture_beside, solved, with_tables
 
     with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
         if again is not None:
+            require_shareable(again.case)
             if plot:
                 picture_beside(again.store.path)
             if again.warning:

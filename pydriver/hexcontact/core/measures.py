@@ -129,13 +129,17 @@ def measures(
     if isinstance(solution, ContactState):
         found: dict[str, float] = flat.measure_friction(lattice, friction, *given)._asdict()
     else:
-        found = flat.measure_pressure(lattice, *given)._asdict()
-        found = {name: value for name, value in found.items() if not VARIABLES[name].frictional}
+        found = without_friction(flat.measure_pressure(lattice, *given))
     if lattice.periodic:  # no edges, and no place of a zone
         found = {
             name: value for name, value in found.items() if VARIABLES[name].required or not math.isnan(value)
         }
     return found
+
+
+def without_friction(found: Any) -> dict[str, float]:
+    """Return those measures of the core that a contact without friction has."""
+    return {name: value for name, value in found._asdict().items() if not VARIABLES[name].frictional}
 
 
 def turning_points(values: Array) -> list[int]:

@@ -19,7 +19,7 @@ module hc_convolution
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
-  use hc_communicator, only: block_layout_t
+  use hc_communicator, only: communicator_t, block_layout_t
   use hc_field_space, only: field_space_t
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
@@ -67,6 +67,9 @@ module hc_convolution
     real(wp) :: whole = 0.0_wp
     !> Space of the fields
     type(field_space_t) :: space
+    !> Ranks that share the transforms; rows before the first of this one where each holds all rows of the fields
+    type(communicator_t), private :: ranks
+    integer, private :: rows_before = 0
     !> Transform lengths along the two lattice directions
     integer :: padded(2) = 0
     !> Columns in a block, number of blocks of this rank, and columns before the first of them
@@ -153,12 +156,13 @@ contains
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
     self%n_row = extent(2)
-    if (space%ranks%size > 1) then
-      self%before = self%width*(space%ranks%first_item(self%n_block) - 1)
-      self%n_block = space%ranks%last_item(self%n_block) - space%ranks%first_item(self%n_block) + 1
-      associate (own => space%own_extent(extent))
-        self%n_row = own(2)
-      end associate
+    self%ranks = space%ranks
+    if (space%helpers%size > 1) self%ranks = space%helpers
+    if (self%ranks%size > 1) then
+      self%before = self%width*(self%ranks%first_item(self%n_block) - 1)
+      self%n_block = self%ranks%last_item(self%n_block) - self%ranks%first_item(self%n_block) + 1
+      self%n_row = self%ranks%last_row(extent(2)) - self%ranks%first_row(extent(2)) + 1
+      if (space%helpers%size > 1) self%rows_before = self%ranks%first_row(extent(2)) - 1
     end if
     self%own_leading = self%n_block*self%width
     self%held%place = address(self%held)
@@ -166,7 +170,7 @@ contains
     if (.not. associated(self%held%scratch)) allocate (self%held%scratch)
     self%n_rows = int(self%leading, int64)*even(self%n_row)*n_component
     self%n_work = self%n_rows
-    if (space%ranks%size > 1) self%n_work = self%n_work + int(self%own_leading, int64)*even(extent(2))*n_component
+    if (self%ranks%size > 1) self%n_work = self%n_work + int(self%own_leading, int64)*even(extent(2))*n_component
     bytes = self%n_work*(storage_size((1.0_wp, 0.0_wp))/8)
     if (present(beside)) bytes = bytes + beside
     call self%held%scratch%reserve(bytes, stat)
@@ -178,7 +182,7 @@ contains
     else
       call make_plans(self, error)
     end if
-    call space%ranks%agree(error)
+    call self%ranks%agree(error)
   end subroutine new_convolution
 
   !> Take the spectra from a cache, or allocate zero ones that are to be computed.
@@ -207,7 +211,7 @@ contains
     allocate (self%held%spectrum)
     call self%held%spectrum%reserve(shape_wanted, self%spectrum, stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
-    call self%space%ranks%agree(error)
+    call self%ranks%agree(error)
     if (.not. allocated(error)) self%spectrum = 0.0_wp
   end subroutine find_spectra
 
@@ -218,7 +222,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     is_kept = .false.
-    if (present(cache)) is_kept = associated(cache) .and. self%space%ranks%size == 1
+    if (present(cache)) is_kept = associated(cache) .and. self%ranks%size == 1
   end function is_kept
 
   !> Store complete spectra in the cache.
@@ -275,11 +279,11 @@ contains
     n = self%extent
     n_kernel = size(self%spectrum, 3)
     scale = 1.0_wp/(real(self%padded(1), wp)*real(self%padded(2), wp))
-    first = self%space%ranks%first_row(n(2)) - 1
+    first = self%ranks%first_row(n(2)) - 1
     allocate (rows(self%leading, first:first + even(self%n_row) - 1, n_kernel), stat=stat)
-    if (stat == 0 .and. self%space%ranks%size > 1) allocate (columns(self%own_leading, even(n(2)), n_kernel), stat=stat)
+    if (stat == 0 .and. self%ranks%size > 1) allocate (columns(self%own_leading, even(n(2)), n_kernel), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
-    call self%space%ranks%agree(error)
+    call self%ranks%agree(error)
     if (allocated(error)) return
 
     thread = 1
@@ -307,8 +311,8 @@ contains
     end do
     !$omp end do
     !$omp end parallel
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_columns(layout_of(self, n_kernel), c_loc(rows), c_loc(columns))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_columns(layout_of(self, n_kernel), c_loc(rows), c_loc(columns))
       call move_alloc(columns, rows)
     end if
     call transform_kernel_columns(self, rows)
@@ -417,7 +421,7 @@ contains
     integer, intent(in) :: n_component
 
     call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(self%n_row), n_component])
-    if (self%space%ranks%size > 1) then
+    if (self%ranks%size > 1) then
       call c_f_pointer(self%held%scratch%place(self%n_rows*(storage_size((1.0_wp, 0.0_wp))/64)), self%lines, &
                        [self%own_leading*even(self%extent(2)), n_component])
     else
@@ -446,13 +450,13 @@ contains
     do i = 1, size(field, 3)
       !$omp do schedule(static)
       do row = 1, self%n_row, 2
-        call transform_rows(self, row, i, thread, field(:, :, i))
+        call transform_rows(self, row, i, thread, field(:, self%rows_before + 1:self%rows_before + self%n_row, i))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_columns(layout_of(self, size(self%work, 3)), c_loc(self%work), c_loc(self%lines))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_columns(layout_of(self, size(self%work, 3)), c_loc(self%work), c_loc(self%lines))
     end if
   end subroutine transform_fields
 
@@ -482,8 +486,8 @@ contains
     integer :: n(2), o, row, thread
 
     n = [self%extent(1), self%n_row]
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
     end if
     thread = 1
     !$omp parallel num_threads(self%space%threads) private(o, row) firstprivate(thread)
@@ -496,15 +500,34 @@ contains
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
           call fftw_execute_dft(self%held%plans%row, joined, transformed)
-          result(:, row, o) = self%factor*real(transformed(:n(1)), wp)
-          if (row < n(2)) result(:, row + 1, o) = -self%factor*aimag(transformed(:n(1)))
+          associate (both => result(:, self%rows_before + row:self%rows_before + min(row + 1, n(2)), o))
+            both(:, 1) = self%factor*real(transformed(:n(1)), wp)
+            if (row < n(2)) both(:, 2) = -self%factor*aimag(transformed(:n(1)))
+          end associate
         end associate
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
+    if (self%space%helpers%size > 1) call gather_rows(self, result)
     if (perturb_convolution) call perturb(result)
   end subroutine transform_back
+
+  !> Take the rows that other ranks computed.
+  subroutine gather_rows(self, result)
+    class(convolution_t), intent(in) :: self
+    !> Sums of the convolutions, of which own rows are known (n_col, n_row, onto)
+    real(wp), intent(inout), contiguous, target :: result(:, :, :)
+    integer, parameter :: word = 32
+    real(wp), allocatable, target :: own(:, :)
+    integer :: o
+
+    do o = 1, size(result, 3)
+      own = result(:, self%rows_before + 1:self%rows_before + self%n_row, o)
+      call self%ranks%fetch(self%extent(1)*(storage_size(1.0_wp)/word), self%extent(2), c_loc(own), [1, self%extent(2)], &
+                            c_loc(result(1, 1, o)))
+    end do
+  end subroutine gather_rows
 
   !> Change every value by two units in the last place of the largest one; the parity of the bits of the value decides the sign.
   pure subroutine perturb(result)

@@ -66,7 +66,12 @@ def launched(folder: Path, ranks: int, *words: str) -> subprocess.Popen[str]:
 @with_mpi
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_several_processes_write_the_file_of_one(ranks: int, tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED)
+    compare_with_one(tmp_path, ranks, PRESSED)
+
+
+def compare_with_one(tmp_path: Path, ranks: int, deck: str) -> None:
+    """Compare the file of several processes with that of one."""
+    (tmp_path / "sphere.toml").write_text(deck)
     assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
     process = launched(tmp_path, ranks, "run", "sphere.toml", "--output", "all.nc")
     out, err = process.communicate(timeout=PATIENCE)
@@ -79,13 +84,42 @@ def test_several_processes_write_the_file_of_one(ranks: int, tmp_path: Path) -> 
 
 
 @with_mpi
-def test_friction_is_refused_by_several_processes(tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(DECK)
+def test_periodic_windows_are_refused_by_several_processes(tmp_path: Path) -> None:
+    periodic = PRESSED.replace("nodes_in_radius = 20", 'boundary = "periodic"\nspacing = "5 um"')
+    (tmp_path / "sphere.toml").write_text(periodic)
     process = launched(tmp_path, 2, "run", "sphere.toml")
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
-    assert err.count("friction: several processes solve contacts without friction") == 1
+    assert err.count("grid.boundary: several processes solve contacts in windows that end") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.toml"]
+
+
+SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]") + (
+    '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n'
+)
+WORN = """
+[[load]]
+label = "fretting"
+path = [{ tangential_load_x = "-2 N" }, { tangential_load_x = "2 N" }]
+[wear]
+coefficient_1 = "1e-14 m^2/N"
+cycle = "fretting"
+cycles = 1_000
+"""
+
+
+@with_mpi
+@pytest.mark.parametrize(
+    ("ranks", "deck"),
+    [
+        (2, SHEARED),
+        (3, SHEARED.replace('"72 GPa"', '"432 GPa"').replace("in_radius = 20", "in_radius = 95")),
+        (2, SHEARED.replace("steps = 2", "") + WORN),
+    ],
+    ids=["unlike", "alike", "worn"],
+)
+def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
+    compare_with_one(tmp_path, ranks, deck)
 
 
 @with_mpi

@@ -46,10 +46,9 @@ def require_shareable(case: Problem) -> None:
     """Refuse a case that several processes do not solve together."""
     if ranks.count == 1:
         return
-    key = "friction" if case.frictional else "grid.boundary" if case.period is not None else ""
-    if key:
+    if case.period is not None:
         raise DeckError(
-            f"{key}: several processes solve contacts without friction in windows that end; expected "
+            "grid.boundary: several processes solve contacts in windows that end; expected "
             "one process. Start it without mpirun, and set OMP_NUM_THREADS to use more cores"
         )
 

@@ -46,11 +46,10 @@ def require_shareable(case: Problem) -> None:
     """Refuse a case that several processes do not solve together."""
     if ranks.count == 1:
         return
-    key = "friction" if case.frictional else "grid.boundary" if case.period is not None else ""
-    if key:
+    if case.frictional:
         raise DeckError(
-            f"{key}: several processes solve contacts without friction in windows that end; expected "
-            "one process. Start it without mpirun, and set OMP_NUM_THREADS to use more cores"
+            "friction: several processes solve contacts without friction; expected one process. Start it "
+            "without mpirun, and set OMP_NUM_THREADS to use more cores"
         )
 
 

@@ -124,30 +124,27 @@ module hc_convolution
 contains
 
   !> Make plans and scratch space for convolutions over a window; the spectra come next, by `find_spectra`.
-  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd, beside)
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, beside)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Transform lengths, the first one a multiple of four; 2*extent - 1 at least unless the convolution is periodic
     integer, intent(in) :: padded(2)
-    !> Number of kernels, and of components of the fields
-    integer, intent(in) :: n_kernel, n_component
+    !> Numbers of even and of odd kernels, which follow, and of components of the fields
+    integer, intent(in) :: n_kernel(2), n_component
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory, a length FFTW cannot plan
     type(error_t), allocatable, intent(out) :: error
-    !> The first odd kernel; absent: all are even
-    integer, intent(in), optional :: first_odd
     !> Bytes of memory beside the row transforms; absent: none
     integer(int64), intent(in), optional :: beside
     integer(int64) :: bytes
     integer :: stat
 
     self%space = space
-    self%n_kernel = n_kernel
-    self%first_odd = n_kernel + 1
-    if (present(first_odd)) self%first_odd = first_odd
+    self%n_kernel = sum(n_kernel)
+    self%first_odd = n_kernel(1) + 1
     self%extent = extent
     self%padded = padded
     self%n_frequency = padded(1)/2 + 1

@@ -76,7 +76,7 @@ contains
     class(elastic_medium_t), allocatable :: reduced
     type(kernel_key_t) :: key
     type(field_space_t) :: shared
-    integer :: first_odd, n_kernel, i
+    integer :: n_kernel(2), i
     logical :: only_normal, found
 
     call check_operator(lattice, medium, error)
@@ -91,16 +91,16 @@ contains
     operator%n_component = merge(1, 3, only_normal)
     operator%index = block_index
     source%transformed = [(i, i=1, n_block)]
-    first_odd = n_even + 1
     if (medium%trace() > 0.0_wp) then
       operator%index = spectrum_index
       source%transformed = with_trace
-      first_odd = n_even
     end if
-    n_kernel = merge(1, spectra_of(medium), only_normal)
-    operator%at_once = components_at_once(n_kernel)
+    n_kernel = [1, 0]
+    if (.not. only_normal) n_kernel(1) = n_even - merge(1, 0, medium%trace() > 0.0_wp)
+    if (.not. only_normal) n_kernel(2) = spectra_of(medium) - n_kernel(1)
+    operator%at_once = components_at_once(sum(n_kernel))
     call new_convolution(operator%convolution, lattice%extent, transform_length(lattice), n_kernel, operator%at_once, &
-                         shared, error, first_odd=first_odd)
+                         shared, error)
     if (allocated(error)) return
     operator%convolution%factor = medium%unit(lattice%spacing())
     operator%convolution%whole = medium%trace()

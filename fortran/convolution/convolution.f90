@@ -96,6 +96,8 @@ module hc_convolution
     procedure :: convolve, convolve_in_place
     !> Memory beside the row transforms, whose content is lost when another convolution uses the scratch
     procedure :: beside
+    !> The memory of the row transforms itself, for fields that are transformed in their place
+    procedure :: in_place
     !> Take spectra from a cache, and store them there
     procedure :: find_spectra, store_spectra
     !> Spectra of kernels given at the lattice offsets
@@ -125,30 +127,27 @@ module hc_convolution
 contains
 
   !> Make plans and scratch space for convolutions over a window; the spectra come next, by `find_spectra`.
-  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd, beside)
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, beside)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Transform lengths, the first one a multiple of four; 2*extent - 1 at least unless the convolution is periodic
     integer, intent(in) :: padded(2)
-    !> Number of kernels, and of components of the fields
-    integer, intent(in) :: n_kernel, n_component
+    !> Numbers of even and of odd kernels, which follow, and of components of the fields
+    integer, intent(in) :: n_kernel(2), n_component
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory, a length FFTW cannot plan
     type(error_t), allocatable, intent(out) :: error
-    !> The first odd kernel; absent: all are even
-    integer, intent(in), optional :: first_odd
     !> Bytes of memory beside the row transforms; absent: none
     integer(int64), intent(in), optional :: beside
     integer(int64) :: bytes
     integer :: stat
 
     self%space = space
-    self%n_kernel = n_kernel
-    self%first_odd = n_kernel + 1
-    if (present(first_odd)) self%first_odd = first_odd
+    self%n_kernel = sum(n_kernel)
+    self%first_odd = n_kernel(1) + 1
     self%extent = extent
     self%padded = padded
     self%n_frequency = padded(1)/2 + 1
@@ -436,23 +435,60 @@ contains
     beside = self%held%scratch%place(self%n_work*(storage_size((1.0_wp, 0.0_wp))/64))
   end function beside
 
+  !> Point to the memory of the row transforms, for fields of the window; to nothing where their transforms have no room behind them.
+  !>
+  !> Pairs of rows that are transformed from the last one on never reach one that is still to be read, and back from the first one on.
+  function in_place(self, n_component) result(field)
+    class(convolution_t), intent(in) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+    real(wp), pointer, contiguous :: field(:)
+
+    field => null()
+    if (self%ranks%size > 1 .or. self%leading < self%extent(1)) return
+    if (int(self%leading, int64)*even(self%n_row)*n_component > self%n_rows) return
+    call c_f_pointer(self%held%scratch%place(), field, [product(self%extent)*n_component])
+  end function in_place
+
+  !> Return the ends of the stages in which pairs of rows are transformed: one stage, but for fields in the memory of their
+  !> transforms, where a stage begins so late that these lie behind all of its rows.
+  function stages_of(self, field) result(last)
+    class(convolution_t), intent(in) :: self
+    !> Fields (n_col, n_row, component)
+    real(wp), intent(in), contiguous, target :: field(:, :, :)
+    !> Pairs before the first stage, 0, and up to the end of each
+    integer, allocatable :: last(:)
+
+    last = [(self%n_row + 1)/2*size(field, 3)]
+    if (c_associated(c_loc(field), self%held%scratch%place())) then
+      do while (last(1) > 1)
+        last = [(last(1) + 1)/2, last]
+      end do
+    end if
+    last = [0, last]
+  end function stages_of
+
   !> Transform the rows of fields.
   subroutine transform_fields(self, field)
     class(convolution_t), intent(inout) :: self
     !> Fields to be convolved (n_col, n_row, from)
-    real(wp), intent(in), contiguous :: field(:, :, :)
-    integer :: i, row, thread
+    real(wp), intent(in), contiguous, target :: field(:, :, :)
+    integer, allocatable :: last(:)
+    integer :: stage, pair, n, thread
 
+    n = (self%n_row + 1)/2
+    last = stages_of(self, field)
     thread = 1
-    !$omp parallel num_threads(self%space%threads) private(i, row) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(stage, pair) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     self%row_buffer(self%extent(1) + 1:, 1, thread) = 0.0_wp
-    do i = 1, size(field, 3)
+    do stage = size(last), 2, -1
       !$omp do schedule(static)
-      do row = 1, self%n_row, 2
-        call transform_rows(self, row, i, thread, field(:, self%rows_before + 1:self%rows_before + self%n_row, i))
+      do pair = last(stage - 1), last(stage) - 1
+        call transform_rows(self, 2*modulo(pair, n) + 1, pair/n + 1, thread, &
+                            field(:, self%rows_before + 1:self%rows_before + self%n_row, pair/n + 1))
       end do
-      !$omp end do nowait
+      !$omp end do
     end do
     !$omp end parallel
     if (self%ranks%size > 1) then
@@ -482,19 +518,23 @@ contains
   subroutine transform_back(self, result)
     class(convolution_t), intent(inout) :: self
     !> Sums of the convolutions (n_col, n_row, onto)
-    real(wp), intent(inout), contiguous :: result(:, :, :)
-    integer :: n(2), o, row, thread
+    real(wp), intent(inout), contiguous, target :: result(:, :, :)
+    integer, allocatable :: last(:)
+    integer :: n(2), stage, pair, o, row, thread
 
     n = [self%extent(1), self%n_row]
     if (self%ranks%size > 1) then
       call self%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
     end if
+    last = stages_of(self, result)
     thread = 1
-    !$omp parallel num_threads(self%space%threads) private(o, row) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(stage, pair, o, row) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    do o = 1, size(result, 3)
+    do stage = 2, size(last)
       !$omp do schedule(static)
-      do row = 1, n(2), 2
+      do pair = last(stage - 1), last(stage) - 1
+        o = pair/((n(2) + 1)/2) + 1
+        row = 2*modulo(pair, (n(2) + 1)/2) + 1
         ! an odd last row has no companion, but values of earlier products
         if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
@@ -506,7 +546,7 @@ contains
           end associate
         end associate
       end do
-      !$omp end do nowait
+      !$omp end do
     end do
     !$omp end parallel
     if (self%space%helpers%size > 1) call gather_rows(self, result)
@@ -556,17 +596,15 @@ contains
     class(convolution_t), intent(inout) :: self
     !> Index of the first row, of the component, and of the thread, whose buffer is zero beyond the window and stays so
     integer, intent(in) :: row, component, thread
-    !> Field (n_col, n_row)
-    real(wp), intent(in), contiguous :: field(:, :)
+    !> Field (n_col, n_row), which may lie in the place of its transforms
+    real(wp), intent(in), contiguous, target :: field(:, :)
     integer :: last
 
     last = min(row + 1, self%n_row)
-    ! the columns that only fill up the last block are transformed, too
-    self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
     associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
       ! rows off the contact need no transform
       if (all(abs(field(:, row:last)) <= 0.0_wp)) then
-        self%work(:self%n_frequency, row:row + 1, component) = 0.0_wp
+        self%work(:, row:row + 1, component) = 0.0_wp
         return
       end if
       if (last > row) then
@@ -578,6 +616,8 @@ contains
       call split_rows(transformed, self%work(:self%n_frequency, row, component), &
                       self%work(:self%n_frequency, row + 1, component))
     end associate
+    ! the columns that only fill up the last block are transformed, too
+    self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
   end subroutine transform_rows
 
   !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).

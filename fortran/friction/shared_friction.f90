@@ -8,6 +8,7 @@ module hc_shared_friction
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_communicator, only: communicator_t, wait_for_words
+  use hc_field_space, only: space_over
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields
   use hc_contact_problem, only: friction_problem_t
@@ -74,7 +75,8 @@ contains
     call spread_mask(ranks, self%problem%candidate)
     call new_windowed_friction(self%part, self%problem, error, n_threads, cache, ranks)
     call ranks%agree(error)
-    self%problem%space = self%part%problem%space
+    ! what a path computes by itself, it computes on the first rank alone
+    self%problem%space = space_over(self%problem%lattice%extent, n_threads)
   end subroutine new_shared_friction
 
   !> Take a field of the first rank onto all of them.

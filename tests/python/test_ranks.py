@@ -18,7 +18,9 @@ from hexcontact.result.journal import journal_of
 PRESSED = DECK.replace("[friction]\ncoefficient = 0.2\n", "").replace(
     "nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]"
 )
-WAVES = PRESSED.partition("surface")[0].strip() + """
+WAVES = (
+    PRESSED.partition("surface")[0].strip()
+    + """
 [body.1.surface]
 shape = "formula"
 expression = "1e-6*(2 - cos(2*pi*x/1e-3)*cos(2*pi*y/1e-3) - 0.5*sin(2*pi*(3*x/1e-3 + y/1e-3)))"
@@ -34,8 +36,11 @@ steps = 2
 [[load]]
 mean_gap = "0.2 um"
 """
+)
 ODD_WAVES = WAVES.replace("y/1e-3", "y/1.004e-3").replace("x/1e-3", "x/1.056e-3")  # 251 rows
-ODD_WAVES = ODD_WAVES.replace('["1 mm", "1 mm"]\nnodes_across = 260', '["1.056 mm", "1.004 mm"]\nspacing = "4 um"')
+ODD_WAVES = ODD_WAVES.replace(
+    '["1 mm", "1 mm"]\nnodes_across = 260', '["1.056 mm", "1.004 mm"]\nspacing = "4 um"'
+)
 REFINED = PRESSED.replace("nodes_in_radius = 20\nwindow = [261, 300]", "nodes_in_radius = 52") + (
     "\n[accuracy]\ntarget = 0.05\nmax_nodes = 100_000\n"
 )
@@ -46,9 +51,7 @@ with_mpi = pytest.mark.skipif("MPI: yes" not in flat.BUILT, reason="this build h
     ("variable", "launcher"),
     [("OMPI_COMM_WORLD_SIZE", "mpirun"), ("PMI_SIZE", "mpirun"), ("SLURM_STEP_NUM_TASKS", "srun")],
 )
-@pytest.mark.parametrize(
-    "words", [("run", "sphere.toml"), ("resume", "sphere.nc"), ("study", "sphere.toml")]
-)
+@pytest.mark.parametrize("words", [("run", "sphere.toml"), ("resume", "sphere.nc"), ("study", "sphere.toml")])
 def test_copies_are_refused(
     words: tuple[str, ...], variable: str, launcher: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,7 +131,9 @@ with ranks.together() as first:
 def test_a_window_grows_as_in_one_process(tmp_path: Path) -> None:
     (tmp_path / "sphere.toml").write_text(PRESSED.replace("window = [261, 300]", ""))
     (tmp_path / "growing.py").write_text(GROWING)
-    alone = subprocess.run([sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False)
+    alone = subprocess.run(
+        [sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False
+    )
     assert alone.returncode == 0
     process = launched(tmp_path, 2, "all.nc", program=("growing.py",))
     out, err = process.communicate(timeout=PATIENCE)

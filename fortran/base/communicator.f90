@@ -127,7 +127,8 @@ module hc_communicator
     module subroutine tell(self, values, rank)
       class(communicator_t), intent(in) :: self
       integer(int32), intent(in), contiguous :: values(:)
-      integer, intent(in) :: rank
+      !> Rank; absent: each of the others
+      integer, intent(in), optional :: rank
     end subroutine tell
 
     !> Wait, without use of the processor, until the first rank sends words; return their number.

@@ -218,7 +218,14 @@ contains
 
   !> Send words.
   module procedure tell
-    call MPI_Send(values, size(values), MPI_INTEGER4, rank, told, world(self))
+    integer :: r
+
+    do r = 1, self%size - 1
+      if (present(rank)) then
+        if (r /= rank) cycle
+      end if
+      call MPI_Send(values, size(values), MPI_INTEGER4, r, told, world(self))
+    end do
   end procedure tell
 
   !> Look for the words every millisecond: MPI itself waits with the processor busy.

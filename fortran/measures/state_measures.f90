@@ -44,6 +44,8 @@ module hc_state_measures
     real(wp) :: max_pressure = 0.0_wp, max_traction = 0.0_wp
     !> Elastic energy of both bodies [J]
     real(wp) :: elastic_energy = 0.0_wp
+    !> Mean gap of a window that repeats [m]
+    real(wp) :: mean_gap = 0.0_wp
   end type state_measures_t
 
 contains
@@ -298,7 +300,8 @@ contains
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))
-        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact)
+        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact, lattice%extent(2), space)
+        found%mean_gap = space%sum(state%gap)/lattice%size()
         return
       end if
       found%pressure_center = center_of(lattice, state%pressure, space)
@@ -412,19 +415,29 @@ contains
   end function rises_beside
 
   !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
-  pure integer function edge_nodes(zone) result(n)
-    !> Nodes of the zone
-    logical, intent(in) :: zone(:, :)
-    integer :: row
+  integer function edge_nodes(zone, n_row, space) result(n)
+    !> Nodes of the zone (n_col, own rows)
+    logical, intent(in), contiguous :: zone(:, :)
+    !> Rows of the window
+    integer, intent(in) :: n_row
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    logical :: around(size(zone, 1), 0:size(zone, 2) + 1)
+    integer :: own(2), row, counts(1)
 
-    n = 0
-    associate (n_row => size(zone, 2))
-      do row = 1, n_row
-        associate (here => zone(:, row), below => zone(:, modulo(row - 2, n_row) + 1), above => zone(:, modulo(row, n_row) + 1))
-          n = n + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
-        end associate
-      end do
-    end associate
+    own = space%own_rows(n_row)
+    around(:, 1:size(zone, 2)) = zone
+    call space%fetch(n_row, zone, modulo(own(1) - 2, n_row) + 1, around(:, 0:0))
+    call space%fetch(n_row, zone, modulo(own(2), n_row) + 1, around(:, size(zone, 2) + 1:))
+    counts = 0
+    do row = 1, size(zone, 2)
+      associate (here => around(:, row))
+        counts = counts + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. around(:, row - 1) &
+                                                  .and. around(:, row + 1)))
+      end associate
+    end do
+    call space%ranks%add_counts(counts)
+    n = counts(1)
   end function edge_nodes
 
   !> Measure the cells of a zone alone; its edge stays unknown.

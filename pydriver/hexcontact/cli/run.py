@@ -36,7 +36,7 @@ def run(
     from ..core import ranks
     from ..result.store import Store
     from ..solve import log
-    from ..solve.run import metadata_of, require_shareable
+    from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
     if again and overwrite:
@@ -47,7 +47,6 @@ def run(
             return None
         with messages.logging(deck, *([output] if output else [])):
             case = frame.case_of(deck, settings)
-            require_shareable(case)
             target = frame.target_of(case, deck, output)
             log.refuse_same(log_file, [target])
             if plot:  # refuses before the run
@@ -98,12 +97,10 @@ def _was_begun(target: Path, case: Problem) -> bool:
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
     """Resume the run of an output, with the case or the overrides of `restart.reopened`."""
     from ..solve import restart
-    from ..solve.run import require_shareable
     from .solving import overview, picture_beside, solved, with_tables
 
     with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
         if again is not None:
-            require_shareable(again.case)
             if plot:
                 picture_beside(again.store.path)
             if again.warning:

@@ -19,6 +19,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..errors import DeckError, HexcontactError, ResourceError
@@ -80,10 +81,13 @@ def together() -> Iterator[bool]:
         yield not rank
     finally:
         if not rank:
-            for other in range(1, count):
-                _tell(other, None)
+            others(_end)
         rank, count, on_node = 0, 1, 1
         flat.finish_ranks()
+
+
+def _end() -> None:
+    """End the service of the other ranks."""
 
 
 def numbered(owner: object) -> int:
@@ -99,19 +103,37 @@ def _forget(number: int) -> None:
     _forgotten.append(number)
 
 
+def others(procedure: Callable[..., Any], *arguments: Any) -> None:
+    """Let the other ranks call a procedure, of which they report no failures."""
+    if count > 1:
+        freed = [_forgotten.pop() for _ in range(len(_forgotten))]
+        words = _words(procedure, arguments, freed, False)
+        for other in range(1, count):
+            flat.tell_words(words, other)
+
+
 def order(procedure: Callable[..., Any], *arguments: Any) -> Any:
     """Let all ranks call a procedure, which raises an error on all of them or on none; return its result."""
-    freed = [_forgotten.pop() for _ in range(len(_forgotten))]
-    for other in range(1, count):
-        _tell(other, (procedure, arguments, freed, False))
+    others(procedure, *arguments)
     return procedure(*arguments)
+
+
+def wake(procedure: Callable[..., Any], *arguments: Any) -> NDArray[np.int32]:
+    """Return the words of an order, none on one rank, for a solver that sends it by itself."""
+    return _words(procedure, arguments, (), False) if count > 1 else np.empty(0, np.int32)
+
+
+def _words(*order: Any) -> NDArray[np.int32]:
+    """Return an order as words."""
+    text = pickle.dumps(order)
+    return np.frombuffer(text + bytes(-len(text) % _WORD), np.int32).copy()
 
 
 def ask(other: int, procedure: Callable[..., Array], *arguments: Any, shape: tuple[int, int]) -> Array:
     """Return the array that a procedure returns on a rank."""
     if other == rank:
         return procedure(*arguments)
-    _tell(other, (procedure, arguments, (), True))
+    flat.tell_words(_words(procedure, arguments, (), True), other)
     words = flat.take_words(other, 2 * shape[0] * shape[1])
     return np.asarray(words).view(np.float64).reshape(shape)
 
@@ -145,12 +167,6 @@ def share(lattice: Lattice) -> bool:
     return count > 1 and bool(flat.shares_window(lattice.extent))
 
 
-def _tell(other: int, order: Any) -> None:
-    """Send an order to another rank."""
-    text = pickle.dumps(order)
-    flat.tell_words(np.frombuffer(text + bytes(-len(text) % _WORD), np.int32), other)
-
-
 def _serve_to_the_end() -> None:
     """Follow the orders of the first rank; end the process, and with it all, if that fails."""
     try:
@@ -164,8 +180,10 @@ def _serve() -> None:
     """Follow the orders of the first rank; it reports failures, which are those of all ranks."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
         signal.signal(number, signal.SIG_IGN)  # the first rank keeps its last step, and ends all
-    while (given := pickle.loads(flat.hear_words(flat.next_words()).tobytes())) is not None:
-        procedure, arguments, freed, answers = given
+    while True:
+        procedure, arguments, freed, answers = pickle.loads(flat.hear_words(flat.next_words()).tobytes())
+        if procedure is _end:
+            break
         for number in freed:
             held.pop(number, None)
         if answers:
@@ -173,5 +191,5 @@ def _serve() -> None:
             continue
         with contextlib.suppress(HexcontactError):
             procedure(*arguments)
-        del procedure, arguments, given
+        del procedure, arguments
     held.clear()

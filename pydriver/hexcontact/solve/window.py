@@ -15,7 +15,7 @@ from ..core import ranks
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import is_unbounded, measures, without_friction
+from ..core.measures import is_unbounded, measures, recorded
 from ..core.shared import Displacement, SharedContact, SharedFields, SharedOperator, SharedSolution
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
@@ -174,9 +174,8 @@ class Window:
             found["max_pressure"] = math.inf
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
-            found["mean_gap"] = float(solution.gap.mean())
         else:
-            del found["contact_area_error"]  # refinement has its own
+            del found["contact_area_error"], found["mean_gap"]  # refinement has its own error
         return found
 
     def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
@@ -227,7 +226,7 @@ class SharedWindow(Window):
 
     def _measures(self, solution: SharedSolution) -> tuple[dict[str, float], bool]:
         found, unbounded = solution.measures()
-        return without_friction(found), unbounded
+        return recorded(self.lattice, found, friction=False), unbounded
 
     def _fields(self, solution: SharedSolution) -> Mapping[str, NDArray[Any]]:
         moved: dict[str, Displacement | None] = {}
@@ -294,7 +293,7 @@ class FrictionWindow(Window):
             self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
             self.contact = self._solver(self.gap)
         return self.contact.advance(
-            self.contact.virgin() if state is None else state,
+            self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],

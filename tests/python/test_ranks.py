@@ -121,7 +121,7 @@ from hexcontact.core import ranks
 
 with ranks.together() as first:
     if first:
-        case = Case.from_file("sphere.toml")
+        case = Case.from_toml("sphere.toml")
         case.lattice = dataclasses.replace(case.lattice, row_first=-219, n_row=220, col_first=-150, n_col=300)
         case.run(sys.argv[1])
 """

@@ -9,11 +9,15 @@ module ranks_tests
   use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use hc_coulomb, only: coulomb_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
+  use hc_load_path, only: advance, step_settings_t
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -44,6 +48,7 @@ contains
       new_test('compliant_layer', test_layer), &
       new_test('approach', test_approach), &
       new_test('rough', test_rough), &
+      new_test('friction', test_friction), &
       new_test('waves', test_waves), &
       new_test('complete_contact', test_complete), &
       new_test('mean_gap', test_mean_gap), &
@@ -350,6 +355,57 @@ contains
     candidate = .not. (abs(x - 3.0e-4_wp) < 3.0e-5_wp)
     call compare_contacts(lattice, gap, candidate, unilateral_t(), force_control, 40.0_wp, 1.0e-9_wp, error)
   end subroutine test_rough
+
+  !> A sphere that is pressed and sheared, of like and unlike materials, on the whole window and on a part of it.
+  subroutine test_friction(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    do k = 0, 3
+      call shear_sphere(merge(40, 83, k < 2), modulo(k, 2) == 1, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_friction
+
+  !> Compare the ends of two load steps with those of one rank.
+  subroutine shear_sphere(n, unlike, error)
+    integer, intent(in) :: n
+    logical, intent(in) :: unlike
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(elastic_pair_t) :: pair
+    type(friction_problem_t) :: problem
+    type(windowed_friction_t) :: alone, shared
+    type(contact_state_t) :: start, expected, found
+    type(load_target_t) :: target
+    real(wp) :: gap(n, n - 3)
+    integer :: step
+
+    call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
+    if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
+    if (allocated(error)) return
+    call sphere(lattice, gap)
+    call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
+    if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
+    if (.not. allocated(error)) call new_windowed_friction(shared, problem, error, 1, ranks=ranks)
+    if (allocated(error)) return
+    call new_friction_state(start, lattice)
+    do step = 1, 2
+      target%value(:2) = [30.0_wp, merge(0.0_wp, 4.0_wp, step == 1)]
+      call advance(alone, start, target, step_settings_t(1.0e-10_wp), expected, error)
+      if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-10_wp), found, error)
+      if (allocated(error)) return
+      call compare_states(expected, found, [1, n - 3], error)
+      if (allocated(error)) return
+      call check(error, maxval(abs(found%traction - expected%traction)), 0.0_wp, 0.0_wp, 'traction')
+      if (allocated(error)) return
+      call check(error, maxval(abs(found%slip_increment - expected%slip_increment)), 0.0_wp, 0.0_wp, 'slip')
+      if (allocated(error)) return
+      call check_true(error, any(expected%zone == 1) .or. step == 1, 'stick')
+      if (allocated(error)) return
+      start = expected
+    end do
+  end subroutine shear_sphere
 
   !> Waves that repeat, on even and odd numbers of rows; even ones have a coarser lattice, too.
   subroutine test_waves(error)

@@ -143,14 +143,32 @@ def test_a_window_grows_as_in_one_process(tmp_path: Path) -> None:
         assert result["pressure"].shape[1] > 220
 
 
+SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]") + (
+    '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n'
+)
+WORN = """
+[[load]]
+label = "fretting"
+path = [{ tangential_load_x = "-2 N" }, { tangential_load_x = "2 N" }]
+[wear]
+coefficient_1 = "1e-14 m^2/N"
+cycle = "fretting"
+cycles = 1_000
+"""
+
+
 @with_mpi
-def test_friction_is_refused_by_several_processes(tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(DECK)
-    process = launched(tmp_path, 2, "run", "sphere.toml")
-    _, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 2
-    assert err.count("friction: several processes solve contacts without friction") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.toml"]
+@pytest.mark.parametrize(
+    ("ranks", "deck"),
+    [
+        (2, SHEARED),
+        (3, SHEARED.replace('"72 GPa"', '"432 GPa"').replace("in_radius = 20", "in_radius = 95")),
+        (2, SHEARED.replace("steps = 2", "") + WORN),
+    ],
+    ids=["unlike", "alike", "worn"],
+)
+def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
+    test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)
 
 
 @with_mpi

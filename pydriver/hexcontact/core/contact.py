@@ -366,6 +366,20 @@ class NormalContact(Contact):
         return solution
 
 
+def rough_pressure(
+    lattice: Lattice, pair: ElasticPair, gap: Array, interface: Interface = UNILATERAL, **driven: float
+) -> Array:
+    """Return the pressure of a rough frictionless solution under a normal load (N) or at an approach (m).
+
+    The gap (m) is infinite where nothing can touch.
+    """
+    [value], control = checked(**driven), 1 if "normal_load" in driven else 2
+    kernel_cache.take_settings()
+    pressure = flat.rough_pressure(lattice, pair, interface, gap, control, value)
+    kernel_cache.warn_of_faults()
+    return np.asarray(pressure)
+
+
 def memory_needed(
     method: Method,
     n_row: int,

@@ -2,7 +2,7 @@
 module hc_shared_contact
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr
   use hc_precision, only: wp
-  use hc_error, only: error_t, status, raise
+  use hc_error, only: error_t
   use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t
   use hc_elastic_medium, only: elastic_medium_t
@@ -64,9 +64,6 @@ contains
     all_possible = c_null_ptr
     if (ranks%rank == 0) then
       call check_problem(lattice, medium, initial_gap, candidate, error)
-      if (lattice%is_periodic() .and. .not. allocated(error)) then
-        call raise(error, status%invalid_input, 'a window that repeats: expected one process, since several do not solve it')
-      end if
       if (.not. allocated(error)) then
         all_gap = c_loc(initial_gap)
         all_possible = c_loc(candidate)

@@ -37,6 +37,7 @@ module hc_flexibility_fft
   contains
     procedure :: apply => fft_apply
     procedure :: replace => fft_replace
+    procedure :: in_place => fft_in_place
   end type fft_flexibility_t
 
   !> The blocks of the operator at lattice offsets, over the unit of the bodies.
@@ -277,6 +278,16 @@ contains
     call self%convolution%convolve_in_place(self%index(components, components), values)
     call self%count(components, components)
   end subroutine fft_replace
+
+  !> Point to the memory of the row transforms, if the components are multiplied together.
+  function fft_in_place(self, n_component) result(values)
+    class(fft_flexibility_t), intent(in) :: self
+    integer, intent(in) :: n_component
+    real(wp), pointer, contiguous :: values(:)
+
+    values => null()
+    if (n_component <= self%at_once) values => self%convolution%in_place(n_component)
+  end function fft_in_place
 
   !> Multiply pressure and shear traction one after the other, which do not move each other; the pressure is the first component.
   subroutine apply_apart(self, from, traction, onto, displacement)

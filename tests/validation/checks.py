@@ -146,6 +146,12 @@ _ALL = (
         _of("repeating", "superposed"),
     ),
     Check(
+        "rough-friction",
+        "A rough surface with friction on a rigid flat",
+        "Unlike bodies, pressed and sheared, on 128² to 512² nodes, each against a lattice twice as fine.",
+        _of("repeating", "sheared"),
+    ),
+    Check(
         "error-bars",
         "Estimated discretization errors",
         "How many true errors lie within the estimated ones, on lattices of random spacing and origin.",

@@ -76,10 +76,24 @@ def slender() -> Comparison:
     return found
 
 
-def rollers(spacing: float = 1e-6) -> Comparison:
-    """A logarithmic roller at its design load beside the plane contact of the same load by length."""
+def rollers(half_widths: Sequence[float] = (15e-6, 20e-6)) -> Comparison:
+    """Logarithmic rollers at their design loads beside the plane contact of the same load by length."""
     found = Comparison()
-    half_width, length, radius = 20e-6, 2e-3, 5e-3
+    for half_width in half_widths:
+        _roller(found, half_width)
+    found.notes.append(
+        "Steel rollers of 5 mm radius at their design loads, cells of b/20 by b/20; P' load by length, p_0 of "
+        "plane contact under P/l. Near its ends the contact is narrower than there, so that p rises more than "
+        "P'. On cells of 4 to 0.5 µm along the axis at half-width 20 µm: P' 0.91 %, p 1.35 % at 0.95 l/2; p "
+        "is within 1 % up to 0.938 l/2, and up to 0.95 l/2 for half-widths of at most l/120. With a third of "
+        "the end constant 0.97 %, but 2.3 p_0 at the ends."
+    )
+    return found
+
+
+def _roller(found: Comparison, half_width: float) -> None:
+    """Add a roller of 2 mm under the load of a half-width."""
+    length, radius, spacing = 2e-3, 5e-3, half_width / 20
     by_length = math.pi * E_STAR * half_width**2 / (4 * radius)
     peak = 2 * by_length / (math.pi * half_width)
     load = length * by_length
@@ -88,7 +102,7 @@ def rollers(spacing: float = 1e-6) -> Comparison:
         body_1={**STEEL, "surface": surface},
         body_2=STEEL,
         lattice="rectangular",
-        spacing=(spacing, 4 * spacing),
+        spacing=(spacing, spacing),
         normal_load=load,
         tolerance=TOLERANCE,
     )
@@ -97,11 +111,11 @@ def rollers(spacing: float = 1e-6) -> Comparison:
     at = y[:, 0] / (0.5 * length)
     carried = p.sum(axis=1) * spacing / by_length
     on_axis = p[:, np.abs(x[0]).argmin()] / peak
-    where = "2 mm long, half-width 20 µm"
+    where = f"2 mm long, half-width {half_width * 1e6:.0f} µm"
     for name, values, part, allowed in (
         ("P' l/P", carried, 0.95, 0.01),
         ("p(0, y)/p_0", on_axis, 0.9, 0.01),
-        ("p(0, y)/p_0", on_axis, 0.95, 0.02),
+        ("p(0, y)/p_0", on_axis, 0.95, 0.01 if half_width <= length / 120 else 0.02),
     ):
         uneven = float(np.abs(values - 1.0)[np.abs(at) < part].max())
         about = f"{name}, largest deviation from 1 for |y| < {part:g} l/2"
@@ -114,11 +128,6 @@ def rollers(spacing: float = 1e-6) -> Comparison:
         where, "half-width at y = 0", "um", math.sqrt(-start / slope), analytic=half_width, relative=3e-3
     )
     found.add(where, "max p/p_0, near the ends", "-", float(p.max() / peak))
-    found.notes.append(
-        "Steel roller of 5 mm radius at its design load, cells of 1 by 4 µm; P' load by length, p_0 of plane "
-        "contact under P/l."
-    )
-    return found
 
 
 def hollow() -> Comparison:

@@ -36,7 +36,7 @@ def run(
     from ..core import ranks
     from ..result.store import Store
     from ..solve import log
-    from ..solve.run import metadata_of, require_shareable
+    from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
     if again and overwrite:
@@ -47,7 +47,6 @@ def run(
             return None
         with messages.logging(deck, *([output] if output else [])):
             case = frame.case_of(deck, settings)
-            require_shareable(case)
             target = frame.target_of(case, deck, output)
             log.refuse_same(log_file, [target])
             if plot:  # refuses before the run

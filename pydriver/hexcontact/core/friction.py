@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import flat
+from . import flat, ranks
 from .calls import checked, numbers
 from .contact import (
     UNILATERAL,
@@ -206,7 +206,13 @@ class FrictionalContact(Contact):
         law = _checked_law(friction_coefficient, shear_limit, lattice)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
         given = *self._surfaces, law, springs, coupling == "goodman", count
-        self._create(flat.create_sheared, method_code(method, iteration), *given)
+        wake = np.empty(0, np.int32)
+        if ranks.count > 1 and method == "fft":
+            number = ranks.numbered(self)
+            wake = ranks.wake("follow", number)
+            # without arrays that the lattice keeps
+            ranks.order("create sheared", number, dataclasses.replace(lattice), *given[1:2], *given[4:])
+        self._create(flat.create_sheared, method_code(method, iteration), *given, wake)
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
@@ -402,4 +408,5 @@ def memory_needed(
 ) -> int:
     """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))
+    needed = int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))
+    return needed * ranks.on_node if method == "fft" else needed  # each rank has all fields

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DeckError, HexcontactError
 from . import flat
@@ -103,11 +104,20 @@ def order(name: str, *arguments: Any) -> None:
         _tell(name, freed, *arguments)
 
 
-def _tell(*words: Any) -> None:
+def wake(name: str, *arguments: Any) -> NDArray[np.int32]:
+    """Return the words of an order, none on one rank, for a solver that sends it by itself."""
+    return _words(name, [], *arguments) if count > 1 else np.empty(0, np.int32)
+
+
+def _words(*order: Any) -> NDArray[np.int32]:
+    """Return an order as words."""
+    text = pickle.dumps(order)
+    return np.frombuffer(text + bytes(-len(text) % _WORD), np.int32).copy()
+
+
+def _tell(*order: Any) -> None:
     """Send an order to the other ranks."""
-    text = pickle.dumps(words)
-    padded = np.frombuffer(text + bytes(-len(text) % _WORD), np.int32)
-    flat.share_words(padded.copy())
+    flat.share_words(_words(*order))
 
 
 def _serve_to_the_end(rank: int) -> None:
@@ -146,4 +156,14 @@ def _press(number: int, control: int, value: float, tolerance: float, max_sweeps
     flat.free_object(flat.press(_parts[number], control, value, tolerance, max_sweeps))
 
 
-_ORDERS = {"create": _create, "press": _press}
+def _create_sheared(number: int, lattice: Any, *given: Any) -> None:
+    """Set up the part of this rank of a problem with friction."""
+    _parts[number] = Part(flat.create_sheared_part(lattice, *given), lattice)
+
+
+def _follow(number: int) -> None:
+    """Take part in a call of the solver of the first rank."""
+    flat.follow(_parts[number])
+
+
+_ORDERS = {"create": _create, "press": _press, "create sheared": _create_sheared, "follow": _follow}

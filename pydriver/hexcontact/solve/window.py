@@ -218,7 +218,7 @@ class FrictionWindow(Window):
             self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
             self.contact = self._solver(self.gap)
         return self.contact.advance(
-            self.contact.virgin() if state is None else state,
+            self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],
             values,
             bulk_strain=self.case.bulk(target.bulk)[1],

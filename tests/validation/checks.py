@@ -14,7 +14,7 @@ from .reference import Comparison, reference
 
 def kernels() -> Comparison:
     """Pyramid kernels at lattice points against the reference table."""
-    from hexcontact.core.influence import pyramid_kernels
+    from hexcontact.influence import pyramid_kernels
 
     found = Comparison()
     for col, row in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, -1)):

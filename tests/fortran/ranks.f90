@@ -427,16 +427,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
-    do k = 0, 3
-      call shear_sphere(merge(40, 83, k < 2), modulo(k, 2) == 1, error)
+    do k = 0, 5
+      call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, error)
       if (allocated(error)) return
     end do
   end subroutine test_friction
 
   !> Compare the ends of two load steps with those of one rank.
-  subroutine shear_sphere(n, unlike, error)
+  subroutine shear_sphere(n, unlike, periodic, error)
     integer, intent(in) :: n
-    logical, intent(in) :: unlike
+    logical, intent(in) :: unlike, periodic
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(elastic_pair_t) :: pair
@@ -450,6 +450,7 @@ contains
     call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
     if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
     if (allocated(error)) return
+    lattice%periodic = periodic
     call sphere(lattice, gap)
     call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)

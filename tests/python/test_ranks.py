@@ -119,38 +119,22 @@ def assert_same(first: Path, second: Path) -> None:
             np.testing.assert_array_equal(one[name][:], several[name][:], err_msg=name)
 
 
-# Two steps on a window beside the contact: it grows in the first one.
-GROWING = """
-import dataclasses, sys
-from hexcontact import Case
-from hexcontact.core import ranks
-
-with ranks.together() as first:
-    if first:
-        case = Case.from_toml("sphere.toml")
-        case.lattice = dataclasses.replace(case.lattice, row_first=-219, n_row=220, col_first=-150, n_col=300)
-        case.run(sys.argv[1])
-"""
-
-
-@with_mpi
-def test_a_window_grows_as_in_one_process(tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("window = [261, 300]", ""))
-    (tmp_path / "growing.py").write_text(GROWING)
-    alone = subprocess.run(
-        [sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False
-    )
-    assert alone.returncode == 0
-    process = launched(tmp_path, 2, "all.nc", program=("growing.py",))
-    out, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, out + err
-    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
-    with netCDF4.Dataset(tmp_path / "all.nc") as result:
-        assert result["pressure"].shape[1] > 220
-
-
 SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]") + (
     '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n'
+)
+ADAPTIVE = SHEARED.replace("steps = 2\n[[load]]", "[[load]]").replace("steps = 2", 'steps = "auto"') + (
+    "[solver]\nstep_tolerance = 0.3\n"
+)
+SHEARED_WAVES = (
+    WAVES.partition("[[load]]")[0]
+    + """
+[friction]
+coefficient = 0.3
+[[load]]
+mean_pressure = "200 MPa"
+[[load]]
+mean_traction_x = "20 MPa"
+"""
 )
 WORN = """
 [[load]]
@@ -170,11 +154,44 @@ cycles = 1_000
         (2, SHEARED),
         (3, SHEARED.replace('"72 GPa"', '"432 GPa"').replace("in_radius = 20", "in_radius = 95")),
         (2, SHEARED.replace("steps = 2", "") + WORN),
+        (3, ADAPTIVE),
+        (2, SHEARED_WAVES),
     ],
-    ids=["unlike", "alike", "worn"],
+    ids=["unlike", "alike", "worn", "adaptive", "waves"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)
+
+
+# On a window beside the contact, which grows in the first step.
+GROWING = """
+import dataclasses, sys
+from hexcontact import Case
+from hexcontact.core import ranks
+
+with ranks.together() as first:
+    if first:
+        case = Case.from_toml("sphere.toml")
+        case.lattice = dataclasses.replace(case.lattice, row_first=-219, n_row=220, col_first=-150, n_col=300)
+        case.run(sys.argv[1])
+"""
+
+
+@with_mpi
+@pytest.mark.parametrize("deck", [PRESSED, ADAPTIVE], ids=["pressed", "adaptive"])
+def test_a_window_grows_as_in_one_process(deck: str, tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(deck.replace("window = [261, 300]", ""))
+    (tmp_path / "growing.py").write_text(GROWING)
+    alone = subprocess.run(
+        [sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False
+    )
+    assert alone.returncode == 0
+    process = launched(tmp_path, 2, "all.nc", program=("growing.py",))
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
+    with netCDF4.Dataset(tmp_path / "all.nc") as result:
+        assert result["pressure"].shape[1] > 220
 
 
 @with_mpi

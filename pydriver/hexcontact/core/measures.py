@@ -127,7 +127,9 @@ def measures(
     """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
     given = initial_gap, candidate, solution
     if isinstance(solution, ContactState):
-        return recorded(lattice, flat.measure_friction(lattice, friction, *given), friction=True)
+        found = flat.measure_friction(lattice, friction, *given)
+        all_known: dict[str, float] = found._asdict()
+        return recorded(lattice, found, friction=True) if lattice.periodic else all_known
     return recorded(lattice, flat.measure_pressure(lattice, *given), friction=False)
 
 

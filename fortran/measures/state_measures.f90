@@ -294,7 +294,7 @@ contains
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))
-        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact)
+        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact, space, lattice%extent(2))
         return
       end if
       found%pressure_center = center_of(lattice, state%pressure)
@@ -335,19 +335,28 @@ contains
   end function rises_beside
 
   !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
-  pure integer function edge_nodes(zone) result(n)
-    !> Nodes of the zone
-    logical, intent(in) :: zone(:, :)
-    integer :: row
+  integer function edge_nodes(zone, space, n_row) result(n)
+    !> Nodes of the zone (n_col, own rows)
+    logical, intent(in), contiguous :: zone(:, :)
+    !> Space of the fields, and rows of the window
+    type(field_space_t), intent(in) :: space
+    integer, intent(in) :: n_row
+    logical :: wider(size(zone, 1), 0:size(zone, 2) + 1)
+    integer :: row, counts(1)
 
-    n = 0
-    associate (n_row => size(zone, 2))
-      do row = 1, n_row
-        associate (here => zone(:, row), below => zone(:, modulo(row - 2, n_row) + 1), above => zone(:, modulo(row, n_row) + 1))
-          n = n + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
-        end associate
-      end do
+    associate (own => space%own_rows(n_row))
+      call space%fetch(n_row, zone, modulo(own(1) - 2, n_row) + 1, wider(:, :0))
+      call space%fetch(n_row, zone, modulo(own(2), n_row) + 1, wider(:, size(zone, 2) + 1:))
     end associate
+    wider(:, 1:size(zone, 2)) = zone
+    counts = 0
+    do row = 1, size(zone, 2)
+      associate (here => zone(:, row), below => wider(:, row - 1), above => wider(:, row + 1))
+        counts = counts + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
+      end associate
+    end do
+    call space%ranks%add_counts(counts)
+    n = counts(1)
   end function edge_nodes
 
   !> Measure the cells of a zone alone; its edge stays unknown.

@@ -10,6 +10,8 @@ module ranks_tests
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
+  use hc_contact_edges, only: contact_edges_t
+  use hc_state_measures, only: state_measures_t, measure_contact
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
@@ -254,7 +256,31 @@ contains
     if (allocated(error)) return
     call compare_states(expected, found, rows, error)
     call ranks%agree(error)
+    if (allocated(error) .or. .not. lattice%is_periodic()) return
+    call compare_areas(lattice, gap, candidate, expected, found, error)
+    call ranks%agree(error)
   end subroutine compare_contacts
+
+  !> Compare contact area and error in a window that repeats.
+  subroutine compare_areas(lattice, gap, candidate, expected, found, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: gap(:, :)
+    logical, intent(in) :: candidate(:, :)
+    !> State of one rank, and own rows of that of all
+    type(contact_state_t), intent(in) :: expected, found
+    type(error_t), allocatable, intent(out) :: error
+    type(field_space_t) :: space
+    type(contact_edges_t) :: edges
+    type(state_measures_t) :: alone, shared
+
+    call measure_contact(lattice, gap, candidate, expected, space, alone, edges)
+    space%ranks = ranks
+    associate (rows => space%own_rows(lattice%extent(2)))
+      call measure_contact(lattice, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), found, space, shared, edges)
+    end associate
+    call check(error, [shared%contact%area, shared%contact%area_error], [alone%contact%area, alone%contact%area_error], 0.0_wp, &
+               'areas')
+  end subroutine compare_areas
 
   !> Compare own rows.
   subroutine compare_states(expected, found, rows, error)

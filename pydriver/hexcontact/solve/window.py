@@ -164,10 +164,14 @@ class Window:
             found["max_pressure"] = math.inf
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
-            found["mean_gap"] = float(solution.gap.mean())
+            found["mean_gap"] = self._mean_gap(self.case.period.mean_height, solution)
         else:
             del found["contact_area_error"]  # refinement has its own
         return found
+
+    def _mean_gap(self, before: float, solution: Any) -> float:
+        """Return the mean of the gap (m) from that before loading: pressure moves no mean plane."""
+        return before - float(solution.approach)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.
@@ -268,6 +272,10 @@ class FrictionWindow(Window):
         left_out = (*left_out, "creep_power_error") if self.case.pair.beta else left_out
         left_out = (*left_out, _PATH_ERROR) if static else left_out
         return {name: value for name, value in history.items() if name not in left_out}
+
+    def _mean_gap(self, before: float, solution: ContactState) -> float:
+        """Return the mean of the gap (m), which wear and surfaces that move change."""
+        return float(solution.gap.mean())
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""

@@ -3,7 +3,7 @@
 !> Paths of loads, wear and growing windows call the procedures of the solver on the first rank alone. Each call wakes the other
 !> ranks, which take part in it by `follow`.
 module hc_shared_friction
-  use, intrinsic :: iso_c_binding, only: c_loc
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -79,38 +79,48 @@ contains
     self%problem%space = space_over(self%problem%lattice%extent, n_threads)
   end subroutine new_shared_friction
 
-  !> Take a field of the first rank onto all of them.
+  !> Copy a field of the first rank to the other ranks.
   subroutine spread_real(ranks, field)
     type(communicator_t), intent(in) :: ranks
     !> Field (n_col, n_row), of one shape on all ranks
-    real(wp), intent(inout), contiguous, target :: field(:, :)
-    real(wp), allocatable, target :: own(:, :)
+    real(wp), intent(in), contiguous, target :: field(:, :)
 
-    allocate (own, source=field)
-    call ranks%fetch(2*size(field, 1), size(field, 2), c_loc(own), [1, size(field, 2)], c_loc(field), on_first=.true.)
+    call spread(ranks, [2*size(field, 1), size(field, 2)], c_loc(field))
   end subroutine spread_real
 
-  !> Take a mask of the first rank onto all of them.
+  !> Copy a mask of the first rank to the other ranks.
   subroutine spread_mask(ranks, field)
     type(communicator_t), intent(in) :: ranks
     !> Mask (n_col, n_row), of one shape on all ranks
-    logical, intent(inout), contiguous, target :: field(:, :)
-    logical, allocatable, target :: own(:, :)
+    logical, intent(in), contiguous, target :: field(:, :)
 
-    allocate (own, source=field)
-    call ranks%fetch(size(field, 1), size(field, 2), c_loc(own), [1, size(field, 2)], c_loc(field), on_first=.true.)
+    call spread(ranks, shape(field), c_loc(field))
   end subroutine spread_mask
 
-  !> Take zones of the first rank onto all of them.
+  !> Copy zones of the first rank to the other ranks.
   subroutine spread_zone(ranks, field)
     type(communicator_t), intent(in) :: ranks
     !> Zones (n_col, n_row), of one shape on all ranks
-    integer, intent(inout), contiguous, target :: field(:, :)
-    integer, allocatable, target :: own(:, :)
+    integer, intent(in), contiguous, target :: field(:, :)
 
-    allocate (own, source=field)
-    call ranks%fetch(size(field, 1), size(field, 2), c_loc(own), [1, size(field, 2)], c_loc(field), on_first=.true.)
+    call spread(ranks, shape(field), c_loc(field))
   end subroutine spread_zone
+
+  !> Copy rows of the first rank to the other ranks.
+  subroutine spread(ranks, extent, field)
+    type(communicator_t), intent(in) :: ranks
+    !> Words in a row, and number of rows
+    integer, intent(in) :: extent(2)
+    !> The rows
+    type(c_ptr), intent(in) :: field
+    integer, target :: none(1)
+
+    if (ranks%rank == 0) then
+      call ranks%fetch(extent(1), extent(2), field, [1, 0], c_loc(none), on_first=.true.)
+    else
+      call ranks%fetch(extent(1), extent(2), c_loc(none), [1, extent(2)], field, on_first=.true.)
+    end if
+  end subroutine spread
 
   !> Let the other ranks take part in a call.
   subroutine announce(self, order)
@@ -135,18 +145,14 @@ contains
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
     type(call_t) :: order
-    type(contact_state_t) :: from
-    real(wp), allocatable :: origin(:, :, :)
 
     call self%problem%friction%begin_step(start%zone)
     order = call_t(to_solve, target, tolerance, max_sweeps, start%motion, start%load)
     order%guessed = allocated(self%guess)
     if (order%guessed) order%guess_motion = self%guess%motion
     call announce(self, order)
-    from = start
-    origin = reference
     if (order%guessed) self%part%guess = self%guess
-    call solve_together(self, order, from, origin, state, error)
+    call solve_together(self, order, start, reference, state, error)
   end subroutine solve_step
 
   !> Solve a load step on all ranks.
@@ -154,8 +160,8 @@ contains
     class(shared_friction_t), intent(inout) :: self
     type(call_t), intent(in) :: order
     !> State to start from, and displacement that slip counts from; on ranks but the first one fields without meaning
-    type(contact_state_t), intent(inout) :: start
-    real(wp), intent(inout), contiguous, target :: reference(:, :, :)
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
     integer :: m
@@ -168,8 +174,6 @@ contains
       call spread_real(self%ranks, start%relative_displacement(:, :, m))
       call spread_real(self%ranks, reference(:, :, m))
     end do
-    start%motion = order%motion
-    start%load = order%load
     if (order%guessed) then
       call spread_real(self%ranks, self%part%guess%pressure)
       do m = 1, 2
@@ -200,8 +204,8 @@ contains
   !> Compute displacements on all ranks.
   subroutine displace_together(self, tractions, displacement, error)
     class(shared_friction_t), intent(inout) :: self
-    !> Pressure and shear traction; without meaning on ranks but the first one
-    real(wp), intent(inout), contiguous, target :: tractions(:, :, :)
+    !> Pressure and shear traction; set on the first rank
+    real(wp), intent(in), contiguous, target :: tractions(:, :, :)
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
     integer :: m
@@ -243,6 +247,8 @@ contains
       select case (order%what)
       case (to_solve)
         call add_fields(start, lattice, self%problem%space)
+        start%motion = order%motion
+        start%load = order%load
         allocate (fields(lattice%extent(1), lattice%extent(2), 2))
         if (order%guessed) then
           allocate (self%part%guess)

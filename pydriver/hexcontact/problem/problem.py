@@ -291,7 +291,7 @@ class Problem:
         moved = np.array(pattern.coordinates(*self.lattice.origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]
-            other.lattice = window.enclosing(bounds[:, 0], bounds[:, 1], spacing, window.MARGIN, pattern)
+            other.lattice = pattern.enclosing(*bounds.T, spacing, window.MARGIN)
         else:
             other.lattice = window.covering(self.lattice, spacing, pattern)
         return other
@@ -394,7 +394,7 @@ class Problem:
         if self.full_contact:
             assert grid.length is not None  # checked, as the window is
             assert grid.window is not None
-            lattice = window.centered(grid.length, center, grid.window, window.pattern_of(grid))
+            lattice = window.pattern_of(grid).centered(grid.length, center, grid.window)
             self._check_interface(source, lattice)
             return lattice
         try:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Mask, reals
+from ..arrays import Array, Mask
 from ..core import flat
 from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
 from ..core.lattice import Lattice, Pattern
@@ -103,25 +103,6 @@ class Estimate(NamedTuple):
 # --- lattice coordinates ------------------------------------------------------------------------------------
 
 
-def centered(
-    spacing: float, center: tuple[float, float], shape: tuple[int, int], pattern: Pattern
-) -> Lattice:
-    """Return the window of `shape` (n_row, n_col) about the node nearest to `center`.
-
-    An odd count puts that node in the middle; of an even count, one node more lies on the negative side.
-    """
-    along, across = pattern.coordinates(*center)
-    col, row = round(float(along) / spacing), round(float(across) / spacing)
-    return pattern.window(spacing, row - shape[0] // 2, col - shape[1] // 2, *shape)
-
-
-def enclosing(lower: Array, upper: Array, spacing: float, margin: int, pattern: Pattern) -> Lattice:
-    """Return the smallest window about all nodes between two lattice coordinates, and `margin` nodes more."""
-    first = [math.floor(value / spacing) - margin for value in lower]
-    last = [math.ceil(value / spacing) + margin for value in upper]
-    return pattern.window(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1)
-
-
 def covering(window: Lattice, spacing: float, pattern: Pattern) -> Lattice:
     """Return the smallest window of another lattice about all nodes of a window."""
     moved = np.array(pattern.coordinates(*window.origin))
@@ -129,7 +110,7 @@ def covering(window: Lattice, spacing: float, pattern: Pattern) -> Lattice:
     last = first + np.array([window.n_col, window.n_row]) - 1
     slack = 1e-9 * spacing  # nodes that both have in common stay the rim, whatever the rounding
     lower, upper = (window.spacing * index + moved for index in (first, last))
-    return enclosing(lower + slack, upper - slack, spacing, 0, pattern)
+    return pattern.enclosing(lower + slack, upper - slack, spacing)
 
 
 # --- the estimate -------------------------------------------------------------------------------------------
@@ -191,7 +172,7 @@ def starting_half_size(
     x = center[0] + radii[:, None] * np.cos(angles)
     y = center[1] + radii[:, None] * np.sin(angles)
     with np.errstate(all="ignore"):
-        height = reals(gap(x, y), "gap")
+        height = np.asarray(gap(x, y), float)
         height = np.where(np.isfinite(height), height, np.inf)
         # the median over the directions, some of which may lie outside of a punch or along a groove
         # (not by numpy.median, which imports numpy.ma); at the end of a surface the lowest direction
@@ -310,7 +291,7 @@ def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     if max(n_row, n_col) > MOST_NODES_PER_SIDE:
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(n_row, n_col)}"
         problems.append(Mistake(("grid", key), value, sentence))
-    return replace(centered(spacing, center, (n_row, n_col), pattern), periodic=True), problems
+    return replace(pattern.centered(spacing, center, (n_row, n_col)), periodic=True), problems
 
 
 def sides(lattice: Lattice) -> tuple[float, float] | None:
@@ -354,10 +335,10 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         spacing = estimate.spacings(pattern.window(1.0, 0, 0, 1, 1)) / grid.in_radius
     if spacing is not None:
         if grid.window is not None:
-            return centered(spacing, center, grid.window, pattern)
+            return pattern.centered(spacing, center, grid.window)
         if isinstance(grid.extent, tuple):
             return Lattice.covering(spacing, center, grid.extent[0], grid.extent[1], *pattern)
-        return enclosing(lower, upper, spacing, MARGIN, pattern)
+        return pattern.enclosing(lower, upper, spacing, MARGIN)
 
     nodes = grid.nodes_across or 0  # one of the three is always given
     shape = (nodes, nodes)
@@ -370,7 +351,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         margin = MARGIN if nodes >= 11 else 1
     # half a spacing may be lost if the middle is no node; the first attempt is without
     for intervals in (nodes - 1 - 2 * margin, nodes - 2 - 2 * margin):
-        lattice = centered(float(np.max(upper - lower)) / intervals, center, shape, pattern)
+        lattice = pattern.centered(float(np.max(upper - lower)) / intervals, center, shape)
         if not _outside(lattice, lower, upper):
             break
     return lattice
@@ -455,10 +436,8 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
             needed = f'["{length_x}", "{length_y}"]'
         else:
-            needed_window = enclosing(
-                estimate.lower, estimate.upper, lattice.spacing, MARGIN, lattice.pattern
-            )
-            needed = f"[{needed_window.n_row}, {needed_window.n_col}] nodes"
+            about = lattice.pattern.enclosing(estimate.lower, estimate.upper, lattice.spacing, MARGIN)
+            needed = f"[{about.n_row}, {about.n_col}] nodes"
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"
         )

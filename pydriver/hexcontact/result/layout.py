@@ -81,7 +81,12 @@ class Layout:
             raise ValueError("a result needs at least one finished step")
         self.metadata = metadata
         self.steps = steps
-        self.window = _union([step.lattice for step in steps])
+        first, *others = [step.lattice for step in steps]
+        if any((one.spacing, one.pattern) != (first.spacing, first.pattern) for one in others):
+            raise ValueError(
+                "the steps of a result share one lattice: spacing, origin and cells must not change"
+            )
+        self.window = first.joined(*others)
         present = {name for step in steps for name in (*step.fields, *step.history)}
         if unknown := present - VARIABLES.keys():
             raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
@@ -197,22 +202,6 @@ class Layout:
         with lock:
             for name, field in fixed.items():
                 columns[name][...] = field
-
-
-def _union(windows: Sequence[Lattice]) -> Lattice:
-    """Return the smallest window about `windows` of one lattice."""
-    first = windows[0]
-    if any((w.spacing, w.pattern) != (first.spacing, first.pattern) for w in windows):
-        raise ValueError("the steps of a result share one lattice: spacing, origin and cells must not change")
-    row_first = min(w.row_first for w in windows)
-    col_first = min(w.col_first for w in windows)
-    return dataclasses.replace(
-        first,
-        row_first=row_first,
-        col_first=col_first,
-        n_row=max(w.row_first + w.n_row for w in windows) - row_first,
-        n_col=max(w.col_first + w.n_col for w in windows) - col_first,
-    )
 
 
 def lattice_of(dataset: Dataset) -> Lattice:

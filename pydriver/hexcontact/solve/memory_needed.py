@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from ..core import contact, kernel_cache, memory
 from ..core.lattice import Lattice
@@ -94,17 +95,10 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     dispensable bytes.
     """
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
-    operator, set_up = (
-        contact.memory_needed(
-            "fft",
-            *lattice.shape,
-            part=part,
-            spectra=5 + (case.pair.spectra % 2 == 0),  # a body is unlike a rigid one
-            threads=memory.threads(),
-            periodic=lattice.periodic,
-        )
-        for part in ("operator", "set-up of the operator")
-    )
+    spectra = 5 + (case.pair.spectra % 2 == 0)  # a body is unlike a rigid one
+    given: dict[str, Any] = {"spectra": spectra, "threads": memory.threads(), "periodic": lattice.periodic}
+    operator = contact.memory_needed("fft", *lattice.shape, part="operator", **given)
+    set_up = contact.memory_needed("fft", *lattice.shape, part="set-up of the operator", **given)
     fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
     needed = case.memory_needed(lattice) + kept
     if case.frictional or method == "direct":
@@ -112,7 +106,7 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     else:  # the output takes the place of transforms and iterations
         needed += max(fields, _WRITING)
     if case.deck.wear:
-        needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
+        needed += contact.memory_needed("fft", *lattice.shape, threads=given["threads"])
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)

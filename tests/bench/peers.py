@@ -156,9 +156,18 @@ def measure(
         sheared = (64,) if quick else SHEARED_SIZES
         pair = [code for code in codes if code.label in ("hexcontact", "aspher")]
         tables.append(cattaneo_mindlin(pair, sheared))
-    tables.append(rough(codes, [n for n in sizes or ROUGH_SIZES if n <= largest]))
     tables[0].remarks += absent
     return tables
+
+
+def measure_rough(
+    folder: Path, *, quick: bool, sizes: Sequence[int] | None = None, names: Sequence[str] | None = None
+) -> list[Table]:
+    """Return the table of a rough surface in a window that repeats."""
+    codes, absent = entries(folder, names)
+    table = rough(codes, [n for n in sizes or ROUGH_SIZES if n <= (512 if quick else 1024)])
+    table.remarks += absent
+    return [table]
 
 
 def hertz(codes: list[Entry], sizes: Sequence[int]) -> list[Table]:

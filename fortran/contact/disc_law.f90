@@ -187,7 +187,7 @@ contains
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
     integer, intent(out), contiguous :: zone(:)
     real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
-    real(wp) :: bound(size(p)), squares(2), largest, length, unit
+    real(wp) :: bound(size(p)), squares(2), largest, largest_r, length, unit
     real(wp), allocatable :: normal(:, :)
     integer :: i
 
@@ -197,16 +197,19 @@ contains
     unit = 1.0_wp
     if (p_max > 0.0_wp) unit = 1.0_wp/p_max
     if (self%is_isotropic()) then
-      call linearize_disc(size(p), unit, bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
+      call linearize_disc(unit, bound, largest, r, qx - r*dsx, qy - r*dsy, direction, compliance)
+      call classify(in_contact, zone, direction, compliance)
       return
     end if
     squares = self%stretches()
+    ! r A^2 is nowhere above r, or the classification would be no contraction
+    largest_r = r*squares(1)
     associate (a => self%stretch())
       associate (q => squeezed(a, qx, qy), ds => stretched(a, dsx, dsy))
-        ! r A^2 is nowhere above r, or the classification would be no contraction
-        call linearize_disc(size(p), unit, bound, largest, r*squares(1), in_contact, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), &
-                            zone, direction, compliance)
+        call linearize_disc(unit, bound, largest, largest_r, q(:, 1) - largest_r*ds(:, 1), q(:, 2) - largest_r*ds(:, 2), &
+                            direction, compliance)
       end associate
+      call classify(in_contact, zone, direction, compliance)
       normal = squeezed(a, direction(1, :), direction(2, :))
     end associate
     do i = 1, size(p)
@@ -218,19 +221,17 @@ contains
   end subroutine linearize_row
 
   !> Linearise the law of the disc at the nodes of a row.
-  pure subroutine linearize_disc(n, unit, bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Inverse of the unit of pressure; radius of each node, and the largest of all nodes [Pa]; parameter r [Pa/m]
-    real(wp), intent(in) :: unit, bound(n), largest, r
-    !> Nodes in contact; the others are separated
-    logical, intent(in) :: in_contact(n)
-    !> Traction and slip of the step
-    real(wp), intent(in) :: qx(n), qy(n), dsx(n), dsy(n)
-    !> separated, stick or slip
-    integer, intent(out) :: zone(n)
+  pure subroutine linearize_disc(unit, bound, largest, r, dx, dy, direction, compliance)
+    !> Inverse of the unit of pressure
+    real(wp), intent(in) :: unit
+    !> Radius of each node, and the largest of all nodes [Pa]
+    real(wp), intent(in), contiguous :: bound(:)
+    real(wp), intent(in) :: largest
+    !> Parameter r [Pa/m], and d = q - r ds
+    real(wp), intent(in) :: r
+    real(wp), intent(in), contiguous :: dx(:), dy(:)
     !> Direction e (2, n) and compliance D (n) of the nodes that slip
-    real(wp), intent(out) :: direction(2, n), compliance(n)
+    real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
     real(wp) :: x, y, length, radius, least, slips, widest_bound, alone
     integer :: i
 
@@ -239,9 +240,9 @@ contains
     ! without any pressure the traction itself is the scale
     alone = merge(0.0_wp, smallest_bound, largest > 0.0_wp)
     !$omp simd private(x, y, length, radius, slips)
-    do i = 1, n
-      x = unit*(qx(i) - r*dsx(i))
-      y = unit*(qy(i) - r*dsy(i))
+    do i = 1, size(bound)
+      x = unit*dx(i)
+      y = unit*dy(i)
       length = sqrt(max(x**2 + y**2, nothing))
       radius = unit*min(bound(i), widest_bound)
       ! 1 or 0, without a condition, so that the compiler takes several nodes at a time
@@ -250,13 +251,25 @@ contains
       direction(2, i) = slips*(y/length)
       compliance(i) = slips*(max(length - radius, 0.0_wp)/(r*max(radius, least, alone*length)))
     end do
-    do i = 1, n
+  end subroutine linearize_disc
+
+  !> Find the zones of the nodes of a row.
+  pure subroutine classify(in_contact, zone, direction, compliance)
+    !> Nodes in contact; the others are separated
+    logical, intent(in), contiguous :: in_contact(:)
+    !> separated, stick or slip
+    integer, intent(out), contiguous :: zone(:)
+    !> Direction e (2, n) and compliance D (n) of the nodes that slip
+    real(wp), intent(inout), contiguous :: direction(:, :), compliance(:)
+    integer :: i
+
+    do i = 1, size(zone)
       zone(i) = merge(merge(slip, stick, compliance(i) > 0.0_wp), separated, in_contact(i))
       if (in_contact(i)) cycle
       direction(:, i) = [1.0_wp, 0.0_wp]
       compliance(i) = 0.0_wp
     end do
-  end subroutine linearize_disc
+  end subroutine classify
 
   !> Return the unit vector t, a quarter turn ahead of e.
   pure function normal_to(direction) result(t)

@@ -19,7 +19,7 @@ module hc_convolution
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
-  use hc_communicator, only: block_layout_t
+  use hc_communicator, only: communicator_t, block_layout_t
   use hc_field_space, only: field_space_t
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
@@ -67,6 +67,9 @@ module hc_convolution
     real(wp) :: whole = 0.0_wp
     !> Space of the fields
     type(field_space_t) :: space
+    !> Ranks that share the transforms; rows before the first of this one where each holds all rows of the fields
+    type(communicator_t), private :: ranks
+    integer, private :: rows_before = 0
     !> Transform lengths along the two lattice directions
     integer :: padded(2) = 0
     !> Columns in a block, number of blocks of this rank, and columns before the first of them
@@ -93,6 +96,8 @@ module hc_convolution
     procedure :: convolve, convolve_in_place
     !> Memory beside the row transforms, whose content is lost when another convolution uses the scratch
     procedure :: beside
+    !> The memory of the row transforms itself, for fields that are transformed in their place
+    procedure :: in_place
     !> Take spectra from a cache, and store them there
     procedure :: find_spectra, store_spectra
     !> Spectra of kernels given at the lattice offsets
@@ -122,30 +127,27 @@ module hc_convolution
 contains
 
   !> Make plans and scratch space for convolutions over a window; the spectra come next, by `find_spectra`.
-  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd, beside)
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, beside)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Transform lengths, the first one a multiple of four; 2*extent - 1 at least unless the convolution is periodic
     integer, intent(in) :: padded(2)
-    !> Number of kernels, and of components of the fields
-    integer, intent(in) :: n_kernel, n_component
+    !> Numbers of even and of odd kernels, which follow, and of components of the fields
+    integer, intent(in) :: n_kernel(2), n_component
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory, a length FFTW cannot plan
     type(error_t), allocatable, intent(out) :: error
-    !> The first odd kernel; absent: all are even
-    integer, intent(in), optional :: first_odd
     !> Bytes of memory beside the row transforms; absent: none
     integer(int64), intent(in), optional :: beside
     integer(int64) :: bytes
     integer :: stat
 
     self%space = space
-    self%n_kernel = n_kernel
-    self%first_odd = n_kernel + 1
-    if (present(first_odd)) self%first_odd = first_odd
+    self%n_kernel = sum(n_kernel)
+    self%first_odd = n_kernel(1) + 1
     self%extent = extent
     self%padded = padded
     self%n_frequency = padded(1)/2 + 1
@@ -153,12 +155,13 @@ contains
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
     self%n_row = extent(2)
-    if (space%ranks%size > 1) then
-      self%before = self%width*(space%ranks%first_item(self%n_block) - 1)
-      self%n_block = space%ranks%last_item(self%n_block) - space%ranks%first_item(self%n_block) + 1
-      associate (own => space%own_extent(extent))
-        self%n_row = own(2)
-      end associate
+    self%ranks = space%ranks
+    if (space%helpers%size > 1) self%ranks = space%helpers
+    if (self%ranks%size > 1) then
+      self%before = self%width*(self%ranks%first_item(self%n_block) - 1)
+      self%n_block = self%ranks%last_item(self%n_block) - self%ranks%first_item(self%n_block) + 1
+      self%n_row = self%ranks%last_row(extent(2)) - self%ranks%first_row(extent(2)) + 1
+      if (space%helpers%size > 1) self%rows_before = self%ranks%first_row(extent(2)) - 1
     end if
     self%own_leading = self%n_block*self%width
     self%held%place = address(self%held)
@@ -166,7 +169,7 @@ contains
     if (.not. associated(self%held%scratch)) allocate (self%held%scratch)
     self%n_rows = int(self%leading, int64)*even(self%n_row)*n_component
     self%n_work = self%n_rows
-    if (space%ranks%size > 1) self%n_work = self%n_work + int(self%own_leading, int64)*even(extent(2))*n_component
+    if (self%ranks%size > 1) self%n_work = self%n_work + int(self%own_leading, int64)*even(extent(2))*n_component
     bytes = self%n_work*(storage_size((1.0_wp, 0.0_wp))/8)
     if (present(beside)) bytes = bytes + beside
     call self%held%scratch%reserve(bytes, stat)
@@ -178,7 +181,7 @@ contains
     else
       call make_plans(self, error)
     end if
-    call space%ranks%agree(error)
+    call self%ranks%agree(error)
   end subroutine new_convolution
 
   !> Take the spectra from a cache, or allocate zero ones that are to be computed.
@@ -207,7 +210,7 @@ contains
     allocate (self%held%spectrum)
     call self%held%spectrum%reserve(shape_wanted, self%spectrum, stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
-    call self%space%ranks%agree(error)
+    call self%ranks%agree(error)
     if (.not. allocated(error)) self%spectrum = 0.0_wp
   end subroutine find_spectra
 
@@ -218,7 +221,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     is_kept = .false.
-    if (present(cache)) is_kept = associated(cache) .and. self%space%ranks%size == 1
+    if (present(cache)) is_kept = associated(cache) .and. self%ranks%size == 1
   end function is_kept
 
   !> Store complete spectra in the cache.
@@ -275,11 +278,11 @@ contains
     n = self%extent
     n_kernel = size(self%spectrum, 3)
     scale = 1.0_wp/(real(self%padded(1), wp)*real(self%padded(2), wp))
-    first = self%space%ranks%first_row(n(2)) - 1
+    first = self%ranks%first_row(n(2)) - 1
     allocate (rows(self%leading, first:first + even(self%n_row) - 1, n_kernel), stat=stat)
-    if (stat == 0 .and. self%space%ranks%size > 1) allocate (columns(self%own_leading, even(n(2)), n_kernel), stat=stat)
+    if (stat == 0 .and. self%ranks%size > 1) allocate (columns(self%own_leading, even(n(2)), n_kernel), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
-    call self%space%ranks%agree(error)
+    call self%ranks%agree(error)
     if (allocated(error)) return
 
     thread = 1
@@ -307,8 +310,8 @@ contains
     end do
     !$omp end do
     !$omp end parallel
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_columns(layout_of(self, n_kernel), c_loc(rows), c_loc(columns))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_columns(layout_of(self, n_kernel), c_loc(rows), c_loc(columns))
       call move_alloc(columns, rows)
     end if
     call transform_kernel_columns(self, rows)
@@ -417,7 +420,7 @@ contains
     integer, intent(in) :: n_component
 
     call c_f_pointer(self%held%scratch%place(), self%work, [self%leading, even(self%n_row), n_component])
-    if (self%space%ranks%size > 1) then
+    if (self%ranks%size > 1) then
       call c_f_pointer(self%held%scratch%place(self%n_rows*(storage_size((1.0_wp, 0.0_wp))/64)), self%lines, &
                        [self%own_leading*even(self%extent(2)), n_component])
     else
@@ -432,27 +435,67 @@ contains
     beside = self%held%scratch%place(self%n_work*(storage_size((1.0_wp, 0.0_wp))/64))
   end function beside
 
+  !> Point to the memory of the row transforms, for fields of the window; to nothing where their transforms have no room behind them.
+  !>
+  !> Pairs of rows that are transformed from the last one on never reach one that is still to be read, and back from the first one on.
+  function in_place(self, n_component) result(field)
+    class(convolution_t), intent(in) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+    real(wp), pointer, contiguous :: field(:)
+
+    field => null()
+    if (self%ranks%size > 1 .or. self%leading < self%extent(1)) return
+    if (int(self%leading, int64)*even(self%n_row)*n_component > self%n_rows) return
+    call c_f_pointer(self%held%scratch%place(), field, [product(self%extent)*n_component])
+  end function in_place
+
+  !> Find the ends of the stages in which pairs of rows are transformed: one stage, but for fields in the memory of their
+  !> transforms, where a stage begins so late that these lie behind all of its rows.
+  subroutine find_stages(self, field, last)
+    class(convolution_t), intent(in) :: self
+    !> Fields (n_col, n_row, component)
+    real(wp), intent(in), contiguous, target :: field(:, :, :)
+    !> Pairs before the first stage, 0, and up to the end of each
+    integer, allocatable, intent(out) :: last(:)
+    integer :: end_of(storage_size(0) + 1), n
+
+    n = 1
+    end_of(1) = (self%n_row + 1)/2*size(field, 3)
+    if (c_associated(c_loc(field), self%held%scratch%place())) then
+      do while (end_of(n) > 1)
+        end_of(n + 1) = (end_of(n) + 1)/2
+        n = n + 1
+      end do
+    end if
+    allocate (last(0:n), source=[0, end_of(n:1:-1)])
+  end subroutine find_stages
+
   !> Transform the rows of fields.
   subroutine transform_fields(self, field)
     class(convolution_t), intent(inout) :: self
     !> Fields to be convolved (n_col, n_row, from)
-    real(wp), intent(in), contiguous :: field(:, :, :)
-    integer :: i, row, thread
+    real(wp), intent(in), contiguous, target :: field(:, :, :)
+    integer, allocatable :: last(:)
+    integer :: stage, pair, n, thread
 
+    n = (self%n_row + 1)/2
+    call find_stages(self, field, last)
     thread = 1
-    !$omp parallel num_threads(self%space%threads) private(i, row) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(stage, pair) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     self%row_buffer(self%extent(1) + 1:, 1, thread) = 0.0_wp
-    do i = 1, size(field, 3)
+    do stage = ubound(last, 1), 1, -1
       !$omp do schedule(static)
-      do row = 1, self%n_row, 2
-        call transform_rows(self, row, i, thread, field(:, :, i))
+      do pair = last(stage - 1), last(stage) - 1
+        call transform_rows(self, 2*modulo(pair, n) + 1, pair/n + 1, thread, &
+                            field(:, self%rows_before + 1:self%rows_before + self%n_row, pair/n + 1))
       end do
-      !$omp end do nowait
+      !$omp end do
     end do
     !$omp end parallel
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_columns(layout_of(self, size(self%work, 3)), c_loc(self%work), c_loc(self%lines))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_columns(layout_of(self, size(self%work, 3)), c_loc(self%work), c_loc(self%lines))
     end if
   end subroutine transform_fields
 
@@ -478,33 +521,56 @@ contains
   subroutine transform_back(self, result)
     class(convolution_t), intent(inout) :: self
     !> Sums of the convolutions (n_col, n_row, onto)
-    real(wp), intent(inout), contiguous :: result(:, :, :)
-    integer :: n(2), o, row, thread
+    real(wp), intent(inout), contiguous, target :: result(:, :, :)
+    integer, allocatable :: last(:)
+    integer :: n(2), stage, pair, o, row, thread
 
     n = [self%extent(1), self%n_row]
-    if (self%space%ranks%size > 1) then
-      call self%space%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
+    if (self%ranks%size > 1) then
+      call self%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
     end if
+    call find_stages(self, result, last)
     thread = 1
-    !$omp parallel num_threads(self%space%threads) private(o, row) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(stage, pair, o, row) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    do o = 1, size(result, 3)
+    do stage = 1, ubound(last, 1)
       !$omp do schedule(static)
-      do row = 1, n(2), 2
+      do pair = last(stage - 1), last(stage) - 1
+        o = pair/((n(2) + 1)/2) + 1
+        row = 2*modulo(pair, (n(2) + 1)/2) + 1
         ! an odd last row has no companion, but values of earlier products
         if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
           call fftw_execute_dft(self%held%plans%row, joined, transformed)
-          result(:, row, o) = self%factor*real(transformed(:n(1)), wp)
-          if (row < n(2)) result(:, row + 1, o) = -self%factor*aimag(transformed(:n(1)))
+          associate (both => result(:, self%rows_before + row:self%rows_before + min(row + 1, n(2)), o))
+            both(:, 1) = self%factor*real(transformed(:n(1)), wp)
+            if (row < n(2)) both(:, 2) = -self%factor*aimag(transformed(:n(1)))
+          end associate
         end associate
       end do
-      !$omp end do nowait
+      !$omp end do
     end do
     !$omp end parallel
+    if (self%space%helpers%size > 1) call gather_rows(self, result)
     if (perturb_convolution) call perturb(result)
   end subroutine transform_back
+
+  !> Take the rows that other ranks computed.
+  subroutine gather_rows(self, result)
+    class(convolution_t), intent(in) :: self
+    !> Sums of the convolutions, of which own rows are known (n_col, n_row, onto)
+    real(wp), intent(inout), contiguous, target :: result(:, :, :)
+    integer, parameter :: word = 32
+    real(wp), allocatable, target :: own(:, :)
+    integer :: o
+
+    do o = 1, size(result, 3)
+      own = result(:, self%rows_before + 1:self%rows_before + self%n_row, o)
+      call self%ranks%fetch(self%extent(1)*(storage_size(1.0_wp)/word), self%extent(2), c_loc(own), [1, self%extent(2)], &
+                            c_loc(result(1, 1, o)))
+    end do
+  end subroutine gather_rows
 
   !> Change every value by two units in the last place of the largest one; the parity of the bits of the value decides the sign.
   pure subroutine perturb(result)
@@ -533,17 +599,15 @@ contains
     class(convolution_t), intent(inout) :: self
     !> Index of the first row, of the component, and of the thread, whose buffer is zero beyond the window and stays so
     integer, intent(in) :: row, component, thread
-    !> Field (n_col, n_row)
-    real(wp), intent(in), contiguous :: field(:, :)
+    !> Field (n_col, n_row), which may lie in the place of its transforms
+    real(wp), intent(in), contiguous, target :: field(:, :)
     integer :: last
 
     last = min(row + 1, self%n_row)
-    ! the columns that only fill up the last block are transformed, too
-    self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
     associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
       ! rows off the contact need no transform
       if (all(abs(field(:, row:last)) <= 0.0_wp)) then
-        self%work(:self%n_frequency, row:row + 1, component) = 0.0_wp
+        self%work(:, row:row + 1, component) = 0.0_wp
         return
       end if
       if (last > row) then
@@ -555,6 +619,8 @@ contains
       call split_rows(transformed, self%work(:self%n_frequency, row, component), &
                       self%work(:self%n_frequency, row + 1, component))
     end associate
+    ! the columns that only fill up the last block are transformed, too
+    self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
   end subroutine transform_rows
 
   !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).

@@ -199,11 +199,11 @@ contains
         case (0)
           total(start:last, o) = (0.0_wp, 0.0_wp)
         case (1)
-          call add_1(m, sign, part(1)%spectrum, part(1)%value, total(start:last, o))
+          call add_1(sign, part(1)%spectrum, part(1)%value, total(start:last, o))
         case (2)
-          call add_2(m, sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, total(start:last, o))
+          call add_2(sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, total(start:last, o))
         case default
-          call add_3(m, sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, part(3)%spectrum, &
+          call add_3(sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, part(3)%spectrum, &
                      part(3)%value, total(start:last, o))
         end select
       end do
@@ -224,36 +224,34 @@ contains
   end subroutine rotate
 
   !> Compute total = conjg(sign * spectrum * field)
-  pure subroutine add_1(n, sign, s_1, f_1, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
+  pure subroutine add_1(sign, s_1, f_1, total)
     !> Sign and spectrum of the kernel
-    real(wp), intent(in) :: sign(1), s_1(n)
+    real(wp), intent(in) :: sign(1)
+    real(wp), intent(in), contiguous :: s_1(:)
     !> Transformed field and result
-    complex(wp), intent(in) :: f_1(n)
-    complex(wp), intent(inout) :: total(n)
+    complex(wp), intent(in), contiguous :: f_1(:)
+    complex(wp), intent(inout), contiguous :: total(:)
     real(wp) :: a
     integer :: f
 
-    do f = 1, n
+    do f = 1, size(total)
       a = sign(1)*s_1(f)
       total(f) = cmplx(a*real(f_1(f), wp), -a*aimag(f_1(f)), wp)
     end do
   end subroutine add_1
 
   !> Compute total = conjg(sum over two fields of sign * spectrum * field)
-  pure subroutine add_2(n, sign, s_1, f_1, s_2, f_2, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
+  pure subroutine add_2(sign, s_1, f_1, s_2, f_2, total)
     !> Signs and spectra of the kernels
-    real(wp), intent(in) :: sign(2), s_1(n), s_2(n)
+    real(wp), intent(in) :: sign(2)
+    real(wp), intent(in), contiguous :: s_1(:), s_2(:)
     !> Transformed fields and result
-    complex(wp), intent(in) :: f_1(n), f_2(n)
-    complex(wp), intent(inout) :: total(n)
+    complex(wp), intent(in), contiguous :: f_1(:), f_2(:)
+    complex(wp), intent(inout), contiguous :: total(:)
     real(wp) :: a, b
     integer :: f
 
-    do f = 1, n
+    do f = 1, size(total)
       a = sign(1)*s_1(f)
       b = sign(2)*s_2(f)
       total(f) = cmplx(a*real(f_1(f), wp) + b*real(f_2(f), wp), -a*aimag(f_1(f)) - b*aimag(f_2(f)), wp)
@@ -261,18 +259,17 @@ contains
   end subroutine add_2
 
   !> Compute total = conjg(sum over three fields of sign * spectrum * field)
-  pure subroutine add_3(n, sign, s_1, f_1, s_2, f_2, s_3, f_3, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
+  pure subroutine add_3(sign, s_1, f_1, s_2, f_2, s_3, f_3, total)
     !> Signs and spectra of the kernels
-    real(wp), intent(in) :: sign(3), s_1(n), s_2(n), s_3(n)
+    real(wp), intent(in) :: sign(3)
+    real(wp), intent(in), contiguous :: s_1(:), s_2(:), s_3(:)
     !> Transformed fields and result
-    complex(wp), intent(in) :: f_1(n), f_2(n), f_3(n)
-    complex(wp), intent(inout) :: total(n)
+    complex(wp), intent(in), contiguous :: f_1(:), f_2(:), f_3(:)
+    complex(wp), intent(inout), contiguous :: total(:)
     real(wp) :: a, b, c
     integer :: f
 
-    do f = 1, n
+    do f = 1, size(total)
       a = sign(1)*s_1(f)
       b = sign(2)*s_2(f)
       c = sign(3)*s_3(f)

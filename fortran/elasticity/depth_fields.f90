@@ -162,22 +162,22 @@ contains
   end subroutine find_images
 
   !> Add displacement times the shear modulus, and stress, by the potentials of the three loads at one of the depths.
-  pure subroutine add(self, j, n, p, q_x, q_y, spacing, displacement, stress)
+  pure subroutine add(self, j, p, q_x, q_y, spacing, displacement, stress)
     class(depth_fields_t), intent(in) :: self
-    !> Number of the depth, and of the points
-    integer, intent(in) :: j, n
-    !> Derivatives for the pressure, and for the traction along x and y that acts on the body
-    real(wp), intent(in) :: p(n, n_derivative), q_x(n, n_derivative), q_y(n, n_derivative)
+    !> Number of the depth
+    integer, intent(in) :: j
+    !> Derivatives for the pressure, and for the traction along x and y that acts on the body (point, derivative)
+    real(wp), intent(in), contiguous :: p(:, :), q_x(:, :), q_y(:, :)
     !> Length that those refer to [m]
     real(wp), intent(in) :: spacing
     !> Point; direction x, y, z or component; load. Lengths are over the spacing
-    real(wp), intent(inout) :: displacement(n, 3, 3), stress(n, 6, 3)
-    real(wp) :: u(n, 3, 3), s(n, 6, 3), z(n)
+    real(wp), intent(inout), contiguous :: displacement(:, :, :), stress(:, :, :)
+    real(wp) :: u(size(p, 1), 3, 3), s(size(p, 1), 6, 3), z(size(p, 1))
 
     if (abs(self%weight(j)) > 0.0_wp) then
       z = self%depth(j)/spacing
-      call displacements(n, p, q_x, q_y, z, self%poisson_ratio, u)
-      call stresses(n, p, q_x, q_y, self%poisson_ratio, s)
+      call displacements(size(z), p, q_x, q_y, z, self%poisson_ratio, u)
+      call stresses(size(z), p, q_x, q_y, self%poisson_ratio, s)
       displacement = displacement + self%weight(j)*self%stiffness*u
       stress = stress + self%weight(j)*s
     else

@@ -30,6 +30,7 @@ module hc_coupled_system
     procedure :: product => coupled_product
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
+    procedure :: take_image => coupled_image
   end type coupled_system_t
 
 contains
@@ -137,5 +138,16 @@ contains
       call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:), error)
     end associate
   end subroutine coupled_precondition_packed
+
+  !> Point to memory for a product: that of the operator, if it has some.
+  subroutine coupled_image(self, n, own, image, stat)
+    class(coupled_system_t), intent(in) :: self
+    integer, intent(in) :: n
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    integer, intent(out) :: stat
+
+    call self%operators%take_image(3, own, image, stat)
+  end subroutine coupled_image
 
 end module hc_coupled_system

@@ -8,6 +8,7 @@
 module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_communicator, only: communicator_t
   use hc_options, only: newton_options_t
   use hc_field_space, only: space_over
   use hc_scratch, only: scratch_t
@@ -43,7 +44,7 @@ module hc_frictional_contact
 contains
 
   !> Set up the operators of a problem on all its lattices.
-  subroutine new_frictional_contact(self, problem, error, n_threads, cache, shared)
+  subroutine new_frictional_contact(self, problem, error, n_threads, cache, shared, ranks)
     !> Solver to be set up
     type(frictional_contact_t), intent(out) :: self
     !> The problem
@@ -56,6 +57,8 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Memory of the transforms of a solver that is never used at the same time, and freed later
     type(scratch_t), pointer, intent(in), optional :: shared
+    !> Ranks that share the products, each with all fields; absent: one
+    type(communicator_t), intent(in), optional :: ranks
     type(scratch_t), pointer :: scratch
     integer :: l, n_level
 
@@ -87,6 +90,7 @@ contains
 
       level%space = space_over(level%lattice%extent, n_threads)
       level%space%scratch => scratch
+      if (present(ranks)) level%space%helpers = ranks%over(level%lattice%extent)
       call new_operators(operators, level%lattice, level%medium, level%space, error, cache, level%options%preconditioner)
     end subroutine prepare
 

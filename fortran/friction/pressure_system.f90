@@ -23,6 +23,7 @@ module hc_pressure_system
     procedure :: product => pressure_product
     procedure :: product_packed => pressure_product_packed
     procedure :: precondition_packed => pressure_precondition_packed
+    procedure :: take_image => pressure_image
   end type pressure_system_t
 
 contains
@@ -91,5 +92,16 @@ contains
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed
+
+  !> Point to memory for a product: that of the operator, if it has some.
+  subroutine pressure_image(self, n, own, image, stat)
+    class(pressure_system_t), intent(in) :: self
+    integer, intent(in) :: n
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    integer, intent(out) :: stat
+
+    call self%operators%take_image(1, own, image, stat)
+  end subroutine pressure_image
 
 end module hc_pressure_system

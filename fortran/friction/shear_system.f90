@@ -46,6 +46,7 @@ module hc_shear_system
     procedure :: product => shear_product
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
+    procedure :: take_image => shear_image
     !> Turn components along x and y into the frames, or back
     procedure :: turn
     !> Let every node stick; free frames and compliances until then
@@ -375,5 +376,16 @@ contains
       end do
     end associate
   end subroutine sum_behind
+
+  !> Point to memory for a product: that of the operator, if it has some.
+  subroutine shear_image(self, n, own, image, stat)
+    class(shear_system_t), intent(in) :: self
+    integer, intent(in) :: n
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    integer, intent(out) :: stat
+
+    call self%operators%take_image(2, own, image, stat)
+  end subroutine shear_image
 
 end module hc_shear_system

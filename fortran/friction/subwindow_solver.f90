@@ -8,6 +8,7 @@
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_communicator, only: communicator_t
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
@@ -29,6 +30,8 @@ module hc_subwindow_solver
     integer :: threads = 0
     !> Cache of spectra
     type(kernel_cache_t), pointer :: cache => null()
+    !> Ranks that share the products
+    type(communicator_t) :: ranks
   contains
     procedure :: solve_step
     procedure :: set_gap
@@ -37,7 +40,7 @@ module hc_subwindow_solver
 contains
 
   !> Set up the operators of a problem on its window; those of parts are set up on demand.
-  subroutine new_windowed_friction(self, problem, error, n_threads, cache)
+  subroutine new_windowed_friction(self, problem, error, n_threads, cache, ranks)
     !> Solver to be set up
     type(windowed_friction_t), intent(out) :: self
     !> The problem
@@ -48,10 +51,13 @@ contains
     integer, intent(in), optional :: n_threads
     !> Cache of spectra; it has to outlive the solver
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> Ranks that share the products, each with all fields; absent: one
+    type(communicator_t), intent(in), optional :: ranks
 
+    if (present(ranks)) self%ranks = ranks
     if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
-    call new_frictional_contact(self%frictional_contact_t, problem, error, n_threads, self%cache)
+    call new_frictional_contact(self%frictional_contact_t, problem, error, n_threads, self%cache, ranks=self%ranks)
   end subroutine new_windowed_friction
 
   !> Count the bytes of a problem while a step is solved on the window; parts, and their spectra in the cache, take
@@ -150,7 +156,7 @@ contains
     self%high = high
     call self%problem%extract_part(low, high, problem)
     allocate (self%part)
-    call new_frictional_contact(self%part, problem, error, self%threads, self%cache, shared=self%problem%space%scratch)
+    call new_frictional_contact(self%part, problem, error, self%threads, self%cache, self%problem%space%scratch, self%ranks)
     if (allocated(error)) deallocate (self%part)
   end subroutine extract_part
 

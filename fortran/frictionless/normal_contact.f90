@@ -294,12 +294,12 @@ contains
     own = level%lattice%first(2) + own - 1
     wanted = [floor_half(own(1)), floor_half(own(2) + 1)] - coarser%lattice%first(2) + 1
     wanted = wanted + [-neighbors_of_neighbors, neighbors_of_neighbors]
-    wanted = min(max(wanted, 1), coarser%lattice%extent(2))
+    if (.not. coarser%lattice%periodic(2)) wanted = min(max(wanted, 1), coarser%lattice%extent(2))
     coarse_rows = coarser%rows_of(wanted(1), wanted(2))
     allocate (rows(coarser%lattice%extent(1), wanted(2) - wanted(1) + 1))
-    call coarser%space%fetch(coarser%lattice%extent(2), coarse%pressure, wanted(1), rows)
+    call coarser%take_rows(coarse%pressure, wanted(1), rows)
     coarse%pressure = rows
-    call coarser%space%fetch(coarser%lattice%extent(2), coarse%gap, wanted(1), rows)
+    call coarser%take_rows(coarse%gap, wanted(1), rows)
     coarse%gap = rows
   end subroutine take_coarse_rows
 

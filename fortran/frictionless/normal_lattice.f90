@@ -91,7 +91,7 @@ contains
     call new_symbol_preconditioner(preconditioner, self%lattice, self%medium, space, self%options%preconditioner, error, cache)
     if (allocated(error)) return
     call move_alloc(preconditioner, self%preconditioner)
-    call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), 1, 1, space, error, &
+    call new_convolution(self%single, self%lattice%extent, transform_length(self%lattice), [1, 0], 1, space, error, &
                          beside=before_last(self) + self%own_size()*(storage_size(1.0_sp)/8))
     if (allocated(error)) return
     if (self%exact) then

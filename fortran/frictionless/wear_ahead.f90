@@ -5,6 +5,8 @@
 !> never takes more than there is pressure left to take away, however long the jump. The change from the
 !> pressure of the cycle is the only unknown, so that shear tractions and bulk strains, which are constant, do not enter.
 !>
+!> Ranks that share the window each hold their rows of all fields.
+!>
 !> Equations: docs/theory/wear.md, (V3), (V4).
 module hc_wear_ahead
   use hc_precision, only: wp
@@ -24,7 +26,7 @@ module hc_wear_ahead
 
   public :: worn_cycle_t, energy_ahead, energy_ahead_memory
 
-  !> What is known at the end of a cycle; fields over the window (n_col, n_row).
+  !> What is known at the end of a cycle; fields over the window (n_col, own rows).
   type :: worn_cycle_t
     !> Dissipated energy by area [J/m^2] and path of slip [m] of the cycle
     real(wp), allocatable :: energy(:, :), path(:, :)
@@ -88,7 +90,7 @@ contains
 
     ahead = now%energy
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
-    if (.not. any(now%candidate .and. before > 0.0_wp)) return
+    if (problem%space%count(now%candidate .and. before > 0.0_wp) == 0) return
     spring = merge(wear*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
     call settle(now, problem, before, spring, tolerance, after, error, cache)
     if (allocated(error)) return
@@ -134,7 +136,7 @@ contains
       end do
     end do
     call new_normal_problem(level, problem%lattice, problem%medium, merge(now%gap, 0.0_wp, now%candidate), now%candidate, &
-                            error, nodal_springs_t(reshape(spring + layer, [size(spring)])))
+                            error, nodal_springs_t(reshape(spring + layer, [size(spring)])), problem%space)
     if (allocated(error)) return
     call level%prepare(kernel, .true., .true., problem%space, error, cache)
     if (allocated(error)) return
@@ -143,7 +145,7 @@ contains
     if (allocated(error)) return
     closing = closing + layer*before
     ! the gap under `before` is that of the cycle, 0 where nodes carry
-    lift = maxval(closing, mask=now%candidate)
+    lift = problem%space%max(closing, now%candidate)
     level%initial_gap = lift - closing
     do row = 1, size(before, 2)
       do col = 1, size(before, 1)
@@ -156,7 +158,7 @@ contains
     end do
     allocate (state%pressure, source=merge(before, 0.0_wp, now%candidate))
     target = load_target_t([merge(force_control, displacement_control, now%by_load)], &
-                           [merge(problem%lattice%cell_area()*sum(state%pressure), lift, now%by_load)])
+                           [merge(problem%lattice%cell_area()*problem%space%sum(state%pressure), lift, now%by_load)])
     call solve_on_normal_lattice(level, iterate, target, tolerance, max_sweeps, state, error)
     if (allocated(error)) return
     if (.not. state%converged) then

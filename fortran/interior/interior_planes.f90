@@ -123,7 +123,7 @@ contains
     logical, intent(in), optional :: displaced
 
     type(field_space_t) :: shared
-    integer :: stat
+    integer :: n_even, stat
     logical :: coated
 
     call check_lattice(lattice, error)
@@ -144,9 +144,9 @@ contains
       call raise(error, status%resources, 'not enough memory for the stress: use a smaller window')
       return
     end if
+    n_even = planes%tables%first_odd - 1
     call new_convolution(planes%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         size(planes%tables%load), max(planes%tables%n_component, 3), shared, error, &
-                         first_odd=planes%tables%first_odd)
+                         [n_even, size(planes%tables%load) - n_even], max(planes%tables%n_component, 3), shared, error)
   end subroutine new_interior_planes
 
   !> Bytes that planes take, the setting up of their tables included.
@@ -260,7 +260,7 @@ contains
       do depth = 1, size(self%fields%depth)
         z = self%fields%depth(depth)/self%spacing
         call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-        call self%fields%add(depth, m, d(:m, :), d(:m, :), d(:m, :), self%spacing, u(:m, :, :), s(:m, :, :))
+        call self%fields%add(depth, d(:m, :), d(:m, :), d(:m, :), self%spacing, u(:m, :, :), s(:m, :, :))
       end do
       if (self%tables%kind == of_displacement) s(:, :3, :) = u
       do t = 1, size(k, 1)

@@ -23,6 +23,16 @@ module hc_interior_points
 
   public :: fields_at_points, check_body
 
+  !> Nodes that carry traction in any step.
+  type :: loaded_nodes_t
+    !> What one of them carries
+    type(interior_pyramid_t) :: pyramid
+    !> Positions (node, direction) [m]
+    real(wp), allocatable :: position(:, :)
+    !> Tractions in the frame of the body (node, component of the steps one after the other) [Pa]
+    real(wp), allocatable :: traction(:, :)
+  end type loaded_nodes_t
+
   !> Error at one of several depths, which threads compute.
   type :: fault_t
     type(error_t), allocatable :: error
@@ -53,6 +63,7 @@ contains
 
     type(field_space_t) :: shared
     type(periodic_interior_t) :: repeating
+    type(loaded_nodes_t) :: loaded
 
     call check_lattice(lattice, error)
     if (.not. allocated(error)) call check_body(body, error)
@@ -65,7 +76,8 @@ contains
       call new_periodic_interior(repeating, lattice, body, inside, traction, shared, error)
       if (.not. allocated(error)) call repeating%at_points(points, displacement, stress, error)
     else
-      call sum_at_points(lattice, traction, body, inside, points, displacement, stress, shared, error)
+      call new_loaded_nodes(loaded, lattice, traction, body, error)
+      if (.not. allocated(error)) call sum_at_points(loaded, inside, points, displacement, stress, shared, error)
     end if
     if (allocated(error)) return
     if (body == 2) then
@@ -75,10 +87,8 @@ contains
   end subroutine fields_at_points
 
   !> Sum over the pyramids of a window that ends. The influence of a pyramid on a point is worked out once for all steps.
-  subroutine sum_at_points(lattice, traction, body, inside, points, displacement, stress, space, error)
-    type(lattice_t), intent(in) :: lattice
-    real(wp), intent(in), contiguous :: traction(:, :, :, :)
-    integer, intent(in) :: body
+  subroutine sum_at_points(loaded, inside, points, displacement, stress, space, error)
+    type(loaded_nodes_t), intent(in) :: loaded
     type(layered_body_t), intent(in) :: inside
     real(wp), intent(in) :: points(:, :)
     real(wp), intent(out) :: displacement(:, :, :), stress(:, :, :)
@@ -86,19 +96,16 @@ contains
     !> Allocated on failure: layers that images do not describe, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
-    type(interior_pyramid_t) :: pyramid
     type(depth_fields_t), allocatable :: fields(:)
-    real(wp), allocatable :: node(:, :), load(:, :), sums(:, :, :)
+    real(wp), allocatable :: sums(:, :, :)
     integer, allocatable :: level(:)
     real(wp) :: u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
     integer :: i, j, step, k, thread, stat
 
-    call loaded_nodes(lattice, traction, body, node, load, error)
-    if (.not. allocated(error)) call find_levels(inside, points(3, :), level, fields, error)
+    call find_levels(inside, points(3, :), level, fields, error)
     if (allocated(error)) return
-    call new_interior_pyramid(pyramid, lattice%basis)
     ! of each thread; no stack holds those of many steps
-    allocate (sums(n_derivative, 3*size(traction, 4), space%threads), stat=stat)
+    allocate (sums(n_derivative, size(loaded%traction, 2), space%threads), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
       return
@@ -111,14 +118,14 @@ contains
       displacement(:, i, :) = 0.0_wp
       stress(:, i, :) = 0.0_wp
       do j = 1, size(fields(level(i))%depth)
-        call sum_pyramids(pyramid, node, load, [points(:2, i), fields(level(i))%depth(j)], sums(:, :, thread))
-        do step = 1, size(traction, 4)
+        call sum_pyramids(loaded, [points(:2, i), fields(level(i))%depth(j)], sums(:, :, thread))
+        do step = 1, size(displacement, 3)
           k = 3*(step - 1)
           d(1, :, :) = sums(:, k + 1:k + 3, thread)
           u = 0.0_wp
           s = 0.0_wp
-          call fields(level(i))%add(j, 1, d(:, :, 1), d(:, :, 2), d(:, :, 3), pyramid%spacing, u, s)
-          displacement(:, i, step) = displacement(:, i, step) + pyramid%spacing*sum(u(1, :, :), dim=2)
+          call fields(level(i))%add(j, d(:, :, 1), d(:, :, 2), d(:, :, 3), loaded%pyramid%spacing, u, s)
+          displacement(:, i, step) = displacement(:, i, step) + loaded%pyramid%spacing*sum(u(1, :, :), dim=2)
           stress(:, i, step) = stress(:, i, step) + sum(s(1, :, :), dim=2)
         end do
       end do
@@ -171,17 +178,14 @@ contains
     if (body /= 1 .and. body /= 2) call raise(error, status%invalid_input, 'the number of the body: 1 or 2 expected')
   end subroutine check_body
 
-  !> Nodes that carry traction in any step, and their tractions in the frame of the body.
-  subroutine loaded_nodes(lattice, traction, body, node, load, error)
+  !> Find the nodes that carry traction.
+  subroutine new_loaded_nodes(self, lattice, traction, body, error)
+    type(loaded_nodes_t), intent(out) :: self
     type(lattice_t), intent(in) :: lattice
     !> Pressure and traction on body 1 (n_col, n_row, component, step) [Pa]
     real(wp), intent(in) :: traction(:, :, :, :)
     !> Number of the body
     integer, intent(in) :: body
-    !> Positions (node, direction) [m]
-    real(wp), allocatable, intent(out) :: node(:, :)
-    !> Tractions (node, component of the steps one after the other) [Pa]
-    real(wp), allocatable, intent(out) :: load(:, :)
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
 
@@ -190,11 +194,12 @@ contains
 
     n_step = size(traction, 4)
     n = count(any(any(abs(traction) > 0.0_wp, dim=4), dim=3))
-    allocate (node(n, 2), load(n, 3*n_step), stat=stat)
+    allocate (self%position(n, 2), self%traction(n, 3*n_step), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the tractions: use fewer load steps')
       return
     end if
+    call new_interior_pyramid(self%pyramid, lattice%basis)
     side = merge(1.0_wp, -1.0_wp, body == 1)
     n = 0
     do row = 1, size(traction, 2)
@@ -202,19 +207,17 @@ contains
         if (.not. any(abs(traction(col, row, :, :)) > 0.0_wp)) cycle
         n = n + 1
         index = real(lattice%first + [col, row] - 1, wp)
-        node(n, :) = lattice%origin + matmul(lattice%basis, index)
-        load(n, 1::3) = traction(col, row, 1, :)
-        load(n, 2::3) = side*traction(col, row, 2, :)
-        load(n, 3::3) = side*traction(col, row, 3, :)
+        self%position(n, :) = lattice%origin + matmul(lattice%basis, index)
+        self%traction(n, 1::3) = traction(col, row, 1, :)
+        self%traction(n, 2::3) = side*traction(col, row, 2, :)
+        self%traction(n, 3::3) = side*traction(col, row, 3, :)
       end do
     end do
-  end subroutine loaded_nodes
+  end subroutine new_loaded_nodes
 
   !> Derivatives of the potentials of all loads at a point.
-  pure subroutine sum_pyramids(pyramid, node, load, point, sums)
-    type(interior_pyramid_t), intent(in) :: pyramid
-    !> Positions (node, direction) [m], and loads (node, load)
-    real(wp), intent(in) :: node(:, :), load(:, :)
+  pure subroutine sum_pyramids(loaded, point, sums)
+    type(loaded_nodes_t), intent(in) :: loaded
     !> The point [m]
     real(wp), intent(in) :: point(3)
     !> Sums (derivative, load), lengths in longest edges
@@ -224,16 +227,18 @@ contains
     integer :: first, last, n, direction
 
     sums = 0.0_wp
-    at(:, 3) = point(3)/pyramid%spacing
-    do first = 1, size(node, 1), most_points
-      last = min(first + most_points - 1, size(node, 1))
-      n = last - first + 1
-      do direction = 1, 2
-        at(:n, direction) = (point(direction) - node(first:last, direction))/pyramid%spacing
+    associate (pyramid => loaded%pyramid, node => loaded%position)
+      at(:, 3) = point(3)/pyramid%spacing
+      do first = 1, size(node, 1), most_points
+        last = min(first + most_points - 1, size(node, 1))
+        n = last - first + 1
+        do direction = 1, 2
+          at(:n, direction) = (point(direction) - node(first:last, direction))/pyramid%spacing
+        end do
+        call pyramid%potentials(n, at(:n, 1), at(:n, 2), at(:n, 3), d(:n, :))
+        sums = sums + matmul(transpose(d(:n, :)), loaded%traction(first:last, :))
       end do
-      call pyramid%potentials(n, at(:n, 1), at(:n, 2), at(:n, 3), d(:n, :))
-      sums = sums + matmul(transpose(d(:n, :)), load(first:last, :))
-    end do
+    end associate
   end subroutine sum_pyramids
 
 end module hc_interior_points

@@ -376,7 +376,7 @@ contains
         s = 0.0_wp
         do j = 1, n_level + 1
           d(1, :, :) = sums(:, 3*step - 2:3*step, j)
-          call at%near%add(j, 1, d(:, :, 1), d(:, :, 2), d(:, :, 3), self%pyramid%spacing, u, s)
+          call at%near%add(j, d(:, :, 1), d(:, :, 2), d(:, :, 3), self%pyramid%spacing, u, s)
         end do
         total(:xz, step, i) = total(:xz, step, i) + sum(s(1, :, :), dim=2)
         total(u_x:, step, i) = total(u_x:, step, i) + self%pyramid%spacing*sum(u(1, :, :), dim=2)
@@ -563,7 +563,7 @@ contains
         do j = 1, n_level + 1
           z = at%near%depth(j)/spacing
           call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-          call at%near%add(j, m, d(:m, :), d(:m, :), d(:m, :), spacing, u(:m, :, :), s(:m, :, :))
+          call at%near%add(j, d(:m, :), d(:m, :), d(:m, :), spacing, u(:m, :, :), s(:m, :, :))
         end do
         do i = 1, m
           there = modulo(node(:, from + i - 1), lattice%extent) + 1

@@ -27,6 +27,8 @@ module hc_field_space
     integer :: threads = 1
     !> Ranks that share the rows of the window; by default this one holds all
     type(communicator_t) :: ranks = communicator_t()
+    !> Ranks that share the transforms of fields of which each holds all rows, and their spectra; by default this one has them all
+    type(communicator_t) :: helpers = communicator_t()
     !> Memory that the transforms of a solver share; not there: each has its own
     type(scratch_t), pointer :: scratch => null()
   contains

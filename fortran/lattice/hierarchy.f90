@@ -27,8 +27,8 @@ module hc_hierarchy
   contains
     !> Columns and rows of a field in the memory of this rank, and their product
     procedure :: own_extent, own_rows, own_size
-    !> Lattice of some rows
-    procedure :: rows_of
+    !> Lattice of some rows, and a field there
+    procedure :: rows_of, take_rows
     !> Field on a part of the window, and back
     procedure :: cut, paste
     !> The same problem on the lattice of every second node
@@ -157,7 +157,32 @@ contains
     integer, intent(in) :: first, last
 
     rows = self%lattice%subwindow([1, first], [self%lattice%extent(1), last])
+    rows%periodic(1) = self%lattice%periodic(1)
   end function rows_of
+
+  !> Take some rows of a field: beyond the first and the last one, by less than a window, those of the other side.
+  subroutine take_rows(self, field, first, rows)
+    class(level_t), intent(in) :: self
+    !> Field (n_col, own rows)
+    real(wp), intent(in), contiguous :: field(:, :)
+    !> First of the rows, and their values (n_col, number of rows)
+    integer, intent(in) :: first
+    real(wp), intent(out), contiguous :: rows(:, :)
+    integer :: before, within
+
+    associate (n => self%lattice%extent(2))
+      if (.not. self%lattice%periodic(2)) then
+        call self%space%fetch(n, field, first, rows)
+        return
+      end if
+      ! every rank takes part in all of them
+      before = min(max(1 - first, 0), size(rows, 2))
+      within = max(min(n - first + 1, size(rows, 2)), before)
+      call self%space%fetch(n, field, n + first, rows(:, :before))
+      call self%space%fetch(n, field, max(first, 1), rows(:, before + 1:within))
+      call self%space%fetch(n, field, max(first - n, 1), rows(:, within + 1:))
+    end associate
+  end subroutine take_rows
 
   !> Take a field on a part of the window.
   subroutine cut(self, field, low, part, values)

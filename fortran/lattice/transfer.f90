@@ -54,7 +54,7 @@ contains
     !$omp end parallel do
   end subroutine prolong
 
-  !> Take a row of a coarse field and its continuation; a periodic window continues with its other side.
+  !> Take a row of a coarse field and its continuation; a window continues with its other side where it repeats.
   pure subroutine take_row(lattice, field, row, held, first, values)
     !> Coarse lattice and window, and field (n_col, n_row)
     type(lattice_t), intent(in) :: lattice
@@ -68,24 +68,24 @@ contains
     integer :: c, r
 
     r = row - lattice%first(2) + 1
+    if (lattice%periodic(2)) r = modulo(r - 1, size(field, 2)) + 1
     associate (start => lattice%first(1), n => shape(field))
-      if (lattice%is_periodic()) then
-        do c = first, ubound(values, 1)
-          values(c) = field(modulo(c - start, n(1)) + 1, modulo(r - 1, n(2)) + 1)
-        end do
-        return
-      end if
-      if (held) then
-        do c = first, ubound(values, 1)
-          values(c) = field(min(max(c - start + 1, 1), n(1)), min(max(r, 1), n(2)))
-        end do
-        return
-      end if
       values = 0.0_wp
-      if (r < 1 .or. r > n(2)) return
-      do c = max(first, start), min(ubound(values, 1), start + n(1) - 1)
-        values(c) = field(c - start + 1, r)
-      end do
+      if ((r < 1 .or. r > n(2)) .and. .not. held) return
+      r = min(max(r, 1), n(2))
+      if (lattice%periodic(1)) then
+        do c = first, ubound(values, 1)
+          values(c) = field(modulo(c - start, n(1)) + 1, r)
+        end do
+      else if (held) then
+        do c = first, ubound(values, 1)
+          values(c) = field(min(max(c - start + 1, 1), n(1)), r)
+        end do
+      else
+        do c = max(first, start), min(ubound(values, 1), start + n(1) - 1)
+          values(c) = field(c - start + 1, r)
+        end do
+      end if
     end associate
   end subroutine take_row
 
@@ -124,7 +124,7 @@ contains
                                                           coarse(max(1, 1 + c):min(last, last + c), r))
         end associate
       end do
-      if (coarse_lattice%is_periodic()) around([1, last]) = 1.0_wp
+      if (coarse_lattice%periodic(1)) around([1, last]) = 1.0_wp
       do col = 1, last
         if (coarse(col, row) > 0.0_wp .or. .not. around(col) > 0.0_wp) cycle
         beyond = 0.0_wp

@@ -38,6 +38,8 @@ module hc_linear_system
     procedure :: product_packed
     !> z = M r at the active nodes
     procedure :: precondition_packed
+    !> Memory for a product over all nodes
+    procedure :: take_image
   end type linear_system_t
 
   !> Linear constraints on the unknowns (nodes, number of constraints, may be 0).
@@ -124,6 +126,23 @@ contains
     call nodes%unpack(x, from)
     call self%product(from, y, error)
   end subroutine product_packed
+
+  !> Point to memory for a product of `product_packed`, which stays there until the next product or preconditioner: by default that
+  !> of the caller.
+  subroutine take_image(self, n, own, image, stat)
+    class(linear_system_t), intent(in) :: self
+    !> Number of all nodes
+    integer, intent(in) :: n
+    !> Memory of the caller, allocated if it is needed
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    !> Not zero: there is not enough memory
+    integer, intent(out) :: stat
+
+    stat = 0
+    if (.not. allocated(own)) allocate (own(n), stat=stat)
+    image => own
+  end subroutine take_image
 
   !> Compute z = M r at the active nodes: by default M is the identity.
   subroutine precondition_packed(self, nodes, n, r, z, error)

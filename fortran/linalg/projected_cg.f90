@@ -10,7 +10,7 @@
 module hc_projected_cg
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_field_space, only: field_space_t
@@ -58,8 +58,9 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    !> Product of a direction, over all nodes
-    real(wp), allocatable :: onto(:)
+    !> Product of a direction, over all nodes, and memory for it where the system has none
+    real(wp), pointer, contiguous :: onto(:)
+    real(wp), allocatable, target :: own(:)
     !> On the active nodes: the residual; its preconditioned projection, whose memory serves for the product of the
     !> direction, too; the direction
     real(wp), allocatable :: r(:), z(:), d(:)
@@ -69,11 +70,16 @@ contains
     real(wp) :: inverse(size(change), size(change))
     type(field_space_t) :: space
     logical :: independent, anew
+    integer :: stat
 
     space = system%space
-    call find_residual(nodes, rhs, ax, space, r, z)
-    allocate (d(size(r)), onto(size(x)))
+    ! before there are vectors
     call constraints%invert(space, inverse, independent)
+    call find_residual(nodes, rhs, ax, space, r, z)
+    allocate (d(size(r)))
+    call system%take_image(size(x), own, onto, stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for a product: choose a smaller window')
+    if (allocated(error)) return
     iteration%made = 0
     iteration%outcome = iterations_used_up
     largest = 0.0_wp

@@ -50,17 +50,18 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
-      !> nodes
-      real(wp), allocatable :: v(:), z(:)
-      !> The product A z on the others
-      real(sp), allocatable :: beyond(:)
+      !> Weighted residual v, on the active nodes
+      real(wp), allocatable :: v(:)
+      !> M r there, r that residual without its weights: the direction is z = M r + M B share with C^T z = 0; and the product A z on
+      !> the other nodes
+      real(sp), allocatable :: mr(:), beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
     type(active_set_t) :: others
-    !> A product over all nodes
-    real(wp), allocatable :: image(:)
+    !> A product over all nodes, and memory for it where the system has none
+    real(wp), pointer, contiguous :: image(:)
+    real(wp), allocatable, target :: own(:)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(iteration%weight))
     !> H, and after rotations
@@ -144,23 +145,18 @@ contains
       h = 0.0_wp
       do k = 1, most
         stat = 0
-        if (.not. allocated(basis(k)%z)) then
+        if (.not. allocated(basis(k)%mr)) then
           if (k == many) call give_back(size(x))
-          allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+          allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
         end if
-        if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
+        if (stat == 0) call system%take_image(size(x), own, image, stat)
         if (stat /= 0) then
           call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
           return
         end if
-        ! the memory of the next direction serves for the residual without its weights
-        call space%copy(basis(k)%v, basis(k + 1)%v)
-        call weigh(1.0_wp/iteration%weight, basis(k + 1)%v)
-        call system%precondition_packed(nodes, size(x), basis(k + 1)%v, basis(k)%z, error)
+        call find_direction(k)
         if (allocated(error)) return
-        share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k)%z))
-        call constraints%add_mb(space, share(:, k), basis(k)%z)
-        call system%product_packed(nodes, basis(k)%z, image, error)
+        call system%product_packed(nodes, basis(k + 1)%v, image, error)
         if (allocated(error)) return
         call nodes%pack(image, basis(k + 1)%v)
         call others%pack(image, basis(k)%beyond)
@@ -193,12 +189,27 @@ contains
       if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
+    !> Compute a direction, in the memory of the next residual; what is stored of it is rounded before it is multiplied.
+    subroutine find_direction(k)
+      !> Its number
+      integer, intent(in) :: k
+
+      call weigh(1.0_wp/iteration%weight, basis(k)%v)
+      call system%precondition_packed(nodes, size(x), basis(k)%v, basis(k + 1)%v, error)
+      if (allocated(error)) return
+      call weigh(iteration%weight, basis(k)%v)
+      basis(k)%mr = real(basis(k + 1)%v, sp)
+      basis(k + 1)%v = basis(k)%mr
+      share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k + 1)%v))
+      call constraints%add_mb(space, share(:, k), basis(k + 1)%v)
+    end subroutine find_direction
+
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
       real(wp), allocatable :: packed(:)
       integer :: i
 
-      if (allocated(image)) deallocate (image)
+      if (allocated(own)) deallocate (own)
       allocate (packed(nodes%n_active))
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
@@ -219,8 +230,11 @@ contains
       call weigh(1.0_wp/iteration%weight, packed)
       call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), packed)
       call nodes%add(1.0_wp, packed, ax)
+      packed = 0.0_wp
+      call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), packed)
+      call nodes%add(1.0_wp, packed, x)
       do i = 1, directions
-        call nodes%add(y(i), basis(i)%z, x)
+        call nodes%add(y(i), basis(i)%mr, x)
         call others%add(y(i), basis(i)%beyond, ax)
         iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*max(maxval(abs(basis(i)%beyond)), 0.0_sp)
       end do

@@ -34,8 +34,8 @@ module hc_flexibility
   contains
     !> Relative displacements of given tractions
     procedure(apply), deferred :: apply
-    !> Tractions replaced by the relative displacements that they cause
-    procedure :: replace
+    !> Tractions replaced by the relative displacements that they cause, and memory that the operator has for them
+    procedure :: replace, in_place
     !> Do the arrays fit the window and the components?
     procedure :: check
     !> Add one product to the count
@@ -119,6 +119,17 @@ contains
     allocate (traction, source=values)
     call self%apply(components, traction, components, values, error)
   end subroutine replace
+
+  !> Point to memory for components as vectors, of which the next use of operators and preconditioners makes something else; by
+  !> default there is none.
+  function in_place(self, n_component) result(values)
+    class(flexibility_t), intent(in) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+    real(wp), pointer, contiguous :: values(:)
+
+    values => null()
+  end function in_place
 
   !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)

@@ -37,6 +37,7 @@ module hc_flexibility_fft
   contains
     procedure :: apply => fft_apply
     procedure :: replace => fft_replace
+    procedure :: in_place => fft_in_place
   end type fft_flexibility_t
 
   !> The blocks of the operator at lattice offsets, over the unit of the bodies.
@@ -75,7 +76,7 @@ contains
     class(elastic_medium_t), allocatable :: reduced
     type(kernel_key_t) :: key
     type(field_space_t) :: shared
-    integer :: first_odd, n_kernel, i
+    integer :: n_kernel(2), i
     logical :: only_normal, found
 
     call check_operator(lattice, medium, error)
@@ -90,16 +91,16 @@ contains
     operator%n_component = merge(1, 3, only_normal)
     operator%index = block_index
     source%transformed = [(i, i=1, n_block)]
-    first_odd = n_even + 1
     if (medium%trace() > 0.0_wp) then
       operator%index = spectrum_index
       source%transformed = with_trace
-      first_odd = n_even
     end if
-    n_kernel = merge(1, spectra_of(medium), only_normal)
-    operator%at_once = components_at_once(n_kernel)
+    n_kernel = [1, 0]
+    if (.not. only_normal) n_kernel(1) = n_even - merge(1, 0, medium%trace() > 0.0_wp)
+    if (.not. only_normal) n_kernel(2) = spectra_of(medium) - n_kernel(1)
+    operator%at_once = components_at_once(sum(n_kernel))
     call new_convolution(operator%convolution, lattice%extent, transform_length(lattice), n_kernel, operator%at_once, &
-                         shared, error, first_odd=first_odd)
+                         shared, error)
     if (allocated(error)) return
     operator%convolution%factor = medium%unit(lattice%spacing())
     operator%convolution%whole = medium%trace()
@@ -277,6 +278,16 @@ contains
     call self%convolution%convolve_in_place(self%index(components, components), values)
     call self%count(components, components)
   end subroutine fft_replace
+
+  !> Point to the memory of the row transforms, if the components are multiplied together.
+  function fft_in_place(self, n_component) result(values)
+    class(fft_flexibility_t), intent(in) :: self
+    integer, intent(in) :: n_component
+    real(wp), pointer, contiguous :: values(:)
+
+    values => null()
+    if (n_component <= self%at_once) values => self%convolution%in_place(n_component)
+  end function fft_in_place
 
   !> Multiply pressure and shear traction one after the other, which do not move each other; the pressure is the first component.
   subroutine apply_apart(self, from, traction, onto, displacement)

@@ -107,7 +107,7 @@ contains
     length = good_size(lattice%extent)
     if (lattice%is_periodic()) length = lattice%extent
     self%length = length
-    call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
+    call new_convolution(self%convolution, lattice%extent, length, [merge(n_tangential, 1, self%tangential), 0], n_component, &
                          space, error, beside=beside)
     if (allocated(error)) return
     self%unit = medium%unit(lattice%spacing())
@@ -268,7 +268,7 @@ contains
     if (self%convolution%space%count(active .and. compliance > 0.0_wp) == 0) return
     if (.not. allocated(self%sprung)) then
       allocate (self%sprung, self%share(size(compliance)), self%stiffness(size(compliance)))
-      call new_convolution(self%sprung, self%extent, self%length, 1, 1, self%convolution%space, error)
+      call new_convolution(self%sprung, self%extent, self%length, [1, 0], 1, self%convolution%space, error)
       if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
       if (allocated(error)) then
         ! without memory for it: the symbol without springs still is a preconditioner

@@ -39,6 +39,8 @@ module hc_operator_set
     procedure :: apply => apply_operators
     !> The same along components that act, in the place of the tractions
     procedure :: replace => replace_by_displacement
+    !> Memory for them
+    procedure :: take_image
     !> Count the work from here on; no nodes are active
     procedure :: reset
     !> Free what the preconditioners store for the active nodes
@@ -156,6 +158,25 @@ contains
     call self%flexibility%replace(components, fields, error)
     if (.not. allocated(error)) call take_off_ahead(self, components, values)
   end subroutine replace_by_displacement
+
+  !> Point to memory for components as vectors: that of the operator, until its next use or that of a preconditioner, or else that of
+  !> the caller.
+  subroutine take_image(self, n_component, own, image, stat)
+    class(operators_t), intent(in) :: self
+    !> Number of components
+    integer, intent(in) :: n_component
+    !> Memory of the caller, allocated if it is needed
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    !> Not zero: there is not enough memory
+    integer, intent(out) :: stat
+
+    stat = 0
+    image => self%flexibility%in_place(n_component)
+    if (associated(image)) return
+    if (.not. allocated(own)) allocate (own(n_component*self%flexibility%lattice%size()), stat=stat)
+    image => own
+  end subroutine take_image
 
   !> Return all work so far, in applications of the full operator.
   pure real(wp) function work(self)

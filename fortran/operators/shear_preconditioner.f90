@@ -76,7 +76,7 @@ contains
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential=.true., &
+    call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, &
                                    more=4*(lattice%size() + 2*margin_of(options, lattice%extent)))
     self%elastic_compliance = node_compliance(lattice, medium)
   end subroutine new_shear_preconditioner

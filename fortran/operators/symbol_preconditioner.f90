@@ -60,7 +60,7 @@ module hc_symbol_preconditioner
 contains
 
   !> Set up a preconditioner over a window.
-  subroutine new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, tangential, more)
+  subroutine new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, more)
     !> Preconditioner to be set up
     class(symbol_preconditioner_t), intent(out) :: self
     !> Lattice and window
@@ -75,17 +75,17 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
-    !> Of the shear traction; absent: of the pressure
-    logical, intent(in), optional :: tangential
-    !> Numbers of single precision that `take_memory` takes beside; absent: none
+    !> For shear tractions: numbers of single precision that `take_memory` takes beside; absent: for the pressure
     integer, intent(in), optional :: more
     integer(int64) :: n
 
     n = product(space%own_extent(lattice%extent))
-    if (present(tangential)) n = merge(2*n, n, tangential)
-    if (present(more)) n = n + more
-    call new_inverse_symbol(self%inverse, lattice, medium, space, error, tangential, cache, beside=n*(storage_size(1.0_sp)/8))
-    if (present(more)) self%n_more = more
+    if (present(more)) then
+      n = 2*n + more
+      self%n_more = more
+    end if
+    call new_inverse_symbol(self%inverse, lattice, medium, space, error, present(more), cache, &
+                            beside=n*(storage_size(1.0_sp)/8))
     self%unit = self%inverse%unit
     self%extent = space%own_extent(lattice%extent)
     self%space = space
@@ -115,9 +115,15 @@ contains
     integer, intent(in) :: extent(2)
     !> The nodes
     logical, intent(in) :: active(extent(1), extent(2))
+    type(preconditioner_options_t) :: options
 
+    options = self%options
+    if (self%patches) then
+      options%ring_factor = options%patch_ring_factor
+      options%ring_power = options%patch_ring_power
+    end if
     if (.not. allocated(self%edge)) allocate (self%edge)
-    call new_edge_extension(self%edge, active, self%space, self%options, near=self%beside)
+    call new_edge_extension(self%edge, active, self%space, options, near=self%beside)
   end subroutine continue_beyond
 
   !> Take memory for displacements, zero, and what else is needed beside them.

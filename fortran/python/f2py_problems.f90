@@ -1,6 +1,7 @@
 !> Operators, contact problems and states for Python: set-up, with checks of memory, and fields of states.
 module hc_f2py_problems
   use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc
+  use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_memory, only: require_memory
@@ -15,15 +16,17 @@ module hc_f2py_problems
   use hc_normal_law, only: normal_law_t
   use hc_contact_state, only: contact_state_t, allocate_fields, field_of, n_load
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
-  use hc_shared_contact, only: shared_contact_t, new_shared_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
+  use hc_shared_friction, only: shared_friction_t, new_shared_friction
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_sheared, secure_fields, entry_fields, wear_fields, new_held_state, find_field
+  public :: new_operator, new_pressed, new_pressed_part, new_sheared, follow_sheared, secure_fields, entry_fields, wear_fields
+  public :: new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
   integer, parameter :: fft_based = 1, as_written = 2
@@ -57,13 +60,15 @@ contains
   end subroutine take_window
 
   !> Create a flexibility operator over a window.
-  subroutine new_operator(method, lattice, bodies, threads, handle, error)
+  subroutine new_operator(method, lattice, bodies, threads, handle, error, shared)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
     !> Handle of the operator
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
+    !> By FFT, on rows that all ranks share; all call this
+    logical, intent(in), optional :: shared
     type(slot_t), pointer :: slot
     type(field_space_t) :: space
     type(dense_flexibility_t), pointer :: dense
@@ -75,9 +80,12 @@ contains
     if (method == fft_based) bytes = fft_setup_memory(lattice%extent, spectra_of(bodies)) &
                                      + fft_memory(lattice%extent, .false., space%threads, spectra_of(bodies), &
                                                   periodic=lattice%is_periodic())
-    call take_window(lattice, bytes, threads, slot, handle, error)
+    if (present(shared)) space%ranks = ranks
+    call take_window(lattice, bytes/space%ranks%size*space%ranks%on_node, threads, slot, handle, error)
     if (.not. allocated(error)) call check_operator(lattice, bodies, error, threads)
+    call space%ranks%agree(error)
     if (.not. allocated(error)) then
+      slot%space%ranks = space%ranks
       if (method == fft_based) then
         allocate (fft)
         slot%operator => fft
@@ -91,7 +99,7 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_operator
 
-  !> Create a frictionless contact problem: by FFT on all ranks, of which the first one has gap and candidates.
+  !> Create a frictionless contact problem.
   subroutine new_pressed(method, lattice, bodies, gap, candidate, law, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
@@ -108,23 +116,14 @@ contains
     type(field_space_t) :: space
     type(direct_contact_t), pointer :: dense
     type(normal_contact_t), pointer :: fft
-    type(shared_contact_t), pointer :: shared
     integer(c_int64_t) :: bytes
-    logical :: is_shared
 
-    is_shared = method == fft_based .and. ranks%size > 1
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
     if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
-    if (is_shared) bytes = bytes/ranks%size*ranks%on_node
     call take_window(lattice, bytes, threads, slot, handle, error)
-    if (is_shared) call ranks%agree(error)
     if (.not. allocated(error)) then
-      if (is_shared) then
-        allocate (shared)
-        slot%pressed => shared
-        call new_shared_contact(shared, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law, ranks)
-      else if (method == fft_based) then
+      if (method == fft_based) then
         allocate (fft)
         slot%pressed => fft
         call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law)
@@ -137,8 +136,39 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_pressed
 
-  !> Create a contact problem with friction.
-  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, goodman, threads, handle, error)
+  !> Create a frictionless contact problem whose rows all ranks share; all call this.
+  subroutine new_pressed_part(lattice, bodies, gap, candidate, law, threads, handle, error)
+    integer, intent(in) :: threads
+    type(lattice_t), intent(in) :: lattice
+    class(elastic_medium_t), intent(in) :: bodies
+    !> Own rows of the gap before loading [m]
+    real(wp), intent(in) :: gap(:, :)
+    !> Nodes of them that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    class(normal_law_t), intent(in) :: law
+    !> Handle of the problem
+    integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+    type(field_space_t) :: space
+    type(normal_contact_t), pointer :: fft
+    integer(c_int64_t) :: bytes
+
+    space = space_over(lattice%extent, threads)
+    bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
+    call take_window(lattice, bytes/ranks%size*ranks%on_node, threads, slot, handle, error)
+    call ranks%agree(error)
+    if (.not. allocated(error)) then
+      allocate (fft)
+      slot%pressed => fft
+      call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law, ranks=ranks)
+    end if
+    if (allocated(error)) call free_object(handle)
+  end subroutine new_pressed_part
+
+  !> Create a contact problem with friction: by FFT on all ranks, of which the first one has gap and candidates.
+  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, goodman, threads, wake, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
@@ -150,6 +180,8 @@ contains
     class(normal_law_t), intent(in) :: law
     !> Shear tractions do not move the pressure
     logical, intent(in) :: goodman
+    !> Words that let the other ranks follow a call of the first one
+    integer(int32), intent(in) :: wake(:)
     !> Handle of the problem
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
@@ -157,19 +189,33 @@ contains
     type(field_space_t) :: space
     type(friction_problem_t) :: problem
     type(windowed_friction_t), pointer :: fft
+    type(shared_friction_t), pointer :: shared
     type(direct_friction_t), pointer :: dense
+    real(wp), allocatable :: own_gap(:, :)
     integer(c_int64_t) :: bytes
+    logical :: is_shared
 
+    is_shared = method == fft_based .and. ranks%size > 1
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
                                                               space%threads, spectra_of(bodies), lattice%is_periodic())
+    if (is_shared) bytes = bytes*ranks%on_node
     call take_window(lattice, bytes, threads, slot, handle, error)
-    if (.not. allocated(error)) call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, &
-                                                          error, law)
+    if (.not. allocated(error) .and. is_shared .and. ranks%rank > 0) then
+      allocate (own_gap(lattice%extent(1), lattice%extent(2)), source=0.0_wp)
+      call new_friction_problem(problem, slot%lattice, bodies, own_gap, own_gap < 1.0_wp, friction, goodman, error, law)
+    else if (.not. allocated(error)) then
+      call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, error, law)
+    end if
+    if (is_shared) call ranks%agree(error)
     if (.not. allocated(error)) then
-      if (method == fft_based) then
+      if (is_shared) then
+        allocate (shared)
+        slot%sheared => shared
+        call new_shared_friction(shared, problem, error, threads, kernel_cache, ranks, wake)
+      else if (method == fft_based) then
         allocate (fft)
         slot%sheared => fft
         call new_windowed_friction(fft, problem, error, threads, kernel_cache)
@@ -182,6 +228,19 @@ contains
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_sheared
+
+  !> Take part in a call of the first rank, of a problem with friction.
+  subroutine follow_sheared(solver, error)
+    class(friction_solver_t), intent(inout) :: solver
+    type(error_t), allocatable, intent(out) :: error
+
+    select type (solver)
+    type is (shared_friction_t)
+      call solver%follow(error)
+    class default
+      call raise(error, status%bad_handle, 'the problem is not one of several ranks')
+    end select
+  end subroutine follow_sheared
 
   !> Refuse a load step if there is no memory for further fields beside the solution.
   subroutine secure_fields(slot, n_field, error)

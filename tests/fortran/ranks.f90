@@ -1,7 +1,8 @@
 !> Tests of what several ranks do together.
 module ranks_tests
   use, intrinsic :: iso_c_binding, only: c_loc
-  use hc_precision, only: wp
+  use, intrinsic :: iso_fortran_env, only: int32
+  use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
@@ -9,15 +10,26 @@ module ranks_tests
   use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use hc_contact_edges, only: contact_edges_t
+  use hc_state_measures, only: state_measures_t, measure_contact, rises_to_end
+  use hc_window_growth, only: grown_window, shared_grown_window
+  use hc_coulomb, only: coulomb_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
+  use hc_load_path, only: advance, step_settings_t
+  use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   use testing, only: test_t, new_test, check, check_true
   implicit none
   private
 
   public :: collect, ranks
+
+  real(wp), parameter :: two_pi = 2.0_wp*pi
 
   !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
@@ -32,13 +44,22 @@ contains
       new_test('slabs', test_slabs), &
       new_test('reductions', test_reductions), &
       new_test('rows', test_rows), &
+      new_test('words', test_words), &
       new_test('errors', test_errors), &
       new_test('products', test_products), &
+      new_test('periodic_products', test_periodic_products), &
       new_test('contact', test_contact), &
       new_test('part_of_the_window', test_part), &
       new_test('compliant_layer', test_layer), &
       new_test('approach', test_approach), &
-      new_test('rough', test_rough) &
+      new_test('rough', test_rough), &
+      new_test('friction', test_friction), &
+      new_test('waves', test_waves), &
+      new_test('complete_contact', test_complete), &
+      new_test('mean_gap', test_mean_gap), &
+      new_test('layer_between_waves', test_waves_on_layer), &
+      new_test('across_the_end', test_across), &
+      new_test('wear_ahead', test_wear_ahead) &
     ]
   end subroutine collect
 
@@ -129,6 +150,28 @@ contains
     call check_true(error, all(nint(some) == reshape([(i, i=5*first - 4, 5*last)], shape(some))), 'rows of the first rank')
   end subroutine test_rows
 
+  !> The first rank tells each other rank some words, which gives them back.
+  subroutine test_words(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int32) :: words(3)
+    integer :: r, n
+
+    do r = 1, ranks%size - 1
+      if (ranks%rank == 0) then
+        call ranks%tell([1_int32, 2_int32, int(r, int32)], r)
+        call ranks%take(words, r)
+        call check_true(error, all(words == [2, 4, 2*r]), 'words')
+        if (allocated(error)) return
+      else if (ranks%rank == r) then
+        call ranks%wait_for_words(n)
+        call check_true(error, n == 3, 'number of words')
+        call ranks%hear(words)
+        call ranks%give(2*words)
+        if (allocated(error)) return
+      end if
+    end do
+  end subroutine test_words
+
   !> An error of one rank is one of all, and names it.
   subroutine test_errors(error)
     type(error_t), allocatable, intent(out) :: error
@@ -161,6 +204,25 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_products
+
+  !> The same on windows that repeat, without padding; some ranks have fewer columns than others.
+  subroutine test_periodic_products(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_pair_t) :: pair
+    type(lattice_t) :: lattice
+    integer :: k
+
+    do k = 0, 3
+      call new_elastic_pair(pair, material_t(2.0_wp, 0.25_wp), material_t(5.0_wp, merge(0.1_wp, 0.25_wp, k > 1)), error)
+      if (allocated(error)) return
+      call new_lattice(lattice, merge(oblique_basis(0.5_wp, 0.9_wp, 1.1_wp), equilateral_basis(0.5_wp), k == 3), &
+                       [-4, -3], [20 + 4*k, 30 + k], error)
+      if (allocated(error)) return
+      lattice%periodic = .true.
+      call compare_products(lattice, pair, k > 0, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_periodic_products
 
   subroutine compare_products(lattice, pair, all_of_them, error)
     type(lattice_t), intent(in) :: lattice
@@ -219,7 +281,46 @@ contains
     if (allocated(error)) return
     call compare_states(expected, found, rows, error)
     call ranks%agree(error)
+    if (allocated(error)) return
+    call compare_measures(lattice, gap, candidate, expected, found, rows, error)
+    call ranks%agree(error)
   end subroutine compare_contacts
+
+  !> Compare measures with those of one rank, to the bit, and larger windows.
+  subroutine compare_measures(lattice, gap, candidate, expected, found, rows, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: gap(:, :)
+    logical, intent(in) :: candidate(:, :)
+    type(contact_state_t), intent(in) :: expected, found
+    integer, intent(in) :: rows(2)
+    type(error_t), allocatable, intent(out) :: error
+    type(state_measures_t) :: of_all, of_parts
+    type(contact_edges_t) :: edges
+    type(field_space_t) :: space
+    type(lattice_t) :: grown, grown_from_parts
+    logical :: rises, rise_in_parts
+
+    call measure_contact(lattice, gap, candidate, expected, space, of_all, edges)
+    rises = rises_to_end(candidate, expected%pressure, space, lattice%extent(2))
+    grown = grown_window(lattice, expected%zone > 0)
+    space%ranks = ranks
+    call measure_contact(lattice, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), found, space, of_parts, edges)
+    rise_in_parts = rises_to_end(candidate(:, rows(1):rows(2)), found%pressure, space, lattice%extent(2))
+    grown_from_parts = shared_grown_window(lattice, found%zone > 0, space)
+    call check(error, [of_parts%contact%area_error, of_parts%mean_gap, of_parts%elastic_energy], &
+               [of_all%contact%area_error, of_all%mean_gap, of_all%elastic_energy], 0.0_wp, 'measures of windows that repeat')
+    if (allocated(error) .or. lattice%is_periodic()) return
+    associate (one => of_all%contact, all => of_parts%contact)
+      call check(error, [all%area, all%radius, all%area_fit, all%radius_fit, all%semi_major, all%semi_minor, &
+                         of_parts%pressure_center, of_parts%max_pressure, of_parts%elastic_energy], &
+                 [one%area, one%radius, one%area_fit, one%radius_fit, one%semi_major, one%semi_minor, of_all%pressure_center, &
+                  of_all%max_pressure, of_all%elastic_energy], 0.0_wp, 'measures')
+    end associate
+    if (allocated(error)) return
+    call check_true(error, rises .eqv. rise_in_parts, 'rise to an end')
+    if (allocated(error)) return
+    call check_true(error, all(grown%first == grown_from_parts%first) .and. all(grown%extent == grown_from_parts%extent), 'grown')
+  end subroutine compare_measures
 
   !> Compare own rows.
   subroutine compare_states(expected, found, rows, error)
@@ -320,6 +421,211 @@ contains
     candidate = .not. (abs(x - 3.0e-4_wp) < 3.0e-5_wp)
     call compare_contacts(lattice, gap, candidate, unilateral_t(), force_control, 40.0_wp, 1.0e-9_wp, error)
   end subroutine test_rough
+
+  !> A sphere that is pressed and sheared, of like and unlike materials, on the whole window and on a part of it.
+  subroutine test_friction(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    do k = 0, 5
+      call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_friction
+
+  !> Compare the ends of two load steps with those of one rank.
+  subroutine shear_sphere(n, unlike, periodic, error)
+    integer, intent(in) :: n
+    logical, intent(in) :: unlike, periodic
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(elastic_pair_t) :: pair
+    type(friction_problem_t) :: problem
+    type(windowed_friction_t) :: alone, shared
+    type(contact_state_t) :: start, expected, found
+    type(load_target_t) :: target
+    real(wp) :: gap(n, n - 3)
+    integer :: step
+
+    call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
+    if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
+    if (allocated(error)) return
+    lattice%periodic = periodic
+    call sphere(lattice, gap)
+    call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
+    if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
+    if (.not. allocated(error)) call new_windowed_friction(shared, problem, error, 1, ranks=ranks)
+    if (allocated(error)) return
+    call new_friction_state(start, lattice)
+    do step = 1, 2
+      target%value(:2) = [30.0_wp, merge(0.0_wp, 4.0_wp, step == 1)]
+      call advance(alone, start, target, step_settings_t(1.0e-10_wp), expected, error)
+      if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-10_wp), found, error)
+      if (allocated(error)) return
+      call compare_states(expected, found, [1, n - 3], error)
+      if (allocated(error)) return
+      call check(error, maxval(abs(found%traction - expected%traction)), 0.0_wp, 0.0_wp, 'traction')
+      if (allocated(error)) return
+      call check(error, maxval(abs(found%slip_increment - expected%slip_increment)), 0.0_wp, 0.0_wp, 'slip')
+      if (allocated(error)) return
+      call check_true(error, any(expected%zone == 1) .or. step == 1, 'stick')
+      if (allocated(error)) return
+      start = expected
+    end do
+  end subroutine shear_sphere
+
+  !> Waves that repeat, on even and odd numbers of rows; even ones have a coarser lattice, too.
+  subroutine test_waves(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    do k = 80, 83
+      call press_waves([96, k], unilateral_t(), force_control, 0.05_wp, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_waves
+
+  !> Waves pressed flat.
+  subroutine test_complete(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_waves([64, 64], unilateral_t(), force_control, 4.0_wp, error)
+  end subroutine test_complete
+
+  !> A mean gap in place of a load.
+  subroutine test_mean_gap(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_waves([80, 72], unilateral_t(), displacement_control, 0.4_wp, error)
+  end subroutine test_mean_gap
+
+  !> A compliant layer between waves.
+  subroutine test_waves_on_layer(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    call press_waves([64, 50], power_interface_t(1.0e15_wp, 1.0_wp), force_control, 0.1_wp, error)
+    if (allocated(error)) return
+    call press_waves([80, 80], power_interface_t(1.0e15_wp, 1.0_wp), force_control, 0.1_wp, error)
+  end subroutine test_waves_on_layer
+
+  !> Press waves of 1 um together.
+  subroutine press_waves(extent, law, control, value, error)
+    integer, intent(in) :: extent(2), control
+    class(normal_law_t), intent(in) :: law
+    !> Mean pressure [GPa], or approach of the mean planes [um]
+    real(wp), intent(in) :: value
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp) :: gap(extent(1), extent(2)), target
+    logical :: candidate(extent(1), extent(2))
+    integer :: i, j
+
+    call new_lattice(lattice, oblique_basis(1.0e-5_wp, 1.1_wp, 1.3_wp), [-4, -2], extent, error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    do j = 1, extent(2)
+      do i = 1, extent(1)
+        associate (x => two_pi*i/extent(1), y => two_pi*j/extent(2))
+          gap(i, j) = 1.0e-6_wp*(1.0_wp + 0.5_wp*sin(x + 1.0_wp) + 0.3_wp*sin(2*x + y) + 0.2_wp*cos(3*y - x))
+        end associate
+      end do
+    end do
+    candidate = .true.
+    target = 1.0e-6_wp*value
+    if (control == force_control) target = 1.0e9_wp*value*lattice%cell_area()*lattice%size()
+    call compare_contacts(lattice, gap, candidate, law, control, target, 1.0e-12_wp, error)
+  end subroutine press_waves
+
+  !> A contact across the corners of a window that repeats, on three lattices: the interpolation wraps around.
+  subroutine test_across(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 160
+    type(lattice_t) :: lattice
+    real(wp) :: gap(n, n)
+    logical :: candidate(n, n)
+    integer :: i, j
+
+    call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [0, 0], [n, n], error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    do j = 1, n
+      do i = 1, n
+        gap(i, j) = 1.0e-6_wp*(3.0_wp - cos(two_pi*i/n) - cos(two_pi*j/n) - cos(two_pi*(i + j)/n))
+      end do
+    end do
+    candidate = .true.
+    call compare_contacts(lattice, gap, candidate, unilateral_t(), force_control, &
+                          1.0e8_wp*lattice%cell_area()*lattice%size(), 1.0e-11_wp, error)
+  end subroutine test_across
+
+  !> The pressure after a jump of wear, in windows that end and that repeat.
+  subroutine test_wear_ahead(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n(2) = [64, 57]
+    type(elastic_pair_t) :: pair
+    type(lattice_t) :: lattice
+    type(worn_cycle_t) :: cycle
+    type(field_space_t) :: space
+    real(wp) :: expected(n(1), n(2))
+    real(wp), allocatable :: found(:, :)
+    integer :: k, i, rows(2)
+
+    call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.3_wp), error)
+    if (allocated(error)) return
+    call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-32, -28], n, error)
+    if (allocated(error)) return
+    allocate (cycle%gap(n(1), n(2)), cycle%pressure(n(1), n(2)))
+    call sphere(lattice, cycle%gap)
+    cycle%pressure = 1.0e9_wp*sqrt(max(1.0_wp - cycle%gap/2.0e-6_wp, 0.0_wp))
+    cycle%gap = max(cycle%gap - 2.0e-6_wp, 0.0_wp)
+    cycle%path = 1.0e-6_wp*reshape([(1.0_wp + 0.1_wp*sin(0.7_wp*i), i=1, product(n))], n)
+    allocate (cycle%friction(n(1), n(2)), source=0.4_wp)
+    allocate (cycle%candidate(n(1), n(2)), source=.true.)
+    cycle%energy = cycle%friction*cycle%pressure*cycle%path
+    space = space_over(n, 1)
+    rows = [ranks%first_row(n(2)), ranks%last_row(n(2))]
+    allocate (found(n(1), rows(2) - rows(1) + 1))
+    do k = 0, 3
+      lattice%periodic = k > 1
+      cycle%by_load = modulo(k, 2) == 0
+      call wear(lattice, pair, cycle, space, expected, error)
+      if (allocated(error)) return
+      space%ranks = ranks
+      call wear(lattice, pair, rows_of_cycle(cycle, rows), space, found, error)
+      if (allocated(error)) return
+      space%ranks = communicator_t()
+      call check_true(error, any(abs(expected - cycle%energy) > 0.01_wp*maxval(expected)), 'wear')
+      if (.not. allocated(error)) call check(error, maxval(abs(found - expected(:, rows(1):rows(2)))), 0.0_wp, 0.0_wp, 'energy')
+      call ranks%agree(error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_wear_ahead
+
+  !> Compute the energy of a cycle by which a jump wears.
+  subroutine wear(lattice, pair, cycle, space, energy, error)
+    type(lattice_t), intent(in) :: lattice
+    type(elastic_pair_t), intent(in) :: pair
+    type(worn_cycle_t), intent(in) :: cycle
+    type(field_space_t), intent(in) :: space
+    real(wp), intent(out) :: energy(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    type(normal_problem_t) :: problem
+
+    call new_normal_problem(problem, lattice, pair, cycle%gap, cycle%candidate, error, space=space)
+    if (.not. allocated(error)) call energy_ahead(cycle, problem, 5.0e-11_wp, 1.0e-9_wp, energy, error)
+  end subroutine wear
+
+  !> Return some rows of all fields of a cycle.
+  pure type(worn_cycle_t) function rows_of_cycle(cycle, rows) result(part)
+    type(worn_cycle_t), intent(in) :: cycle
+    !> First and last row
+    integer, intent(in) :: rows(2)
+
+    associate (from => rows(1), to => rows(2))
+      part = worn_cycle_t(cycle%energy(:, from:to), cycle%path(:, from:to), cycle%pressure(:, from:to), cycle%gap(:, from:to), &
+                          cycle%candidate(:, from:to), cycle%friction(:, from:to), cycle%by_load)
+    end associate
+  end function rows_of_cycle
 
 end module ranks_tests
 

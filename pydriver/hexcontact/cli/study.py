@@ -56,6 +56,7 @@ def study(
     log_level: frame.Level = None,
 ) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
+    from ..core import ranks
     from ..deck.toml import read_toml
     from ..study.study import Study, study_reporter
     from .solving import Messages
@@ -64,6 +65,8 @@ def study(
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
+    if case is None and not plan:
+        ranks.refuse_copies("study")
     messages = Messages("study", quiet, as_json, log_file, log_level)
     if "creep_table" in read_toml(file, "a study")[0]:
         options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import flat
+from . import flat, ranks
 from .calls import checked, numbers
 from .contact import (
     UNILATERAL,
@@ -30,7 +30,7 @@ from .contact import (
     window_size,
 )
 from .flat import AdaptiveSteps
-from .handles import HeldState
+from .handles import Handle, HeldState
 from .lattice import Lattice
 
 Coupling = Literal["full", "goodman"]
@@ -206,7 +206,13 @@ class FrictionalContact(Contact):
         law = _checked_law(friction_coefficient, shear_limit, lattice)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
         given = *self._surfaces, law, springs, coupling == "goodman", count
-        self._create(flat.create_sheared, method_code(method, iteration), *given)
+        wake = np.empty(0, np.int32)
+        if ranks.count > 1 and method == "fft":
+            number = ranks.numbered(self)
+            wake = ranks.wake(_follow, number)
+            # without arrays that the lattice keeps
+            ranks.others(_create_part, number, dataclasses.replace(lattice), *given[1:2], *given[4:])
+        self._create(flat.create_sheared, method_code(method, iteration), *given, wake)
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
@@ -388,6 +394,24 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
     return FrictionLaw(found, limit)
 
 
+class _Part(Handle):
+    """The part of a problem with friction on a rank other than the first."""
+
+    def __init__(self, lattice: Lattice, *given: Any) -> None:
+        self.lattice = lattice
+        self._create(flat.create_sheared_part, lattice, *given)
+
+
+def _create_part(number: int, *given: Any) -> None:
+    """Set up the part of this rank of a problem with friction."""
+    ranks.held[number] = _Part(*given)
+
+
+def _follow(number: int) -> None:
+    """Take part in a call of the solver of the first rank."""
+    flat.follow(ranks.held[number])
+
+
 def memory_needed(
     method: Method,
     n_row: int,
@@ -402,4 +426,5 @@ def memory_needed(
 ) -> int:
     """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
     window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))
+    needed = int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))
+    return needed * ranks.on_node if method == "fft" else needed  # each rank has all fields

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..arrays import Dataset
-from ..core import ranks
-from ..errors import AccuracyWarning, DeckError, HexcontactError, warn
+from ..errors import AccuracyWarning, HexcontactError, warn
 from ..problem.preview import coarser, parameters_of
 from ..problem.problem import Problem
 from ..result.history_words import limited_steps
@@ -40,18 +39,6 @@ def metadata_of(case: Problem) -> Metadata:
         planned_steps=case.planned_steps,
         parameters=parameters_of(case),
     )
-
-
-def require_shareable(case: Problem) -> None:
-    """Refuse a case that several processes do not solve together."""
-    if ranks.count == 1:
-        return
-    key = "friction" if case.frictional else "grid.boundary" if case.period is not None else ""
-    if key:
-        raise DeckError(
-            f"{key}: several processes solve contacts without friction in windows that end; expected "
-            "one process. Start it without mpirun, and set OMP_NUM_THREADS to use more cores"
-        )
 
 
 def listeners(

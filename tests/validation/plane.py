@@ -18,8 +18,8 @@ from .runs import Array, Mask, State, bodies, press, run
 # A barrel along x, so that the contact is 18 times as long as it is wide.
 LONG = Paraboloid(radius_x=100.0, radius_y=1.0)
 LOAD = 1.0
-LONGER = Paraboloid(radius_x=6000.0, radius_y=1.0)
-"""184 times: pressing shears less than on a plane by the part 2|y|/(πa) of the pressure beyond its ends."""
+LONGER = Paraboloid(radius_x=24000.0, radius_y=1.0)
+"""390 times: pressing shears less than on a plane by the part 2|y|/(πa) of the pressure beyond its ends."""
 
 
 def _middle(state: State) -> Mask:
@@ -86,9 +86,9 @@ def _half_width(y: Array, inside: Mask) -> float:
 
 def dissimilar(
     cases: Sequence[tuple[float, float]] = ((-0.189, 0.2), (-0.3, 0.2)),
-    across: int = 40,
-    along: int = 80,
-    steps: int = 20,
+    across: int = 100,
+    along: int = 400,
+    steps: int = 24,
 ) -> Comparison:
     """Press a long contact of dissimilar bodies, then shear it; stick in the mid-plane."""
     found = Comparison()
@@ -111,37 +111,32 @@ def dissimilar(
         exact = goodman_stick_ratio_plane(beta, mu)
         row = 1.0 / across  # distance of the rows of nodes over b
         allowed = 1.4 * row
-        found.add(where, "pressed: c/b", "-", ratio, analytic=exact, absolute=allowed)
+        found.add(where, "pressed: c/b", "-", ratio, analytic=exact, absolute=2 * row)
         states = [made[number] for number in range(steps + 1, len(made) + 1)]
         shares = [
             float(state.traction_y[middle].sum() / (mu * state.pressure[middle]).sum()) for state in states
         ]
         strips = sheared_strips(beta, mu, shares)
-        for number, (part, state, strip) in enumerate(zip(parts, states, strips, strict=True), steps + 1):
+        for part, state, strip in zip(parts, states, strips, strict=True):
             stick = state.y[middle & state.stick] / half
             low, high = float(stick.min()) - 0.5 * row, float(stick.max()) + 0.5 * row
             exact_q = np.interp(state.y[middle] / hertz.semi_minor, strip.y, strip.traction, 0.0, 0.0)
             scale = mu * float(state.pressure[middle].max())
             error = float(np.sqrt(np.mean((state.traction_y[middle] / scale - exact_q) ** 2)))
             found.add(
-                where, f"Q = {part:g} μP: rms error of q_y/(μ p_0)", "-", error, analytic=0.0, absolute=0.01
+                where, f"Q = {part:g} μP: rms error of q_y/(μ p_0)", "-", error, analytic=0.0, absolute=4.5e-3
             )
-            if number == steps + 1:  # slip behind stops, slip ahead goes on
-                found.add(where, f"Q = {part:g} μP: y_min/b", "-", low, analytic=-exact, absolute=allowed)
-                found.add(where, f"Q = {part:g} μP: y_max/b", "-", high, analytic=1.0, absolute=2 * allowed)
-            else:
-                for name, value, true in zip(("y_min", "y_max"), (low, high), strip.stick, strict=True):
-                    found.add(
-                        where, f"Q = {part:g} μP: {name}/b", "-", value, analytic=true, absolute=allowed
-                    )
+            for name, value, true in zip(("y_min", "y_max"), (low, high), strip.stick, strict=True):
+                found.add(where, f"Q = {part:g} μP: {name}/b", "-", value, analytic=true, absolute=allowed)
         found.add(where, f"time, {len(made)} steps", "s", made.seconds)
     found.notes.append(
         f"goodman; {steps} steps P_k = P (k/N)³, then Q along y on body 1, the stiffer one. Plane solution "
         "under pressure: |β| K(c/b) = μ K'(c/b). A first small Q stops the slip on the side to which the "
-        "traction points, so that stick reaches from -c to the edge. Half a row is added to the outermost "
-        "nodes. At larger Q: the plane problem itself, in 400 strips and 100 steps, with the shares Q'/μP' "
-        f"of the mid-plane. The contact is 184 times as long as it is wide, {along} and {across} spacings in "
-        "its half-axes; one 18 times as long differs by 2 % rms at any spacing."
+        "traction points. Half a row is added to the outermost nodes. With Q: the plane problem itself, in "
+        "400 strips and 100 steps (within 0.06 % rms of 1600 and 400), with the shares Q'/μP' of the "
+        f"mid-plane. The contact is 390 times as long as it is wide, {along} and {across} spacings in its "
+        "half-axes. The lattice limits the rms error: p itself differs by 0.18 % from Hertz's (0.44 % with "
+        "40 spacings across). A contact 184 times as long as wide adds 0.1 %, one 18 times as long 2 %."
     )
     return found
 

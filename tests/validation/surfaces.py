@@ -85,8 +85,8 @@ def rollers(half_widths: Sequence[float] = (15e-6, 20e-6)) -> Comparison:
         "Steel rollers of 5 mm radius at their design loads, cells of b/20 by b/20; P' load by length, p_0 "
         "of plane contact under P/l. Near its ends the contact is narrower than there, so that p rises more "
         "than P'. On cells of 4 to 0.5 µm along the axis at half-width 20 µm: P' 0.91 %, p 1.35 % at 0.95 "
-        "l/2; p is within 1 % up to 0.938 l/2, and up to 0.95 l/2 for half-widths of at most l/120. With a third "
-        "of the end constant 0.97 %, but 2.3 p_0 at the ends."
+        "l/2; p is within 1 % up to 0.938 l/2, and up to 0.95 l/2 for half-widths of at most l/120. With a "
+        "third of the end constant 0.97 %, but 2.3 p_0 at the ends."
     )
     return found
 

@@ -435,9 +435,9 @@ contains
     beside = self%held%scratch%place(self%n_work*(storage_size((1.0_wp, 0.0_wp))/64))
   end function beside
 
-  !> Point to the memory of the row transforms, for fields of the window; to nothing where their transforms have no room behind them.
+  !> Point to the memory of the row transforms, for fields of the window, or to nothing where no room is behind their transforms.
   !>
-  !> Pairs of rows that are transformed from the last one on never reach one that is still to be read, and back from the first one on.
+  !> Pairs of rows that are transformed from the last one on, and back from the first one on, never reach one still to be read.
   function in_place(self, n_component) result(field)
     class(convolution_t), intent(in) :: self
     !> Number of components

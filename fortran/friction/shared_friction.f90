@@ -6,7 +6,7 @@ module hc_shared_friction
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, raise, status
   use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
   use hc_spectrum_cache, only: kernel_cache_t
@@ -261,6 +261,8 @@ contains
       case (to_set_gap)
         call spread_real(self%ranks, self%problem%initial_gap)
         call self%part%set_gap(self%problem%initial_gap)
+      case default
+        call raise(error, status%invalid_input, 'expected a call that the ranks know')
       end select
     end associate
   end subroutine follow

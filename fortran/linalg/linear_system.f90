@@ -141,6 +141,7 @@ contains
 
     stat = 0
     if (.not. allocated(own)) allocate (own(n), stat=stat)
+    if (stat /= 0) return
     image => own
   end subroutine take_image
 

@@ -50,11 +50,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      !> Weighted residual v, on the active nodes
-      real(wp), allocatable :: v(:)
-      !> M r there, r that residual without its weights: the direction is z = M r + M B share with C^T z = 0; and the product A z on
-      !> the other nodes
-      real(sp), allocatable :: mr(:), beyond(:)
+      !> Weighted residual v on the active nodes, and M r there, r that residual without its weights: the direction is
+      !> z = M r + M B share with C^T z = 0
+      real(wp), allocatable :: v(:), mr(:)
+      !> The product A z on the other nodes
+      real(sp), allocatable :: beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
@@ -189,7 +189,7 @@ contains
       if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
-    !> Compute a direction, in the memory of the next residual; what is stored of it is rounded before it is multiplied.
+    !> Compute a direction, in the memory of the next residual.
     subroutine find_direction(k)
       !> Its number
       integer, intent(in) :: k
@@ -198,8 +198,7 @@ contains
       call system%precondition_packed(nodes, size(x), basis(k)%v, basis(k + 1)%v, error)
       if (allocated(error)) return
       call weigh(iteration%weight, basis(k)%v)
-      basis(k)%mr = real(basis(k + 1)%v, sp)
-      basis(k + 1)%v = basis(k)%mr
+      call space%copy(basis(k + 1)%v, basis(k)%mr)
       share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k + 1)%v))
       call constraints%add_mb(space, share(:, k), basis(k + 1)%v)
     end subroutine find_direction

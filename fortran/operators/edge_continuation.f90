@@ -89,10 +89,17 @@ contains
     type(preconditioner_options_t), intent(in) :: options
     !> Active nodes, and those at the edge
     integer, intent(in) :: n_active, n_edge
+    real(wp) :: width
 
     number_of_rings = 0
     if (n_edge == 0) return
-    number_of_rings = min(options%max_rings, int(options%ring_factor*(real(n_active, wp)/n_edge)**options%ring_power))
+    width = real(n_active, wp)/n_edge
+    if (options%patches .and. width < options%patch_width) then
+      number_of_rings = int(options%patch_ring_factor*width**options%patch_ring_power)
+    else
+      number_of_rings = int(options%ring_factor*width**options%ring_power)
+    end if
+    number_of_rings = min(options%max_rings, number_of_rings)
   end function number_of_rings
 
   !> Find the rings in own rows and in those that their values depend on: smoothed rings further in or out, and the active nodes

@@ -159,8 +159,8 @@ contains
     if (.not. allocated(error)) call take_off_ahead(self, components, values)
   end subroutine replace_by_displacement
 
-  !> Point to memory for components as vectors: that of the operator, until its next use or that of a preconditioner, or else that of
-  !> the caller.
+  !> Point to memory for components as vectors: that of the operator, until its next use or that of a preconditioner, or that of the
+  !> caller.
   subroutine take_image(self, n_component, own, image, stat)
     class(operators_t), intent(in) :: self
     !> Number of components
@@ -175,6 +175,7 @@ contains
     image => self%flexibility%in_place(n_component)
     if (associated(image)) return
     if (.not. allocated(own)) allocate (own(n_component*self%flexibility%lattice%size()), stat=stat)
+    if (stat /= 0) return
     image => own
   end subroutine take_image
 

@@ -118,10 +118,7 @@ contains
     type(preconditioner_options_t) :: options
 
     options = self%options
-    if (self%patches) then
-      options%ring_factor = options%patch_ring_factor
-      options%ring_power = options%patch_ring_power
-    end if
+    options%patches = self%patches
     if (.not. allocated(self%edge)) allocate (self%edge)
     call new_edge_extension(self%edge, active, self%space, options, near=self%beside)
   end subroutine continue_beyond

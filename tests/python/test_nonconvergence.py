@@ -13,8 +13,8 @@ import pytest
 
 from hexcontact import Case, ConvergenceError, influence
 from hexcontact.solve import nonconvergence
-from hexcontact.solve.steps import steps, window_type
-from hexcontact.solve.window import state_of
+from hexcontact.solve.steps import steps
+from hexcontact.solve.window import state_of, window_over
 
 SPHERE = {"young_modulus": 210e9, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": 10e-3}}
 PLANE = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -29,7 +29,7 @@ def sphere(**keys: Any) -> Case:
 def failed(case: Case, **changed: Any) -> tuple[ConvergenceError, Any, Any]:
     """Change the state at the end of a case, and return what is said of it, the state and the window."""
     *_, last = steps(case)
-    window = window_type(case)(case, last.lattice)
+    window = window_over(case, last.lattice)
     state, target = None, case.load_steps[0]
     for target in case.load_steps:
         state = window.advance(state, target, target.values(dict.fromkeys(_names(), 0.0)))
@@ -66,7 +66,7 @@ def test_moment_of_a_load_about_a_far_origin_is_named() -> None:
 def test_torque_beyond_friction_is_gross_sliding_whatever_the_solver_found() -> None:
     # 3 pi/16 mu P a is 2.7 mN m
     case = sphere(loads=[{"normal_load": 100.0}, {"torque": 5e-4}])
-    lattice = window_type(case)(case, case.lattice).lattice
+    lattice = window_over(case, case.lattice).lattice
     *_, last = steps(case)
     bad = replace(state_of(last), converged=False, sliding=False)
     target = case.load_steps[-1]

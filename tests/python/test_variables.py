@@ -43,7 +43,7 @@ def test_the_arrays_of_the_core_hold_a_contact_state_and_its_measures() -> None:
     assert set(STATE[True]) == {*CORE["fields"], *CORE["zone"]}
     assert set(flat.History._fields) == set(CORE["numbers"]) < set(flat.Solution._fields) < set(known)
     assert set(CORE["residuals"]) < set(flat.Solution._fields)
-    assert set(flat.Measures._fields) == {*CORE["measures"], "contact_area_error"}
+    assert set(flat.Measures._fields) == {*CORE["measures"], "contact_area_error", "mean_gap"}
     assert STATE[False] == ("pressure", "gap", "zone")
 
 

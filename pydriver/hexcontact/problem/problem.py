@@ -297,8 +297,8 @@ class Problem:
         pattern = self.lattice.pattern._replace(origin=origin)
         moved = np.array(pattern.coordinates(*self.lattice.origin))
         if self._contact is not None:
-            bounds = self._contact.bounds + moved[:, None]
-            other.lattice = pattern.enclosing(*bounds.T, spacing, window.MARGIN)
+            lower, upper = (self._contact.bounds + moved[:, None]).T
+            other.lattice = pattern.enclosing(lower, upper, spacing, window.MARGIN)
         else:
             other.lattice = window.covering(self.lattice, spacing, pattern)
         return other

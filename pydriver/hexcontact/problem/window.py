@@ -195,7 +195,7 @@ def starting_half_size(
 
 def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: list[dict[str, float]]) -> int:
     """Return the nodes of a window in contact at the largest of some drives, given the gap at all nodes."""
-    pressures = [rough_pressure(lattice, pair, gap, **drive) for drive in drives]
+    pressures = [rough_pressure(lattice, pair, gap, UNILATERAL, **drive) for drive in drives]
     return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
 
 

@@ -136,7 +136,7 @@ def dissimilar(
         "400 strips and 100 steps (within 0.06 % rms of 1600 and 400), with the shares Q'/μP' of the "
         f"mid-plane. The contact is 390 times as long as it is wide, {along} and {across} spacings in its "
         "half-axes. The lattice limits the rms error: p itself differs by 0.18 % from Hertz's (0.44 % with "
-        "40 spacings across). A contact 184 times as long as wide adds up to 0.07 %, one 18 times as long 2 %."
+        "40 spacings across). One 184 times as long as wide adds up to 0.07 %, 18 times as long 2 %."
     )
     return found
 

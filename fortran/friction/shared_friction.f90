@@ -192,11 +192,13 @@ contains
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: tractions(:, :, :)
+    type(call_t) :: order
 
     allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
     tractions(:, :, 1) = pressure
     tractions(:, :, 2:) = traction
-    call announce(self, call_t(to_displace))
+    order%what = to_displace
+    call announce(self, order)
     call displace_together(self, tractions, displacement, error)
   end subroutine displacements
 
@@ -220,9 +222,11 @@ contains
   subroutine set_gap(self, gap)
     class(shared_friction_t), intent(inout) :: self
     real(wp), intent(in) :: gap(:, :)
+    type(call_t) :: order
 
     self%problem%initial_gap = gap
-    call announce(self, call_t(to_set_gap))
+    order%what = to_set_gap
+    call announce(self, order)
     call spread_real(self%ranks, self%problem%initial_gap)
     call self%part%set_gap(self%problem%initial_gap)
   end subroutine set_gap

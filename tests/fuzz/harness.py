@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 CLEAN = {0, 2, 3, 4}  # exit codes of the documentation: done, input, no convergence, resources
-LONGEST = 20.0  # s of processor time, of which a command that hangs takes more
+LONGEST = 60.0  # s of processor time, of which a command that hangs takes more
 _OBEYED = re.compile("[\0-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e]")
 _MARKED = re.compile(r"hexcontact: |step +\d+/|.*: \d+ load steps?(, after step \d+)?$")
 

@@ -19,7 +19,7 @@ module hc_shared_friction
 
   public :: shared_friction_t, new_shared_friction
 
-  !> What the first rank asks the others to take part in.
+  !> Calls of the first rank that the others take part in.
   integer, parameter :: to_solve = 1, to_displace = 2, to_set_gap = 3
 
   !> Numbers of a call of the first rank.

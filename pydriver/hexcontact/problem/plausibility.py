@@ -300,7 +300,9 @@ def row(case: Problem) -> str:
 
 def notes(case: Problem) -> dict[str, str]:
     """Return notes by what they are about: limits that are not judged, rounded distances, equal seeds."""
-    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case), "seeds": equal_seeds(case)}
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    if case.surfaces.curvature is None:
+        found["seeds"] = equal_seeds(case)
     return {about: note for about, note in found.items() if note}
 
 
@@ -338,11 +340,16 @@ def rounded_distances(case: Problem) -> str:
 
 def equal_seeds(case: Problem) -> str:
     """Return a note on rough surfaces whose waves coincide; empty without two of them."""
-    surfaces = case.surfaces.surface_1, case.surfaces.surface_2
-    parts = [part for one in surfaces for part in (one.parts if isinstance(one, SurfaceSum) else (one,))]
-    rough = [(part.seed, part.sides, part.offset) for part in parts if isinstance(part, Rough)]
-    for seed, _, _ in (one for one in rough if rough.count(one) > 1):
-        return f"two rough surfaces have seed = {seed}: their waves coincide, and peaks meet peaks"
+    found = set()
+    for surface in (case.surfaces.surface_1, case.surfaces.surface_2):
+        for part in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
+            if not isinstance(part, Rough):
+                continue
+            if (waves := (part.seed, part.sides, part.offset)) in found:
+                return (
+                    f"two rough surfaces have seed = {part.seed}: their waves coincide, and peaks meet peaks"
+                )
+            found.add(waves)
     return ""
 
 

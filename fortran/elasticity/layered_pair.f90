@@ -212,8 +212,8 @@ contains
     end do
     if (self%fit_error <= largest_error) return
     write (number, '(es8.1)') self%fit_error
-    call raise(error, status%invalid_input, 'the coatings: their kernels as sums of images have an error of '// &
-               trim(adjustl(number))//' of the largest one; at most 1e-6 expected, so ratios of moduli nearer to 1')
+    call raise(error, status%invalid_input, 'the moduli of layers and bodies lie too far apart: the error of the kernels is '// &
+               trim(adjustl(number))//' of the largest one; at most 1E-06 expected')
   end subroutine find_images
 
   !> Return the smallest thickness of all layers.

@@ -21,6 +21,8 @@ from ..core.measures import (
     slip_ring,
 )
 from ..deck.interface import TwoCoefficients
+from ..deck.rough import Rough
+from ..deck.surfaces import SurfaceSum
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -197,7 +199,13 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if math.isfinite(known.max_pressure):
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
-        along = np.concatenate([one.distances for one in case.maps]) / case.lattice.spacing
+        along = np.array(
+            [
+                distance / case.lattice.apart(one.angle + axis * math.pi / 2)
+                for one in case.maps
+                for axis, distance in zip(one.axes, one.distances, strict=True)
+            ]
+        )
         found |= {
             "spacings_between_points": float(along.max()),
             "points_between_nodes": float(1.0 / along.min()),
@@ -291,8 +299,8 @@ def row(case: Problem) -> str:
 
 
 def notes(case: Problem) -> dict[str, str]:
-    """Return notes by their subjects: limits that are not judged, rounded distances."""
-    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    """Return notes by their subjects: limits that are not judged, rounded distances, equal seeds."""
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case), "seeds": equal_seeds(case)}
     return {about: note for about, note in found.items() if note}
 
 
@@ -326,6 +334,16 @@ def rounded_distances(case: Problem) -> str:
                 f"of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
+
+
+def equal_seeds(case: Problem) -> str:
+    """Return a note on rough surfaces whose waves coincide; empty without two of them."""
+    surfaces = case.surfaces.surface_1, case.surfaces.surface_2
+    parts = [part for one in surfaces for part in (one.parts if isinstance(one, SurfaceSum) else (one,))]
+    rough = [(part.seed, part.sides, part.offset) for part in parts if isinstance(part, Rough)]
+    for seed, _, _ in (one for one in rough if rough.count(one) > 1):
+        return f"two rough surfaces have seed = {seed}: their waves coincide, and peaks meet peaks"
+    return ""
 
 
 def _steepest(case: Problem, found: dict[str, Any]) -> dict[str, str]:

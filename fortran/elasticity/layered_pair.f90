@@ -443,7 +443,7 @@ contains
     end do
   end subroutine find_symbols
 
-  !> Compute what responses add to the transform of the blocks at a wave vector, (J7); that of odd blocks over i.
+  !> Compute the part of the responses in the transform of the blocks at a wave vector, (J7); that of odd blocks over i.
   pure function change_at(self, basis, half) result(change)
     type(layered_pair_t), intent(in) :: self
     real(wp), intent(in) :: basis(2, 2)

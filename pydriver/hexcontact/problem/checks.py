@@ -83,7 +83,7 @@ _SOME_PERIOD = Period(1.0, math.inf)  # for means in a deck that is refused anyw
 
 
 class Repeating(NamedTuple):
-    """The window of a case that repeats, with what its loads refer to, and the surfaces over it."""
+    """The window of a case that repeats, with the references of its loads, and the surfaces over it."""
 
     lattice: Lattice
     period: Period

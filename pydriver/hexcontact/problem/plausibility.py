@@ -299,7 +299,7 @@ def row(case: Problem) -> str:
 
 
 def notes(case: Problem) -> dict[str, str]:
-    """Return notes by what they are about: limits that are not judged, rounded distances, equal seeds."""
+    """Return notes by their subjects: limits that are not judged, rounded distances, equal seeds."""
     found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
     if case.surfaces.curvature is None:
         found["seeds"] = equal_seeds(case)
@@ -398,7 +398,7 @@ def _load_ratio(case: Problem, step: LoadStep) -> float:
 
 
 def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
-    """Return the largest Q/mu P, and what follows from loads or motions along x, y and about z.
+    """Return the largest Q/mu P, and two numbers from loads or motions along x, y and about z.
 
     These are the error of the dissipated energy by loads that turn, None without slip or such steps, and the
     largest Q/mu P of tangential loads that return, None if none is known to. Q/mu P is that of a wide ring if

@@ -500,6 +500,9 @@ def test_a_map_that_does_not_repeat_is_refused_levelled_or_tapered(file: Any) ->
         "the window repeats every 0.64 mm in x; expected 0.715 mm, as the 65 points of the map, or 0.704 mm"
         in (complaint(wide, load=load, **CELL))
     )
+    grooves = waves(WAVE + 1)[:1] + 0.1 * np.arange(WAVE + 1) / WAVE + np.zeros((WAVE + 1, 1))
+    surface = of_file(file("grooves.csv", rows_of(grooves)), **keys)  # alike along y, but for rounding
+    assert largest({**surface, "level": "plane"}, load=load, **CELL) > 0.0
     rhombus = {**CELL, "cell_angle": "60 deg"}
     assert "repeats along x and y only" in complaint(surface, load=load, **rhombus)
 

@@ -31,6 +31,7 @@ _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file al
 _POINTS = ("x", "y", "heights")
 _LONG = 1e6  # half the length (m) of an extruded profile
 _EVEN = 1e-6  # of distances between points that repeat, and of their period
+_ROUNDED = 1e-9  # of heights, over their range
 _BEYOND = 12  # points on each side of a period that its interpolation sees
 _SQUARE, _SLENDER = 1.02, 1.1  # ratios of sides of cells that are squares, and that are not
 
@@ -634,7 +635,7 @@ def _closed(at: Array, height: Array, axis: int, side: float, taper: float | Non
         float(np.fmax.reduce(np.abs(steps), axis=None, initial=0.0))
         for steps in (seam, np.diff(heights, axis=0))
     )
-    if largest > 1.001 * beside:
+    if largest > 1.001 * beside + _ROUNDED * float(np.nanmax(heights) - np.nanmin(heights)):
         raise DeckError(
             f"the map does not repeat: between its opposite ends in {name} it steps by {readable(largest)}, "
             f"between neighboring points by {readable(beside)} at most; level it, or give taper, the width "

@@ -80,7 +80,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    logical :: pulls
+    logical :: pulls, everywhere
     integer :: row, stat
 
     level%flexibility%applications = 0.0_wp
@@ -99,8 +99,10 @@ contains
         now%pressures = now%target/level%lattice%cell_area()
         call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
-        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; it closes it from mean planes
-        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. level%lattice%is_periodic()), &
+        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from mean planes it
+        ! closes it, and layers bulge
+        everywhere = level%lattice%is_periodic() .or. .not. level%medium%trace() > 0.0_wp
+        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. everywhere), &
                      tolerance, max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution

@@ -21,6 +21,7 @@ from ..core.shared import Displacement, SharedContact, SharedFields, SharedOpera
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
+from ..problem.window import before_ends
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
 from .events import Listener
@@ -203,7 +204,10 @@ class Window:
         """Return the measures of a state, and whether the pressure rises to an end of the surface."""
         gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
         found = measures(self.lattice, self.friction, gap, self.candidate, solution)
-        return found, is_unbounded(self.candidate, solution.pressure)
+        inside = self.candidate
+        if self.case.chamfered:
+            inside = before_ends(inside, self.lattice, self.case.chamfered)
+        return found, is_unbounded(inside, solution.pressure)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.

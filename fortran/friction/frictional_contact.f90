@@ -154,17 +154,14 @@ contains
     ! are in the memory of the transforms
     inside = (1 + 2*n_shear)*half + 2*half + 2*field
     if (coupled) then
-      ! slope; unknowns, their products and that of a direction; those of all directions off the contact; without tractions
-      ! and displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 3 + 3 - 6)*field + 3*directions*half
-      ! packed: both of all directions, a residual; constraints with their estimates, and their rows for the pressure; without
-      ! the products there
-      inside = inside + 3*(2*directions + 1)*field + n_shear*(3*field + 2*half) + half - 3*directions*half
+      ! slope; product of the unknowns; those of all directions off the contact; without tractions and displacements of the iterate
+      everywhere = everywhere + (1 + 3 - 6)*field + 3*directions*half
+      ! packed, where half of the nodes stick: unknowns, both of all directions, a residual; constraints with their estimates, and
+      ! their rows for the pressure; without the products there
+      inside = inside + 5*(directions + 1)*field + n_shear*(3*field + 2*half) + half - 5*directions*half/2
     else
-      ! product of a direction
-      everywhere = everywhere + 2*field
-      ! packed: traction before, vectors of conjugate gradients, constraints with their estimates
-      inside = inside + 2*(1 + 4)*field + 2*n_shear*(field + half)
+      ! packed: vectors of conjugate gradients, constraints with their estimates
+      inside = inside + 2*3*field + 2*n_shear*(field + half)
     end if
     friction_step_memory = n*everywhere + n_contact*inside
   end function friction_step_memory

@@ -22,7 +22,7 @@
 !> The tolerance of linear problems is loose while the sets change; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
   use hc_precision, only: wp, sp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_memory, only: give_back
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
@@ -182,7 +182,7 @@ contains
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:)
+    real(wp), allocatable :: rhs(:), given(:)
     real(wp) :: scale, level
     logical :: by_load, compliant, unknown_gap
     integer :: i
@@ -197,11 +197,11 @@ contains
     if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
     call new_active_set(nodes, now%contact, now%pressure%space)
     allocate (constraints%columns(nodes%n_active, merge(1, 0, by_load)), source=1.0_wp)
-    allocate (rhs(size(gap)))
+    allocate (given(size(gap)))
     !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
-    do i = 1, size(rhs)
-      rhs(i) = level - now%h(i)
-      if (now%pressure_feels_shear) rhs(i) = rhs(i) - now%closing(i)
+    do i = 1, size(given)
+      given(i) = level - now%h(i)
+      if (now%pressure_feels_shear) given(i) = given(i) - now%closing(i)
       if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
     end do
     !$omp end parallel do
@@ -215,7 +215,10 @@ contains
     else
       call now%pressure%stretch(1.0_wp, now%p, now%w)
     end if
-    if (compliant) rhs = rhs - now%pressure%offset
+    if (compliant) given = given - now%pressure%offset
+    allocate (rhs(nodes%n_active))
+    call nodes%pack(given, rhs)
+    deallocate (given)
     scale = now%pressure%space%max(now%p)
     scale = now%problem%sprung_compliance(scale)*scale
     iteration%tolerance = options%final_pressure*now%tolerance
@@ -387,13 +390,21 @@ contains
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
     real(wp), allocatable :: rhs(:)
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: given(:)
     real(wp) :: goal, scale
+    integer :: stat
 
     options = now%problem%options%newton
     ! motions that are prescribed are known; the others are multipliers
-    allocate (rhs(size(found%x)))
-    call find_prescribed_displacement(now, rhs)
-    call now%shear%add_rest(rhs)
+    call now%shear%take_image(size(found%x), own, given, stat)
+    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
+    call find_prescribed_displacement(now, given)
+    call now%shear%add_rest(given)
+    call nodes%pack(given, rhs)
+    if (allocated(own)) deallocate (own)
     if (found%is_last) then
       call move_alloc(now%u, found%ax)
     else
@@ -543,8 +554,10 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: touching
-    real(wp), allocatable :: plane(:), column(:)
-    integer :: n, k, n_t
+    real(wp), allocatable :: column(:)
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: plane(:)
+    integer :: n, k, n_t, stat
     logical :: known
 
     n = size(now%p)
@@ -561,7 +574,11 @@ contains
     else
       allocate (mb(size(constraint, 1), size(constraint, 2)))
     end if
-    if (size(mb, 2) > 0) allocate (plane(2*n), column(size(mb, 1)))
+    if (size(mb, 2) == 0) return
+    call now%shear%take_image(2*n, own, plane, stat)
+    if (stat == 0) allocate (column(size(mb, 1)), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)

@@ -20,7 +20,7 @@
 !> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
   use hc_precision, only: wp, sp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
@@ -154,7 +154,7 @@ contains
       step%x(:n) = now%p
       step%x(n + 1:) = now%q
       call now%shear%turn(step%x(n + 1:))
-      ! what p carries along is not counted twice
+      ! the part of q that p carries is not counted twice
       step%x(2*n + 1:) = step%x(2*n + 1:) - system%slope*now%p
       where (.not. shear_active) step%x(n + 1:) = 0.0_wp
       if (friction%is_bounded()) then
@@ -192,7 +192,7 @@ contains
     type(friction_iterate_t), intent(inout) :: now
     !> The step
     type(coupled_step_t), intent(inout), target :: step
-    !> What the start lacks of the loads, over the cell area
+    !> Loads less those of the start, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
@@ -233,7 +233,8 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:)
+    real(wp), allocatable :: rhs(:), unknown(:), kept(:)
+    type(active_set_t) :: fixed
     real(wp) :: residual, p_max
     integer :: n
 
@@ -241,11 +242,9 @@ contains
     options = now%problem%options%newton
     residual = max(now%residual_normal, now%residual_tangential)
     associate (system => step%system, iteration => step%iteration)
-      allocate (step%ax(3*n), rhs(3*n))
-      rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), now%target%control(normal) == force_control)
-      if (allocated(now%pressure%offset)) rhs(:n) = rhs(:n) - now%pressure%offset
-      call find_prescribed_displacement(now, rhs(n + 1:))
-      call now%shear%add_rest(rhs(n + 1:))
+      allocate (step%ax(3*n))
+      call find_rhs(now, step, rhs, error)
+      if (allocated(error)) return
       if (residual < options%residual_ahead) then
         step%ax(:n) = now%w + now%closing
         if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
@@ -272,8 +271,13 @@ contains
                                 options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
-      call projected_gmres(system, step%nodes, step%constraints, rhs, step%x, step%ax, iteration, error)
+      call pack_unknowns(step, unknown, fixed, kept)
+      call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
+      allocate (step%x(3*n))
+      call system%space%fill(step%x, 0.0_wp)
+      call step%nodes%unpack(unknown, step%x)
+      call fixed%unpack(kept, step%x)
       now%outcome = iteration%outcome
       now%rounding = iteration%rounding
       if (iteration%drift > options%displacement_rounding) then
@@ -282,6 +286,53 @@ contains
       end if
     end associate
   end subroutine solve
+
+  !> Find the right-hand side of (F7) at the unknowns, in memory of the operator.
+  subroutine find_rhs(now, step, rhs, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(in) :: now
+    !> The step
+    type(coupled_step_t), intent(in) :: step
+    !> Right-hand side (nodes%n_active)
+    real(wp), allocatable, intent(out) :: rhs(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: given(:)
+    integer :: n, stat
+
+    n = size(step%ax)/3
+    call step%system%take_image(3*n, own, given, stat)
+    if (stat == 0) allocate (rhs(step%nodes%n_active), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the tractions: choose a smaller window')
+    if (allocated(error)) return
+    given(:n) = -now%h + merge(0.0_wp, now%motion(normal), now%target%control(normal) == force_control)
+    if (allocated(now%pressure%offset)) given(:n) = given(:n) - now%pressure%offset
+    call find_prescribed_displacement(now, given(n + 1:))
+    call now%shear%add_rest(given(n + 1:))
+    call step%nodes%pack(given, rhs)
+  end subroutine find_rhs
+
+  !> Pack the unknowns, and the traction across of nodes on a bound that does not grow with the pressure, and free the field.
+  subroutine pack_unknowns(step, unknown, fixed, kept)
+    !> The step, whose unknowns are freed
+    type(coupled_step_t), intent(inout) :: step
+    !> Unknowns (nodes%n_active)
+    real(wp), allocatable, intent(out) :: unknown(:)
+    !> Nodes of other values that are not zero (of 3 n), and the values
+    type(active_set_t), intent(out) :: fixed
+    real(wp), allocatable, intent(out) :: kept(:)
+    real(wp), allocatable :: zero(:)
+
+    allocate (unknown(step%nodes%n_active), zero(step%nodes%n_active))
+    call step%nodes%pack(step%x, unknown)
+    call step%system%space%fill(zero, 0.0_wp)
+    call step%nodes%unpack(zero, step%x)
+    call new_active_set(fixed, abs(step%x) > 0.0_wp, step%system%space)
+    allocate (kept(fixed%n_active))
+    call fixed%pack(step%x, kept)
+    deallocate (step%x)
+  end subroutine pack_unknowns
 
   !> Take tractions and motions of the solution, and their displacements from the product that GMRES carries along.
   subroutine take_solution(now, step, error)

@@ -109,7 +109,7 @@ contains
     end do
   end subroutine set_gap
 
-  !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
+  !> Count the bytes of a problem between its steps: operators and given fields, on all lattices.
   pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, n_spectrum, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -150,21 +150,18 @@ contains
     directions = options%max_directions - 1
     ! iterate; shear system
     everywhere = 6*field + half + 3*field
-    ! packed: traction estimates; weights of the preconditioner of the shear traction, what it turns into the frames; its fields
+    ! packed: traction estimates; weights of the preconditioner of the shear traction, its vectors in the frames; its fields
     ! are in the memory of the transforms
     inside = (1 + 2*n_shear)*half + 2*half + 2*field
     if (coupled) then
-      ! slope; unknowns, their products and that of a direction; those of all directions off the contact; without tractions
-      ! and displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 3 + 3 - 6)*field + 3*directions*half
-      ! packed: both of all directions, a residual; constraints with their estimates, and their rows for the pressure; without
-      ! the products there
-      inside = inside + 3*(2*directions + 1)*field + n_shear*(3*field + 2*half) + half - 3*directions*half
+      ! slope; product of the unknowns; those of all directions off the contact; without tractions and displacements of the iterate
+      everywhere = everywhere + (1 + 3 - 6)*field + 3*directions*half
+      ! packed, where half of the nodes stick: unknowns, both of all directions, a residual; constraints with their estimates, and
+      ! their rows for the pressure; without the products there
+      inside = inside + 5*(directions + 1)*field + n_shear*(3*field + 2*half) + half - 5*directions*half/2
     else
-      ! product of a direction
-      everywhere = everywhere + 2*field
-      ! packed: traction before, vectors of conjugate gradients, constraints with their estimates
-      inside = inside + 2*(1 + 4)*field + 2*n_shear*(field + half)
+      ! packed: vectors of conjugate gradients, constraints with their estimates
+      inside = inside + 2*3*field + 2*n_shear*(field + half)
     end if
     friction_step_memory = n*everywhere + n_contact*inside
   end function friction_step_memory
@@ -249,7 +246,7 @@ contains
 
   contains
 
-    !> Solve on the finest lattice, and count what it takes.
+    !> Solve on the finest lattice, and count the work.
     subroutine attempt(from)
       !> State to start from, whose tractions are freed
       type(contact_state_t), intent(inout) :: from

@@ -7,7 +7,7 @@
 !>     F_q = q - P(q - r ds),         ds = u(p, q) - shift - twist x r - s^n,           (F1), (F3)
 !>     F_m = (sum A p - P,  sum A q - Q,  sum A (x q_y - y q_x) - M_z),                 (F4)
 !>
-!> with P the projection on what the law of friction allows under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> with P the projection on the admissible tractions under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
 !> 1991); a motion that is prescribed has no component of F_m. The linearisation is that of the branch on which each node
 !> lies (semismooth Newton: Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003): g = 0 on the contact, ds = 0 in stick,
 !> and in slip q = mu p e + tau t with t.ds + D tau = 0, (F5), (F6). A sweep is one pass of block Gauss-Seidel over it:
@@ -22,7 +22,7 @@
 !> The tolerance of linear problems is loose while the sets change; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
   use hc_precision, only: wp, sp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_memory, only: give_back
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
@@ -39,11 +39,11 @@ module hc_staggered_newton
 
   public :: staggered_sweep, find_punch_pressure, find_rigid_traction
 
-  !> A shear traction that is solved for, with what it displaces.
+  !> A shear traction that is solved for, with its displacement.
   type :: shear_solution_t
     !> Traction [Pa], and displacement with the springs [m], in the frames (2 n)
     real(wp), allocatable :: x(:), ax(:)
-    !> Motions that are driven by their loads, the loads as constraints, and what the start lacks of them
+    !> Motions that are driven by their loads, the loads as constraints, and the defect of the start
     type(driven_motions_t) :: driven
     type(constraints_t) :: constraints
     real(wp), allocatable :: missing(:)
@@ -51,6 +51,8 @@ module hc_staggered_newton
     real(wp) :: scale = 0.0_wp
     !> Some node sticks; the loads determine the motions
     logical :: sticks = .false., independent = .false.
+    !> It is taken however large it is: no further attempt follows
+    logical :: is_last = .false.
   end type shear_solution_t
 
 contains
@@ -65,7 +67,7 @@ contains
     logical :: judged
 
     now%outcome = solution_accurate
-    ! the pressure is found under the shear traction: what each of them causes has to be known
+    ! the pressure is found under the shear traction: the displacements by each of them are needed
     if (now%joint) call now%refresh(error)
     if (allocated(error)) return
     ! 1.
@@ -75,7 +77,7 @@ contains
       call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
-    ! R_t of the old shear traction under the new pressure: what the step has to reduce
+    ! R_t of the old shear traction under the new pressure, which the step has to reduce
     if (.not. now%first) call now%find_tangential_residual()
     ! 2. and 3.
     call solve_shear(now, judged, error)
@@ -180,7 +182,7 @@ contains
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:)
+    real(wp), allocatable :: rhs(:), given(:)
     real(wp) :: scale, level
     logical :: by_load, compliant, unknown_gap
     integer :: i
@@ -195,11 +197,11 @@ contains
     if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
     call new_active_set(nodes, now%contact, now%pressure%space)
     allocate (constraints%columns(nodes%n_active, merge(1, 0, by_load)), source=1.0_wp)
-    allocate (rhs(size(gap)))
+    allocate (given(size(gap)))
     !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
-    do i = 1, size(rhs)
-      rhs(i) = level - now%h(i)
-      if (now%pressure_feels_shear) rhs(i) = rhs(i) - now%closing(i)
+    do i = 1, size(given)
+      given(i) = level - now%h(i)
+      if (now%pressure_feels_shear) given(i) = given(i) - now%closing(i)
       if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
     end do
     !$omp end parallel do
@@ -213,7 +215,10 @@ contains
     else
       call now%pressure%stretch(1.0_wp, now%p, now%w)
     end if
-    if (compliant) rhs = rhs - now%pressure%offset
+    if (compliant) given = given - now%pressure%offset
+    allocate (rhs(nodes%n_active))
+    call nodes%pack(given, rhs)
+    deallocate (given)
     scale = now%pressure%space%max(now%p)
     scale = now%problem%sprung_compliance(scale)*scale
     iteration%tolerance = options%final_pressure*now%tolerance
@@ -278,13 +283,12 @@ contains
     found%scale = now%problem%tangential_compliance*highest
     fixing = .false.
     do
-      call solve_on_zones(now, fixing, found, error)
+      call solve_on_zones(now, fixing, found, before, error)
       if (allocated(error)) return
       now%unsupported = .not. found%independent
-      if (size(found%missing) == 0 .or. fixing) exit
+      if (found%is_last .or. size(found%missing) == 0 .or. fixing) exit
       ! where all nodes slip, only their directions resist a load: limit the step along them
       if (found%independent) then
-        if (found%sticks) exit
         if (now%shear%space%max_abs(found%x(:n)) <= options%most_across*highest) exit
         deallocate (found%ax)
       end if
@@ -333,13 +337,15 @@ contains
   end subroutine restore_traction
 
   !> Classify the nodes, and solve (F10) for their traction in the frames; the traction of the iterate moves there.
-  subroutine solve_on_zones(now, fixing, found, error)
+  subroutine solve_on_zones(now, fixing, found, before, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Fix some nodes in stick where none sticks
     logical, intent(in) :: fixing
     !> The solution
     type(shear_solution_t), intent(inout) :: found
+    !> The traction before, freed where the solution is taken however large it is
+    real(wp), allocatable, intent(inout) :: before(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: nodes
@@ -365,17 +371,18 @@ contains
         if (found%independent) exit
       end do
     end associate
-    if (found%independent) call solve_in_frames(now, nodes, fixing, found, error)
+    if (.not. found%independent) return
+    found%is_last = size(found%missing) == 0 .or. fixing .or. found%sticks
+    if (found%is_last) deallocate (before)
+    call solve_in_frames(now, nodes, found, error)
   end subroutine solve_on_zones
 
   !> Solve (F10) by conjugate gradients from a traction that carries the prescribed loads.
-  subroutine solve_in_frames(now, nodes, fixing, found, error)
+  subroutine solve_in_frames(now, nodes, found, error)
     !> Tractions and motions; its displacements may move to the solution
     type(friction_iterate_t), intent(inout) :: now
     !> Unknowns (of 2 n)
     type(active_set_t), intent(in) :: nodes
-    !> Some nodes are fixed in stick: there is no further attempt
-    logical, intent(in) :: fixing
     !> The solution, on entry its start
     type(shear_solution_t), intent(inout) :: found
     !> Allocated on failure
@@ -383,14 +390,22 @@ contains
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
     real(wp), allocatable :: rhs(:)
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: given(:)
     real(wp) :: goal, scale
+    integer :: stat
 
     options = now%problem%options%newton
     ! motions that are prescribed are known; the others are multipliers
-    allocate (rhs(size(found%x)))
-    call find_prescribed_displacement(now, rhs)
-    call now%shear%add_rest(rhs)
-    if (size(found%missing) == 0 .or. fixing .or. found%sticks) then
+    call now%shear%take_image(size(found%x), own, given, stat)
+    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
+    call find_prescribed_displacement(now, given)
+    call now%shear%add_rest(given)
+    call nodes%pack(given, rhs)
+    if (allocated(own)) deallocate (own)
+    if (found%is_last) then
       call move_alloc(now%u, found%ax)
     else
       ! the old displacements may be needed again
@@ -539,8 +554,10 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: touching
-    real(wp), allocatable :: plane(:), column(:)
-    integer :: n, k, n_t
+    real(wp), allocatable :: column(:)
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: plane(:)
+    integer :: n, k, n_t, stat
     logical :: known
 
     n = size(now%p)
@@ -557,7 +574,11 @@ contains
     else
       allocate (mb(size(constraint, 1), size(constraint, 2)))
     end if
-    if (size(mb, 2) > 0) allocate (plane(2*n), column(size(mb, 1)))
+    if (size(mb, 2) == 0) return
+    call now%shear%take_image(2*n, own, plane, stat)
+    if (stat == 0) allocate (column(size(mb, 1)), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)

@@ -12,7 +12,7 @@
 !> each: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
 !> springs.
 !>
-!> What is added to the pressure is multiplied in single precision, and pressure and gap are
+!> Increments of the pressure are multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The bound on the error that this leaves in the gap is summed up, too; before it matters
 !> the gap is computed anew from the pressure, in double precision.
 !>
@@ -353,7 +353,7 @@ contains
       anew = anew .or. settled
       if (changed .or. settled .or. sweeps <= options%most_linearized) then
         r = level%normal_classification_parameter(now%n_active)
-        ! what is left close to the solution are errors of a few nodes along the edge
+        ! close to the solution errors remain at a few nodes along the edge
         if (now%residual < options%close_residual) r = max(r, options%local_share/level%normal_compliance)
         call linearize_law(level, now, r)
       end if

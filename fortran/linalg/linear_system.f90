@@ -225,7 +225,7 @@ contains
     type(active_set_t), intent(in) :: nodes
     !> Constraints, with multipliers that are nearly right
     type(constraints_t), intent(in) :: constraints
-    !> Right-hand side, and nearly A x (n)
+    !> Right-hand side (n_active), and nearly A x (n)
     real(wp), intent(in), contiguous :: rhs(:), ax(:)
     !> Share of the preconditioned residual
     real(wp), intent(in) :: length
@@ -241,9 +241,8 @@ contains
     call constraints%invert(system%space, inverse, independent)
     if (.not. independent) return
     allocate (r(nodes%n_active), z(nodes%n_active))
-    call nodes%pack(rhs, r)
     call nodes%pack(ax, z)
-    r = r - z
+    r = rhs - z
     call constraints%add_columns(system%space, constraints%multiplier, r)
     call system%precondition_packed(nodes, size(x), r, z, error)
     if (allocated(error)) return

@@ -47,7 +47,7 @@ contains
     type(active_set_t), intent(in) :: nodes
     !> Constraints, with C = B; on return their multipliers
     type(constraints_t), intent(inout) :: constraints
-    !> Right-hand side (n); freed, once there is a copy of its active part
+    !> Right-hand side at the active nodes, whose memory becomes that of the residual
     real(wp), allocatable, intent(inout) :: rhs(:)
     !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
@@ -121,11 +121,11 @@ contains
     iteration%drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
 
-  !> Compute r = rhs - A x on the active nodes, and free the right-hand side.
+  !> Compute r = rhs - A x on the active nodes, in the memory of the right-hand side.
   subroutine find_residual(nodes, rhs, ax, space, r, z)
     !> Nodes that carry unknowns
     type(active_set_t), intent(in) :: nodes
-    !> Right-hand side, freed, and A x (n)
+    !> Right-hand side (n_active), and A x (n)
     real(wp), allocatable, intent(inout) :: rhs(:)
     real(wp), intent(in), contiguous :: ax(:)
     !> Space of the fields
@@ -134,9 +134,8 @@ contains
     real(wp), allocatable, intent(out) :: r(:), z(:)
     integer :: i
 
-    allocate (r(nodes%n_active), z(nodes%n_active))
-    call nodes%pack(rhs, r)
-    deallocate (rhs)
+    call move_alloc(rhs, r)
+    allocate (z(nodes%n_active))
     call nodes%pack(ax, z)
     !$omp parallel do simd schedule(static) num_threads(space%threads)
     do i = 1, size(r)

@@ -38,9 +38,9 @@ contains
     type(active_set_t), intent(in) :: nodes
     !> Constraints; their multipliers are on entry a start
     type(constraints_t), intent(inout) :: constraints
-    !> Right-hand side (n), freed once there is a copy of its active part
+    !> Right-hand side at the active nodes, whose memory becomes that of the residual
     real(wp), allocatable, intent(inout) :: rhs(:)
-    !> Unknowns (n), on entry a start that satisfies the constraints
+    !> Unknowns (n_active), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere
     real(wp), intent(inout), contiguous :: ax(:)
@@ -103,9 +103,9 @@ contains
       real(wp) :: unit(size(along))
       integer :: i, part
 
-      others = nodes%complement(size(x))
-      allocate (basis(1)%v(nodes%n_active), packed(nodes%n_active))
-      part = size(x)/size(iteration%weight)
+      others = nodes%complement(size(ax))
+      allocate (packed(nodes%n_active))
+      part = size(ax)/size(iteration%weight)
       last(0) = 0
       do i = 1, size(iteration%weight)
         of_part = nodes%slice((i - 1)*part + 1, i*part)
@@ -119,8 +119,7 @@ contains
         call weigh(iteration%weight, packed)
         along(i) = sqrt(space%dot(packed, packed))
       end do
-      call nodes%pack(rhs, basis(1)%v)
-      deallocate (rhs)
+      call move_alloc(rhs, basis(1)%v)
       call nodes%pack(ax, packed)
       basis(1)%v = basis(1)%v - packed
       call constraints%add_columns(space, constraints%multiplier, basis(1)%v)
@@ -146,10 +145,10 @@ contains
       do k = 1, most
         stat = 0
         if (.not. allocated(basis(k)%mr)) then
-          if (k == many) call give_back(size(x))
+          if (k >= many) call give_back(size(ax))
           allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
         end if
-        if (stat == 0) call system%take_image(size(x), own, image, stat)
+        if (stat == 0) call system%take_image(size(ax), own, image, stat)
         if (stat /= 0) then
           call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
           return
@@ -195,7 +194,7 @@ contains
       integer, intent(in) :: k
 
       call weigh(1.0_wp/iteration%weight, basis(k)%v)
-      call system%precondition_packed(nodes, size(x), basis(k)%v, basis(k + 1)%v, error)
+      call system%precondition_packed(nodes, size(ax), basis(k)%v, basis(k + 1)%v, error)
       if (allocated(error)) return
       call weigh(iteration%weight, basis(k)%v)
       call space%copy(basis(k + 1)%v, basis(k)%mr)
@@ -231,9 +230,9 @@ contains
       call nodes%add(1.0_wp, packed, ax)
       packed = 0.0_wp
       call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), packed)
-      call nodes%add(1.0_wp, packed, x)
+      call space%add(packed, x)
       do i = 1, directions
-        call nodes%add(y(i), basis(i)%mr, x)
+        call add_direction(y(i), basis(i)%mr)
         call others%add(y(i), basis(i)%beyond, ax)
         iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*max(maxval(abs(basis(i)%beyond)), 0.0_sp)
       end do
@@ -246,6 +245,19 @@ contains
       end do
       length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     end subroutine take_step
+
+    !> Add a multiple of a direction to the unknowns.
+    subroutine add_direction(factor, direction)
+      real(wp), intent(in) :: factor
+      real(wp), intent(in), contiguous :: direction(:)
+      integer :: i
+
+      !$omp parallel do simd schedule(static) num_threads(space%threads)
+      do i = 1, size(x)
+        x(i) = x(i) + factor*direction(i)
+      end do
+      !$omp end parallel do simd
+    end subroutine add_direction
 
     !> Multiply by one factor for each part.
     subroutine weigh(factor, values)

@@ -29,7 +29,7 @@ contains
     type(active_set_t), intent(in) :: nodes
     !> Constraints, with C = B; on return their multipliers
     type(constraints_t), intent(inout) :: constraints
-    !> Right-hand side (n); freed, once there is a copy of its active part
+    !> Right-hand side at the active nodes; used up
     real(wp), allocatable, intent(inout) :: rhs(:)
     !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
@@ -40,6 +40,8 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
+    real(wp), allocatable :: unknown(:)
+
     if (system%symmetric) then
       call projected_cg(system, nodes, constraints, rhs, x, ax, iteration, error)
       return
@@ -48,7 +50,10 @@ contains
     allocate (constraints%multiplier(size(constraints%columns, 2)), source=0.0_wp)
     iteration%most_directions = max_directions
     iteration%weight = [1.0_wp]
-    call projected_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
+    allocate (unknown(nodes%n_active))
+    call nodes%pack(x, unknown)
+    call projected_gmres(system, nodes, constraints, rhs, unknown, ax, iteration, error)
+    call nodes%unpack(unknown, x)
   end subroutine solve_step_equation
 
 end module hc_step_equation

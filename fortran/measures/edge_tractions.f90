@@ -254,6 +254,7 @@ contains
       if (allocated(error)) return
       iteration = iteration_t(tolerance=system%options%accuracy*maxval(abs(rhs - ax), mask=active), &
                               most=system%options%max_iterations)
+      rhs = pack(rhs, active)
       call projected_cg(system, set, constraints, rhs, x, ax, iteration, error)
       if (allocated(error)) return
       if (iteration%outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)

@@ -33,8 +33,8 @@ def fields_held(case: Problem) -> int:
     friction = case.frictional
     entry = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
     table = [
-        # initial gap; with friction the state before, which the core holds, and holes in the heap
-        (True, 11 if friction else 1),
+        # initial gap of a record; with friction the state before, which the core holds, and holes in the heap
+        (True, 10 if friction else 1),
         (entry, 45),  # places of nodes when their gap closed
         (case.adaptive, 40),  # the path in whole steps, and edges
         (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts

@@ -104,7 +104,7 @@ def test_an_approach_on_a_layer_that_bulges(friction_coefficient: float | None) 
         friction_coefficient=friction_coefficient,
     )
     by_load = case.run().step(-1)
-    assert float(by_load.contact_radius_fit) ** 2 / 20e-3 > 1.2 * float(by_load.approach)
+    assert float(by_load.contact_radius_fit) ** 2 / 20e-3 > 1.1 * float(by_load.approach)
     by_approach = case.changed(approach=float(by_load.approach)).run().step(-1)
     assert float(by_approach.normal_load) == pytest.approx(5.0, rel=1e-6)
 

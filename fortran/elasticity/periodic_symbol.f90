@@ -32,6 +32,8 @@ module hc_periodic_symbol
   integer, parameter :: degree = 13
   !> Numbers k of the hexagons.
   integer, parameter :: hexagon(7) = [1, 3, 5, 7, 9, 11, 13]
+  !> Frequencies of a column that are computed together.
+  integer, parameter :: stride = 64
 
   !> Symbols on one window.
   type :: periodic_symbols_t
@@ -60,7 +62,7 @@ contains
     !> How many of them
     integer, intent(in) :: n
     real(wp), dimension(0:degree, 0:degree) :: wave, value
-    real(wp) :: node(0:degree), side(2), rest(0:n_line, n), weight(size(hexagon)), x(size(hexagon))
+    real(wp) :: node(0:degree), side(2), weight(size(hexagon)), x(size(hexagon))
     real(wp), allocatable :: at_nodes(:, :, :, :, :)
     integer, allocatable :: terms(:, :)
     integer :: a, b, half, k, m, stretch
@@ -83,10 +85,8 @@ contains
     allocate (self%coefficient(0:degree, 0:degree, 0:n_line, n, 2))
     do half = 1, 2
       do b = 0, degree
-        do a = 0, degree
-          call sum_beyond(self, 0.5_wp*pi*[1.0_wp + node(a), node(b) + merge(1.0_wp, -1.0_wp, half == 1)], terms, weight, rest)
-          at_nodes(a, b, :, :, half) = rest
-        end do
+        call sum_beyond(self, 0.5_wp*pi*(1.0_wp + node), 0.5_wp*pi*(node(b) + merge(1.0_wp, -1.0_wp, half == 1)), &
+                        terms, weight, at_nodes(:, b, :, :, half))
       end do
     end do
     do half = 1, 2
@@ -127,48 +127,62 @@ contains
     terms = terms(:, :n)
   end function terms_beyond
 
-  !> Sum these terms, without sines and without the factors that lines have for themselves.
-  pure subroutine sum_beyond(self, theta, terms, weight, total)
+  !> Sum these terms at phases with the same second one, without sines and without the factors that lines have for themselves.
+  pure subroutine sum_beyond(self, theta1, theta2, terms, weight, total)
     type(periodic_symbols_t), intent(in) :: self
     !> Phases
-    real(wp), intent(in) :: theta(2)
+    real(wp), intent(in) :: theta1(:), theta2
     !> The terms, and the weights of the sums over hexagons
     integer, intent(in) :: terms(:, :)
     real(wp), intent(in) :: weight(:)
-    !> Sums: off the lines and on each (0:n_line, symbol)
-    real(wp), intent(out) :: total(0:, :)
-    real(wp) :: part(0:n_line, size(total, 2), size(weight)), half(3), f(n_symbol)
-    integer :: m, t
+    !> Sums: by the first phase, off the lines and on each (phase, 0:n_line, symbol)
+    real(wp), intent(out) :: total(:, 0:, :)
+    real(wp) :: part(size(theta1), size(total, 3), 0:n_line, size(weight))
+    real(wp) :: half(size(theta1), 3), f(size(theta1), size(total, 3)), factor(size(theta1))
+    integer :: m, t, s
 
     part = 0.0_wp
     do t = 1, size(terms, 2)
       associate (i => terms(1, t), j => terms(2, t), hexagon => terms(3, t), k => terms(4, t))
-        half(1:2) = 0.5_wp*theta + pi*[i, j]
-        half(3) = 0.5_wp*(theta(2) - theta(1)) + pi*(j - i)
-        if (k > 0) half(line(1, k)) = 1.0_wp
-        f = response(self, 0.5_wp*theta(1) + pi*i, 0.5_wp*theta(2) + pi*j)/(half(1)*half(2)*half(3))
-        part(k, :, hexagon) = part(k, :, hexagon) + f(:size(part, 2))
+        half(:, 1) = 0.5_wp*theta1 + pi*i
+        half(:, 2) = 0.5_wp*theta2 + pi*j
+        half(:, 3) = half(:, 2) - half(:, 1)
+        call responses(self, half(:, 1), half(:, 2), f)
+        if (k > 0) half(:, line(1, k)) = 1.0_wp
+        factor = 1.0_wp/(half(:, 1)*half(:, 2)*half(:, 3))
+        do s = 1, size(f, 2)
+          part(:, s, k, hexagon) = part(:, s, k, hexagon) + factor*f(:, s)
+        end do
       end associate
     end do
     total = 0.0_wp
     do m = 1, size(weight)
-      total = total + sum(weight(m:))*part(:, :, m)
+      do s = 1, size(total, 3)
+        total(:, :, s) = total(:, :, s) + sum(weight(m:))*part(:, s, :, m)
+      end do
     end do
   end subroutine sum_beyond
 
-  !> Compute the transforms F of the kernels at a wave vector.
-  pure function response(self, h1, h2) result(f)
+  !> Compute the transforms F of the kernels at wave vectors.
+  pure subroutine responses(self, h1, h2, f)
     type(periodic_symbols_t), intent(in) :: self
     !> Half phases
-    real(wp), intent(in) :: h1, h2
-    real(wp) :: f(n_symbol), square, root, d(2)
+    real(wp), intent(in), contiguous :: h1(:), h2(:)
+    !> Transforms (wave vector, symbol)
+    real(wp), intent(out), contiguous :: f(:, :)
+    real(wp), dimension(size(h1)) :: d1, d2, square
 
-    ! the wave vector times half the area of a cell
-    d = [h1*self%basis(2, 2) - h2*self%basis(2, 1), h2*self%basis(1, 1) - h1*self%basis(1, 2)]
-    square = dot_product(d, d)
-    root = pi*self%area/sqrt(square)
-    f = [root, root*d(2)**2/square, -root*d(1)*d(2)/square, -pi*self%area*d(1)/square, -pi*self%area*d(2)/square]
-  end function response
+    ! the wave vectors times half the area of a cell
+    d1 = h1*self%basis(2, 2) - h2*self%basis(2, 1)
+    d2 = h2*self%basis(1, 1) - h1*self%basis(1, 2)
+    square = d1**2 + d2**2
+    f(:, 1) = pi*self%area/sqrt(square)
+    if (size(f, 2) == 1) return
+    f(:, 2) = f(:, 1)*d2**2/square
+    f(:, 3) = -f(:, 1)*d1*d2/square
+    f(:, 4) = -pi*self%area*d1/square
+    f(:, 5) = -pi*self%area*d2/square
+  end subroutine responses
 
   !> Compute the symbols at all frequencies with the same first index.
   pure subroutine column(self, f, symbol)
@@ -177,58 +191,104 @@ contains
     integer, intent(in) :: f
     !> Symbols by the second index (0:number of rows - 1, symbol); K1, K_xx, K_xy, those of K_x and K_y over i [m]
     real(wp), intent(out) :: symbol(0:, :)
-    real(wp) :: row(0:degree, 0:n_line, size(symbol, 2), 2), wave(0:degree), half(3), sine(3), factor(0:n_line)
-    real(wp) :: response_here(n_symbol)
-    integer :: g, i, j, k, m, side
+    real(wp) :: row(0:degree, 0:n_line, size(symbol, 2)), wave(0:degree, 1)
+    integer :: first, g, k, last, m, side
 
-    half(1) = pi*f/self%length(1)
-    wave = chebyshev(4.0_wp*f/self%length(1) - 1.0_wp)
+    wave = chebyshev([4.0_wp*f/self%length(1) - 1.0_wp])
     do side = 1, 2
       do m = 1, size(symbol, 2)
         do k = 0, n_line
-          row(:, k, m, side) = matmul(wave, self%coefficient(:, :, k, m, side))
+          row(:, k, m) = matmul(wave(:, 1), self%coefficient(:, :, k, m, side))
         end do
       end do
+      first = merge(0, self%length(2)/2 + 1, side == 1)
+      last = merge(self%length(2)/2, self%length(2) - 1, side == 1)
+      do g = first, last, stride
+        call piece(self, f, g, row, symbol(g:min(g + stride - 1, last), :))
+      end do
     end do
-    do g = 0, self%length(2) - 1
-      symbol(g, :) = 0.0_wp
-      if (f == 0 .and. g == 0) cycle
-      side = merge(1, 2, 2*g <= self%length(2))
-      half(2) = pi*(g - merge(0, self%length(2), side == 1))/self%length(2)
-      half(3) = half(2) - half(1)
-      wave = chebyshev(4.0_wp*half(2)/pi - merge(1.0_wp, -1.0_wp, side == 1))
-      sine = sin(half)
-      factor(0) = product(sine)
-      do k = 1, n_line
-        associate (q => line(1, k), shift => line(2, k))
-          factor(k) = product(sine, mask=[1, 2, 3] /= q)*sinc(half(q) + pi*shift)*(1 - 2*modulo(shift, 2))
-        end associate
-      end do
-      do m = 1, size(symbol, 2)
-        symbol(g, m) = dot_product(factor, matmul(wave, row(:, :, m, side)))
-      end do
-      do j = -self%near(2), self%near(2)
-        do i = -self%near(1), self%near(1)
-          response_here = sinc(half(1) + pi*i)*sinc(half(2) + pi*j)*sinc(half(3) + pi*(j - i)) &
-                          *response(self, half(1) + pi*i, half(2) + pi*j)
-          symbol(g, :) = symbol(g, :) + response_here(:size(symbol, 2))
-        end do
-      end do
-      ! a frequency that is its own opposite: the odd symbols vanish
-      if (modulo(2*f, self%length(1)) == 0 .and. modulo(2*g, self%length(2)) == 0) symbol(g, 4:) = 0.0_wp
-    end do
+    if (f == 0) symbol(0, :) = 0.0_wp
+    ! frequencies that are their own opposites: the odd symbols vanish
+    if (modulo(2*f, self%length(1)) == 0) then
+      symbol(0, 4:) = 0.0_wp
+      if (modulo(self%length(2), 2) == 0) symbol(self%length(2)/2, 4:) = 0.0_wp
+    end if
   end subroutine column
 
-  !> Compute the Chebyshev polynomials of all degrees.
+  !> Compute the symbols at some frequencies that follow one another, all in the same half of a column.
+  pure subroutine piece(self, f, g, row, symbol)
+    type(periodic_symbols_t), intent(in) :: self
+    !> First index, and the first second one
+    integer, intent(in) :: f, g
+    !> Chebyshev coefficients in the second phase (degree, none or line, symbol)
+    real(wp), intent(in) :: row(0:, 0:, :)
+    !> Symbols (frequency, symbol)
+    real(wp), intent(out) :: symbol(:, :)
+    real(wp) :: half(size(symbol, 1), 3), sine(size(symbol, 1), 3), factor(size(symbol, 1), 0:n_line)
+    real(wp) :: wave(0:degree, size(symbol, 1)), here(size(symbol, 1), size(symbol, 2)), shifted(size(symbol, 1))
+    real(wp) :: second(size(symbol, 1), -self%near(2):self%near(2))
+    real(wp) :: third(size(symbol, 1), -sum(self%near):sum(self%near))
+    integer :: i, j, k, m, shift
+
+    shift = merge(0, self%length(2), 2*g <= self%length(2))
+    half(:, 1) = pi*f/self%length(1)
+    half(:, 2) = pi*[(g + k - shift, k=0, size(symbol, 1) - 1)]/self%length(2)
+    ! the term of zero has no value: any other frequency in its place
+    if (f == 0 .and. g == 0) half(1, 2) = 0.5_wp*pi
+    half(:, 3) = half(:, 2) - half(:, 1)
+    sine = sin(half)
+    factor(:, 0) = product(sine, dim=2)
+    do k = 1, n_line
+      associate (q => line(1, k))
+        factor(:, k) = sine(:, modulo(q, 3) + 1)*sine(:, modulo(q + 1, 3) + 1)*over(sine(:, q), half(:, q), line(2, k))
+      end associate
+    end do
+    wave = chebyshev(4.0_wp*half(:, 2)/pi - merge(1.0_wp, -1.0_wp, shift == 0))
+    do m = 1, size(symbol, 2)
+      symbol(:, m) = 0.0_wp
+      do k = 0, n_line
+        symbol(:, m) = symbol(:, m) + factor(:, k)*matmul(row(:, k, m), wave)
+      end do
+    end do
+    do j = lbound(second, 2), ubound(second, 2)
+      second(:, j) = over(sine(:, 2), half(:, 2), j)
+    end do
+    do j = lbound(third, 2), ubound(third, 2)
+      third(:, j) = over(sine(:, 3), half(:, 3), j)
+    end do
+    do j = -self%near(2), self%near(2)
+      do i = -self%near(1), self%near(1)
+        call responses(self, half(:, 1) + pi*i, half(:, 2) + pi*j, here)
+        shifted = over(sine(:, 1), half(:, 1), i)*second(:, j)*third(:, j - i)
+        do m = 1, size(symbol, 2)
+          symbol(:, m) = symbol(:, m) + shifted*here(:, m)
+        end do
+      end do
+    end do
+  end subroutine piece
+
+  !> Divide sines of half phases by these, shifted by half turns.
+  elemental real(wp) function over(sine, half, turns)
+    real(wp), intent(in) :: sine, half
+    integer, intent(in) :: turns
+    logical :: limit
+    real(wp) :: x
+
+    x = half + pi*turns
+    limit = abs(x) < 1.0e-8_wp
+    over = merge(real(1 - 2*modulo(turns, 2), wp), sine/merge(1.0_wp, x, limit), limit)
+  end function over
+
+  !> Compute the Chebyshev polynomials of all degrees (degree, argument).
   pure function chebyshev(x) result(t)
-    real(wp), intent(in) :: x
-    real(wp) :: t(0:degree)
+    real(wp), intent(in) :: x(:)
+    real(wp) :: t(0:degree, size(x))
     integer :: k
 
-    t(0) = 1.0_wp
-    t(1) = x
+    t(0, :) = 1.0_wp
+    t(1, :) = x
     do k = 2, degree
-      t(k) = 2.0_wp*x*t(k - 1) - t(k - 2)
+      t(k, :) = 2.0_wp*x*t(k - 1, :) - t(k - 2, :)
     end do
   end function chebyshev
 

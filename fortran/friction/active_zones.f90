@@ -129,7 +129,7 @@ contains
 
   end subroutine classify
 
-  !> Put the tractions of the slipping nodes of a row on the boundary of what the law allows, with a start across.
+  !> Put the tractions of the slipping nodes of a row on the boundary of the admissible ones, with a start across.
   pure subroutine put_on_boundary(n, zone, direction, ahead, aside, stiff, qx, qy)
     !> Number of nodes, and their zones
     integer, intent(in) :: n, zone(n)
@@ -160,7 +160,7 @@ contains
     type(driven_motions_t), intent(out) :: driven
     !> Constraint vectors at the unknowns (n_active, number of driven motions)
     real(wp), allocatable, intent(out) :: constraint(:, :)
-    !> What the present traction lacks of the loads, over the cell area
+    !> Loads less those of the present traction, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
     real(wp) :: part(size(nodes%pairs%first))

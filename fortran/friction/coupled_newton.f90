@@ -154,7 +154,7 @@ contains
       step%x(:n) = now%p
       step%x(n + 1:) = now%q
       call now%shear%turn(step%x(n + 1:))
-      ! what p carries along is not counted twice
+      ! the part of q that p carries is not counted twice
       step%x(2*n + 1:) = step%x(2*n + 1:) - system%slope*now%p
       where (.not. shear_active) step%x(n + 1:) = 0.0_wp
       if (friction%is_bounded()) then
@@ -192,7 +192,7 @@ contains
     type(friction_iterate_t), intent(inout) :: now
     !> The step
     type(coupled_step_t), intent(inout), target :: step
-    !> What the start lacks of the loads, over the cell area
+    !> Loads less those of the start, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error

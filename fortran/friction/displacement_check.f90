@@ -42,7 +42,7 @@ contains
       w = by_pressure(:n) + merge(moved(:n), 0.0_wp, now%joint)
       if (now%joint) moved(:n) = 0.0_wp
       now%operators%flexibility%applications = applications
-      ! what sticks moves little: pressure and shear traction cancel there
+      ! nodes in stick move little: pressure and shear traction cancel there
       largest = maxval(abs(by_pressure(n + 1:))) + maxval(abs(moved(n + 1:)))
       if (.not. (agree(now%w, w, rounding*maxval(abs(w)) + now%rounding) .and. &
                  agree(now%closing, moved(:size(now%closing)), rounding*maxval(abs(w))) .and. &
@@ -55,7 +55,7 @@ contains
   !> Return whether two fields agree but for rounding errors.
   pure logical function agree(one, other, rounding)
     real(wp), intent(in) :: one(:), other(:)
-    !> What rounding errors may make up
+    !> Largest difference by rounding errors
     real(wp), intent(in) :: rounding
 
     agree = all(abs(one - other) <= rounding)

@@ -193,8 +193,10 @@ contains
     allocate (self%p(n), self%q(2*n))
     allocate (self%contact(n))
     self%candidate(1:n) => problem%candidate
-    if (step%target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) then
-      ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+    if (step%target%control(normal) /= force_control .and. .not. self%pressure_feels_shear &
+        .and. problem%medium%trace() > 0.0_wp .and. .not. problem%lattice%is_periodic()) then
+      ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from mean planes it
+      ! closes it, and layers bulge
       allocate (self%reached(n))
       self%reached = self%candidate .and. self%h < step%target%value(normal)
       self%candidate => self%reached

@@ -109,7 +109,7 @@ contains
     end do
   end subroutine set_gap
 
-  !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
+  !> Count the bytes of a problem between its steps: operators and given fields, on all lattices.
   pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, n_spectrum, periodic)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -150,7 +150,7 @@ contains
     directions = options%max_directions - 1
     ! iterate; shear system
     everywhere = 6*field + half + 3*field
-    ! packed: traction estimates; weights of the preconditioner of the shear traction, what it turns into the frames; its fields
+    ! packed: traction estimates; weights of the preconditioner of the shear traction, its vectors in the frames; its fields
     ! are in the memory of the transforms
     inside = (1 + 2*n_shear)*half + 2*half + 2*field
     if (coupled) then
@@ -246,7 +246,7 @@ contains
 
   contains
 
-    !> Solve on the finest lattice, and count what it takes.
+    !> Solve on the finest lattice, and count the work.
     subroutine attempt(from)
       !> State to start from, whose tractions are freed
       type(contact_state_t), intent(inout) :: from

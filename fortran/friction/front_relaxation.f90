@@ -148,7 +148,7 @@ contains
     !$omp end parallel do
   end subroutine mark_nodes
 
-  !> Find what is subtracted from the displacement of a node for its slip, and the largest traction that it bears.
+  !> Compute the offset between displacement and slip of a node, and its largest traction.
   subroutine describe(now, fronts)
     type(friction_iterate_t), intent(in) :: now
     !> Nodes near the fronts

@@ -1,7 +1,7 @@
 !> A load step with friction on one lattice.
 !>
 !> Sweeps that find pressure and shear traction one after the other (staggered_newton, which states the equations),
-!> and where that is not enough both together (coupled_newton), until the residuals of what is recorded are within the
+!> and where that is not enough both together (coupled_newton), until the residuals of the recorded state are within the
 !> tolerance.
 !>
 !> Equations: docs/theory/friction.md, (F2) to (F4).
@@ -134,7 +134,7 @@ contains
       call record(now, state)
       state%motion = now%motion
       less = 0.0_wp
-      ! what carried displacements lack: those of the cut, and their rounding errors
+      ! errors of carried displacements: those of the cut, and rounding errors
       if (known .and. judged) less = cut_off(now, state) + 2*options%displacement_rounding
       known = known .and. less <= options%cut_share*step%tolerance
       if (known) then
@@ -218,7 +218,7 @@ contains
     !$omp end parallel do
   end subroutine collect
 
-  !> Bound the displacement by what the recorded tractions lack of those of the iterate, and what rounded directions do, as a
+  !> Bound the displacement by the difference of the recorded tractions from those of the iterate, and by rounded directions, as a
   !> residual.
   !>
   !> No distribution of a traction that is nowhere larger than t, and in the sum T, displaces more than the disc of radius

@@ -18,7 +18,7 @@ module hc_pressure_system
     !> Compliance C [m/Pa] and offset [m] of the spring of each node, 0 off the contact; not there without a compliant law
     real(wp), allocatable :: compliance(:), offset(:)
   contains
-    !> Add to displacements what the springs give way, or take it off
+    !> Add the compression of the springs to displacements, or subtract it
     procedure :: stretch
     procedure :: product => pressure_product
     procedure :: product_packed => pressure_product_packed

@@ -75,7 +75,7 @@ contains
     call spread_mask(ranks, self%problem%candidate)
     call new_windowed_friction(self%part, self%problem, error, n_threads, cache, ranks)
     call ranks%agree(error)
-    ! what a path computes by itself, it computes on the first rank alone
+    ! the computations of a path run on the first rank alone
     self%problem%space = space_over(self%problem%lattice%extent, n_threads)
   end subroutine new_shared_friction
 

@@ -53,7 +53,7 @@ module hc_shear_system
     procedure :: reset_frames, forget_frames
     !> Set the nodes in contact, with their frames and compliances
     procedure :: set_contact
-    !> Add what springs at rest are stretched by
+    !> Add the stretch of springs at rest
     procedure :: add_rest
     !> Reduce the traction of slipping nodes by their compliance
     procedure :: apply_slip_compliance

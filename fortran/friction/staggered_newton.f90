@@ -7,7 +7,7 @@
 !>     F_q = q - P(q - r ds),         ds = u(p, q) - shift - twist x r - s^n,           (F1), (F3)
 !>     F_m = (sum A p - P,  sum A q - Q,  sum A (x q_y - y q_x) - M_z),                 (F4)
 !>
-!> with P the projection on what the law of friction allows under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> with P the projection on the admissible tractions under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
 !> 1991); a motion that is prescribed has no component of F_m. The linearisation is that of the branch on which each node
 !> lies (semismooth Newton: Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003): g = 0 on the contact, ds = 0 in stick,
 !> and in slip q = mu p e + tau t with t.ds + D tau = 0, (F5), (F6). A sweep is one pass of block Gauss-Seidel over it:
@@ -39,11 +39,11 @@ module hc_staggered_newton
 
   public :: staggered_sweep, find_punch_pressure, find_rigid_traction
 
-  !> A shear traction that is solved for, with what it displaces.
+  !> A shear traction that is solved for, with its displacement.
   type :: shear_solution_t
     !> Traction [Pa], and displacement with the springs [m], in the frames (2 n)
     real(wp), allocatable :: x(:), ax(:)
-    !> Motions that are driven by their loads, the loads as constraints, and what the start lacks of them
+    !> Motions that are driven by their loads, the loads as constraints, and the defect of the start
     type(driven_motions_t) :: driven
     type(constraints_t) :: constraints
     real(wp), allocatable :: missing(:)
@@ -67,7 +67,7 @@ contains
     logical :: judged
 
     now%outcome = solution_accurate
-    ! the pressure is found under the shear traction: what each of them causes has to be known
+    ! the pressure is found under the shear traction: the displacements by each of them are needed
     if (now%joint) call now%refresh(error)
     if (allocated(error)) return
     ! 1.
@@ -77,7 +77,7 @@ contains
       call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
-    ! R_t of the old shear traction under the new pressure: what the step has to reduce
+    ! R_t of the old shear traction under the new pressure, which the step has to reduce
     if (.not. now%first) call now%find_tangential_residual()
     ! 2. and 3.
     call solve_shear(now, judged, error)

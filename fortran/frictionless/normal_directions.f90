@@ -61,7 +61,7 @@ contains
       now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
       part = count(now%active, dim=1)
     end if
-    ! what was cut off goes where it changes the approach alone
+    ! the load that was cut off is added along the punch, which changes the approach alone
     if (.not. now%by_load) return
     lack = real((now%pressures/now%p_unit - level%space%total(part))/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
@@ -76,7 +76,7 @@ contains
   !> Compute the step d to max(p + length (z + share of the last step), 0) on the active nodes and to zero elsewhere, conjugate to
   !> the last step before the cut.
   !>
-  !> What the cut changes of a prescribed load is taken off along the punch before it, so that there is no tension, (N8).
+  !> The change of a prescribed load by the cut is subtracted along the punch before it, so that there is no tension, (N8).
   subroutine searched_step(level, now, length, curved, fall)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level

@@ -186,8 +186,8 @@ contains
     now%n_next = now%n_active
   end subroutine classify
 
-  !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
-  !> linearised to.
+  !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of its
+  !> linearisation.
   subroutine classify_compliant_row(level, now, row, r, candidate, next, found)
     type(normal_lattice_t), intent(in) :: level
     type(normal_iterate_t), intent(in) :: now
@@ -241,7 +241,7 @@ contains
     end associate
   end subroutine linearize_law
 
-  !> Add the springs to what the pressure closes, or take them off again.
+  !> Add the springs to the closing by the pressure, or subtract them again.
   subroutine add_springs(level, now, sign)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
@@ -359,7 +359,7 @@ contains
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              - now%compliance(from:to, row)*now%p(from:to, row)
         call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
-        ! nodes that left the set carry no pressure after a whole step, not even what single precision would leave of it
+        ! nodes that left the set carry no pressure after a whole step, not even a residue in single precision
         if (share >= 1.0_wp) where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              + now%compliance(from:to, row)*now%p(from:to, row)

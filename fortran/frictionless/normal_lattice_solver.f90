@@ -12,7 +12,7 @@
 !> each: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
 !> springs.
 !>
-!> What is added to the pressure is multiplied in single precision, and pressure and gap are
+!> Increments of the pressure are multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The bound on the error that this leaves in the gap is summed up, too; before it matters
 !> the gap is computed anew from the pressure, in double precision.
 !>
@@ -80,7 +80,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    logical :: pulls
+    logical :: pulls, everywhere
     integer :: row, stat
 
     level%flexibility%applications = 0.0_wp
@@ -99,8 +99,10 @@ contains
         now%pressures = now%target/level%lattice%cell_area()
         call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
-        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; it closes it from mean planes
-        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. level%lattice%is_periodic()), &
+        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from mean planes it
+        ! closes it, and layers bulge
+        everywhere = level%lattice%is_periodic() .or. .not. level%medium%trace() > 0.0_wp
+        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. everywhere), &
                      tolerance, max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution
@@ -351,7 +353,7 @@ contains
       anew = anew .or. settled
       if (changed .or. settled .or. sweeps <= options%most_linearized) then
         r = level%normal_classification_parameter(now%n_active)
-        ! what is left close to the solution are errors of a few nodes along the edge
+        ! close to the solution errors remain at a few nodes along the edge
         if (now%residual < options%close_residual) r = max(r, options%local_share/level%normal_compliance)
         call linearize_law(level, now, r)
       end if

@@ -17,9 +17,9 @@ module hc_normal_rows
     real(wp) :: approach = 0.0_wp
   end type limits_t
 
-  !> What the nodes of a row are like.
+  !> Classification of the nodes of a row.
   type :: classification_t
-    !> Largest pressure [Pa]; largest residual of the conditions, and on the active nodes of what they were linearised to
+    !> Largest pressure [Pa]; largest residual of the conditions, and on the active nodes of their linearisation
     real(wp) :: p_max = 0.0_wp, worst = 0.0_wp, worst_active = 0.0_wp
     !> Under a compliant law: largest residual of the nodes that would enter or leave the set
     real(wp) :: worst_changed = 0.0_wp

@@ -26,7 +26,7 @@ module hc_wear_ahead
 
   public :: worn_cycle_t, energy_ahead, energy_ahead_memory
 
-  !> What is known at the end of a cycle; fields over the window (n_col, own rows).
+  !> State at the end of a cycle; fields over the window (n_col, own rows).
   type :: worn_cycle_t
     !> Dissipated energy by area [J/m^2] and path of slip [m] of the cycle
     real(wp), allocatable :: energy(:, :), path(:, :)
@@ -60,7 +60,7 @@ contains
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
-    !> Bytes of a node: five fields and two masks of the cycle; pressures, springs, gaps and what they are computed from
+    !> Bytes of a node: five fields and two masks of the cycle; pressures, springs, gaps and their sources
     integer(selected_int_kind(18)), parameter :: node = 5*8 + 2*4 + 12*8
 
     ! the transforms share no memory here: three more than there

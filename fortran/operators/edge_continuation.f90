@@ -1,7 +1,7 @@
 !> Displacements continued beyond the edge of a contact, for a better preconditioner.
 !>
 !> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The inverse of its part on the active nodes is that
-!> of the whole, minimised over what the displacement may be elsewhere:
+!> of the whole, minimised over the displacement elsewhere:
 !>
 !>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
 !>
@@ -23,7 +23,7 @@ module hc_edge_continuation
 
   public :: edge_extension_t, new_edge_extension
 
-  !> Marks of nodes without a ring, and of what lies around the window.
+  !> Marks of nodes without a ring, and of the surroundings of the window.
   integer, parameter :: free = huge(0), outside = huge(0) - 1
   !> Nodes in the rings from which on threads share the work.
   integer, parameter :: worth_sharing = 8192
@@ -49,7 +49,7 @@ module hc_edge_continuation
   contains
     !> Continue a field beyond the active nodes
     procedure :: extend
-    !> The transpose: add what acts on the rings to the active nodes
+    !> The transpose: add loads on the rings to the active nodes
     procedure :: fold
     procedure, private :: extend_rings, fold_rings
   end type edge_extension_t

@@ -82,7 +82,7 @@ contains
     end if
   end subroutine check_operator
 
-  !> Return the lengths of transforms over a window: its own where it repeats, else with room for what wraps around.
+  !> Return the lengths of transforms over a window: its own where it repeats, else with room for the wrap-around.
   pure function transform_length(lattice) result(length)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice

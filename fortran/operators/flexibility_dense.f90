@@ -100,7 +100,7 @@ contains
     !> Number of spectra of the two bodies; absent: the most
     integer, intent(in), optional :: n_spectrum
     integer, parameter :: long = selected_int_kind(18)
-    !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
+    !> Buffer of BLAS for packed matrices: 2 to 15 MB by its build and the processor
     integer(long), parameter :: buffers = 3000000
     !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
     integer(long), parameter :: vectors = 1800

@@ -53,7 +53,7 @@ module hc_inverse_symbol
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
     !> On springs along the normal: the inverse symbol; the share of a displacement that each node passes on to it, and the
-    !> stiffness of what is left (n)
+    !> stiffness of the rest (n)
     type(convolution_t), allocatable, private :: sprung
     real(sp), allocatable, private :: share(:), stiffness(:)
     !> Compliance from which on springs count as loose [m/Pa]; height of the continuation beyond those that do not

@@ -21,7 +21,7 @@ contains
     real(wp), intent(in), contiguous :: direction(:, :)
     !> Displacement along x and y (n)
     real(sp), intent(inout), contiguous :: x(:), y(:)
-    !> Displacement along t at the active nodes; along e, absent: 0, and what it is multiplied with
+    !> Displacement along t at the active nodes; along e, absent: 0, and its factor
     real(wp), intent(in), contiguous :: along_t(:)
     real(wp), intent(in), contiguous, optional :: along_e(:)
     real(wp), intent(in), optional :: factor

@@ -123,7 +123,7 @@ contains
     call new_edge_extension(self%edge, active, self%space, options, near=self%beside)
   end subroutine continue_beyond
 
-  !> Take memory for displacements, zero, and what else is needed beside them.
+  !> Take memory for displacements, zero, and other fields beside them.
   subroutine take_memory(self, n, more)
     class(symbol_preconditioner_t), intent(inout) :: self
     !> Number of values

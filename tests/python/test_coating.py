@@ -93,6 +93,22 @@ def fretting(coating: list, steps: int = 4, **tables) -> Case:
     return Case.from_dict(deck | tables)
 
 
+@pytest.mark.parametrize("friction_coefficient", [None, 0.3])
+def test_an_approach_on_a_layer_that_bulges(friction_coefficient: float | None) -> None:
+    """Contact reaches where the undeformed bodies would not overlap; the same by load and by approach."""
+    case = Case(
+        body_1={"rigid": True, "coating": [layer(20e-6, 1e9, 0.49)]},
+        body_2={"rigid": True, "surface": {"shape": "sphere", "radius": 10e-3}},
+        spacing=10e-6,
+        normal_load=5.0,
+        friction_coefficient=friction_coefficient,
+    )
+    by_load = case.run().step(-1)
+    assert float(by_load.contact_radius_fit) ** 2 / 20e-3 > 1.2 * float(by_load.approach)
+    by_approach = case.changed(approach=float(by_load.approach)).run().step(-1)
+    assert float(by_approach.normal_load) == pytest.approx(5.0, rel=1e-6)
+
+
 def test_layer_of_the_same_material_is_none() -> None:
     plain = fretting([]).run().dataset.isel(step=-1)
     same = fretting([layer(100e-6, 210e9)]).run().dataset.isel(step=-1)

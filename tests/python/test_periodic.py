@@ -51,6 +51,15 @@ def test_few_rows_are_as_good_as_many(rows: int) -> None:
     assert float(pressed.max_pressure[-1]) == pytest.approx(math.sqrt(2) * full, rel=3e-3)
 
 
+def test_a_mean_gap_with_friction_is_that_without() -> None:
+    """Contact reaches where the undeformed bodies would not overlap."""
+    smooth, rough = (
+        waves(nodes=32, friction_coefficient=mu, loads={"mean_gap": 0.1 * HEIGHT}).run().mean_pressure[-1]
+        for mu in (None, 0.3)
+    )
+    assert float(rough) == pytest.approx(float(smooth), rel=1e-7)
+
+
 def test_an_asperity_far_from_the_next_is_alone() -> None:
     """In cells of 8 and 16 contact radii: the influence of the others falls like the third power."""
     radius, a, spacings = 10e-3, 0.1e-3, 12

@@ -473,6 +473,12 @@ class Roller(Surface):
         half_width = math.sqrt(4.0 * by_length * self.radius / (math.pi * modulus))
         return half_width, 2.0 * by_length / (math.pi * half_width)
 
+    def chamfered(self, x: ArrayLike, y: ArrayLike) -> Mask:
+        """Return which points of the plane lie on the chamfers, whose corner is an end for the pressure."""
+        (a, b), _ = _axes(self.angle)
+        along = np.abs(a * (np.asarray(x) - self.offset[0]) + b * (np.asarray(y) - self.offset[1]))
+        return np.asarray(along > (self.length / 2 - (self.chamfer or 0.0)) * _RIM)
+
     def beside(self, modulus: float) -> Surface:
         """Return the roller with the logarithmic profile of the modulus."""
         other = self.model_copy()

@@ -298,11 +298,10 @@ class History:
         if all(step.z.value < SMALLEST for step in self.steps):
             sentence = "expected a normal load or an approach above zero somewhere in the history"
             if self._period and math.isfinite(self._period.mean_height):
-                height = quantity(self._period.mean_height, "m")
-                sentence = (
-                    "expected a mean pressure above zero somewhere in the history, or a mean gap below "
-                    f"{height}, that before loading"
-                )
+                sentence = "expected a mean pressure above zero somewhere in the history"
+                if self._period.mean_height > 0.0:
+                    height = quantity(self._period.mean_height, "m")
+                    sentence += f", or a mean gap below {height}, that before loading"
             names = ("normal_load", "mean_gap", "mean_pressure")
             name = next((name for name in names if getattr(self._entries[0], name) is not None), None)
             key, value = (

@@ -25,6 +25,7 @@ from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
+from ..deck.surfaces import Roller, SurfaceSum
 from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
@@ -131,6 +132,13 @@ class Problem:
         self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
+        surfaces = self.surfaces.surface_1, self.surfaces.surface_2
+        self.chamfered = [
+            part
+            for surface in surfaces
+            for part in (surface.parts if isinstance(surface, SurfaceSum) else (surface,))
+            if isinstance(part, Roller) and part.chamfer
+        ]
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         try:
             self.pair = pair_of(one, two)
@@ -450,7 +458,7 @@ class Problem:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
         place = self._center, pattern or window.pattern_of(self.deck.grid)
         return window.estimate_contact(
-            self.pair, self._gap.at, *place, self.interface, self._gap.heights, **drive
+            self.pair, self._gap.at, *place, self.interface, self._gap.heights, self.chamfered, **drive
         )
 
     @cached_property

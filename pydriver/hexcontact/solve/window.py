@@ -21,6 +21,7 @@ from ..core.shared import Displacement, SharedContact, SharedFields, SharedOpera
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
+from ..problem.window import before_ends
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
 from .events import Listener
@@ -200,7 +201,10 @@ class Window:
         if self.worn is not None:
             gap = self.initial_gap + self.worn
         found = measures(self.lattice, self.friction, gap, self.candidate, solution)
-        return found, is_unbounded(self.candidate, solution.pressure)
+        inside = self.candidate
+        if self.case.chamfered:
+            inside = before_ends(inside, self.lattice, self.case.chamfered)
+        return found, is_unbounded(inside, solution.pressure)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.

@@ -248,18 +248,23 @@ S = TypeVar("S", bound=NormalSolution)
 class Contact(Handle):
     """A contact problem of the core: its lattice, initial gap, and nodes that can touch."""
 
-    def __init__(self, lattice: Lattice, pair: ElasticPair, rim_warning: bool) -> None:
+    def __init__(
+        self,
+        lattice: Lattice,
+        pair: ElasticPair,
+        initial_gap: ArrayLike,
+        candidate: ArrayLike | None,
+        rim_warning: bool,
+    ) -> None:
         self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
-
-    def _surfaces(self, initial_gap: ArrayLike, candidate: ArrayLike | None) -> tuple[Any, ...]:
-        """Return lattice, materials, gap and nodes that can touch, for the core; the gap of others is 0."""
-        self._mask: Mask = np.ones(self.lattice.shape, dtype=bool)
+        self._mask: Mask = np.ones(lattice.shape, dtype=bool)
         if candidate is not None:
-            self._mask = reals(candidate, "candidate", self.lattice.shape, _SHAPE) != 0
-        gap = shaped(initial_gap, self.lattice, "initial_gap")
+            self._mask = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
+        gap = shaped(initial_gap, lattice, "initial_gap")
         self._beyond = gap[~self._mask]  # of nodes that cannot touch
-        touching = gap if self._mask.all() else np.where(self._mask, gap, 0.0)
-        return self.lattice, self._pair, _finite(touching, "initial_gap"), self._mask
+        gap = _finite(gap if self._mask.all() else np.where(self._mask, gap, 0.0), "initial_gap")
+        # for the core, which keeps the only copy of the gap
+        self._surfaces: tuple[Any, ...] = lattice, pair, gap, self._mask
 
     def called(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
         """Return the results of a procedure of the core that uses spectra of kernels."""
@@ -324,8 +329,9 @@ class NormalContact(Contact):
         rim_warning: bool = True,
         interface: Interface = UNILATERAL,
     ) -> None:
-        super().__init__(lattice, pair, rim_warning)
-        given = *self._surfaces(initial_gap, candidate), *checked(interface=interface, threads=threads)
+        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
+        given = *self._surfaces, *checked(interface=interface, threads=threads)
+        del self._surfaces
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -351,10 +357,9 @@ class NormalContact(Contact):
         self._warn_of_rim(solution)
         return solution
 
-    @property
-    def initial_gap(self) -> Array:
-        """Copy of the gap before loading, 0 where the bodies cannot touch."""
-        return np.asarray(flat.gap_of_pressed(self))
+    initial_gap: Any = property(
+        flat.gap_of_pressed, doc="Gap before loading (m), 0 where the bodies cannot touch."
+    )
 
 
 def rough_pressure(

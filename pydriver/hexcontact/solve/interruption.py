@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
 
-from ..core.memory import share_heap
 from ..netcdf_library import LOCK
 
+_ARENA_MAX = -8  # option of mallopt
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
 
 ends_process = False  # whether the process ends with the command, and ignores signals from then on
@@ -69,7 +70,9 @@ def in_background(
             os.write(own, bytes([0]))  # is the number of no signal
         os.close(own)
 
-    share_heap()
+    # one heap for all threads: free memory of a second one does not go back to the system
+    with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
+        ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
     thread = threading.Thread(target=worker, daemon=True)
     LOCK.waiting += 1
     try:

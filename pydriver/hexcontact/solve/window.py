@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,27 +53,22 @@ class Window:
         gap, self.candidate = case.initial_gap(lattice)
         self.friction = case.friction_law(lattice)
         self.contact: Any = self._solver(gap)
-        self._lent: Callable[[], Array | None] = lambda: None
+        self._lent: weakref.ref[Array] | None = None
         # of surfaces that move, and of nodes that cannot touch, the core has another one
         keeps = case.moves or not self.candidate.all()
-        self._own_gap: Array | None = gap if keeps else None
-        self._first_gap: Array | None = self._where_touching(gap) if keeps else None
+        self.gap: Any = gap if case.moves else None
+        self._own_gap: Array | None = self._where_touching(gap) if keeps else None
 
     @property
-    def gap(self) -> Array:
-        """Gap before loading (inf where nothing can touch): a copy of the core's as long as it is in use."""
-        if self._own_gap is not None:
-            return self._own_gap
-        gap = self._lent()
+    def initial_gap(self) -> Array:
+        """Gap of the surfaces that have not moved, NaN where nothing can touch: a copy while it is in use."""
+        gap = self._own_gap
+        if gap is None and self._lent is not None:
+            gap = self._lent()
         if gap is None:
             gap = self.contact.initial_gap
             self._lent = weakref.ref(gap)
         return gap
-
-    @property
-    def initial_gap(self) -> Array:
-        """Gap of the surfaces that have not moved, NaN where nothing can touch."""
-        return self.gap if self._first_gap is None else self._first_gap
 
     def _solver(self, gap: Array) -> Any:
         """Return the solver for an initial gap (inf where nothing can touch)."""
@@ -202,7 +197,9 @@ class Window:
 
     def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
         """Return the measures of a state, and whether the pressure rises to an end of the surface."""
-        gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
+        gap = self.initial_gap if self.gap is None else self._where_touching(self.gap)
+        if self.worn is not None:
+            gap = self.initial_gap + self.worn
         found = measures(self.lattice, self.friction, gap, self.candidate, solution)
         inside = self.candidate
         if self.case.chamfered:
@@ -315,8 +312,8 @@ class FrictionWindow(Window):
     ) -> ContactState:
         """Advance a state to new loads and motions, with surfaces that move at their new place."""
         if self.case.moves:
-            self._own_gap, self.candidate = self.case.initial_gap(self.lattice, target)
-            self.contact = self._solver(self._own_gap)
+            self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
+            self.contact = self._solver(self.gap)
         return self.contact.advance(
             self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],

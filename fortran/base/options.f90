@@ -44,6 +44,8 @@ module hc_options
   type :: normal_options_t
     !> Length of a projected step, (N3): M is a little more than the inverse of the operator
     real(wp) :: step_length = 0.85_wp
+    !> The same on slender cells, where M exceeds it by more
+    real(wp) :: slender_step = 0.8_wp
     !> Factor by which projected steps have to bring the residual down every other time, or their length is searched for: on rough
     !> surfaces sets would change without end
     real(wp) :: progress = 0.5_wp
@@ -164,6 +166,12 @@ module hc_options
     real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.4_wp, patch_width = 10.0_wp
     !> So they do, as on rough surfaces; set by the solver
     logical :: patches = .false.
+    !> Ratio of the edges of a cell above which the grid is wider than the window across the contact, by these shares of it on each
+    !> side: with rings of all neighbors, and with those along short edges
+    real(wp) :: slender = 4.0_wp, margins(2) = [0.05_wp, 0.15_wp]
+    !> Rings along short edges over the width, by the logarithm of the ratio of the edges over another one; height of the mean of a
+    !> line at its end: the surface falls off the less the longer the contact is
+    real(wp) :: rings_by_ratio = 0.18_wp, least_ratio = 1.9_wp, floor = 0.2_wp
     !> Times that a ring is smoothed: waves along the edge fall off the faster the shorter they are
     integer :: smoothings = 2
     !> Compliances of the shortest and of the longest waves in slip, over that of a node, (P5): the shortest ones are known, and

@@ -44,6 +44,7 @@ contains
     integer :: row
 
     step_length = level%options%normal%step_length
+    if (level%lattice%slenderness() > level%options%preconditioner%slender) step_length = level%options%normal%slender_step
     mean = 0.0_wp
     if (now%by_load) then
       !$omp parallel do schedule(static) num_threads(level%space%threads)
@@ -90,7 +91,7 @@ contains
     real(wp), intent(out) :: fall
     !> Newton's method for the part along the punch, and the error of the load that is left to rounding
     integer, parameter :: max_cuts = 12
-    real(wp), parameter :: rounding = 1.0e-7_wp
+    real(wp), parameter :: rounding = 1.0e-10_wp
     !> Share of the steepness before the cut
     real(wp), parameter :: least_share = 0.1_wp
     real(wp), dimension(size(now%p, 2)) :: sum_z, part, punch

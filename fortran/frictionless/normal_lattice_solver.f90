@@ -312,6 +312,29 @@ contains
     progress%fixed_start = min(now%residual, 1.0_wp)
   end subroutine search_step
 
+  !> Compute the largest share of a step that leaves no tension: 1 where pressure was cut off, more elsewhere.
+  real(wp) function longest_share(level, now)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(in) :: now
+    !> Rounding errors of single precision
+    real(wp), parameter :: rounding = 1.0e-6_wp
+    real(wp) :: fall(1), part(size(now%p, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        part(row) = maxval(-now%p_unit*now%d(from:to, row, 1)/max(now%p(from:to, row), tiny(1.0_wp)), &
+                           mask=now%d(from:to, row, 1) < 0.0_sp)
+      end associate
+    end do
+    !$omp end parallel do
+    fall = max(maxval(part), epsilon(1.0_wp))
+    call level%space%most(fall)
+    longest_share = 1.0_wp
+    if (fall(1) < 1.0_wp - rounding) longest_share = 1.0_wp/fall(1)
+  end function longest_share
+
   !> Compute the share of a step that is taken, and of a searched one the length of the next.
   real(wp) function share_of_step(level, now, progress, recurrence)
     type(normal_lattice_t), intent(in) :: level
@@ -326,6 +349,7 @@ contains
       best = progress%fall/progress%curved
       ! all of it ends where there is no tension
       share_of_step = min(best, 1.0_wp)
+      if (level%lattice%slenderness() > level%options%preconditioner%slender) share_of_step = min(best, longest_share(level, now))
       progress%length = min(progress%length*min(max(best, 0.5_wp), 2.0_wp), 2.0_wp)
     else if (progress%step == conjugate .and. level%normal_law%is_compliant()) then
       share_of_step = find_sprung_step(level, now)

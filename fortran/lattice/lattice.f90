@@ -61,6 +61,8 @@ module hc_lattice
     procedure :: neighbor
     !> Neighbours at the ends of edges that are not much longer than the shortest
     procedure :: near_neighbors
+    !> Ratio of the edges of a cell, the longer over the shorter one, and the dimension of the shorter one
+    procedure :: slenderness, short_side
     !> Whether the window repeats, both ways
     procedure :: is_periodic
     !> Values of the neighbors at all nodes
@@ -253,6 +255,22 @@ contains
       near = edges < 5.0_wp*minval(edges)
     end associate
   end function near_neighbors
+
+  !> Return the longer edge of a cell over the shorter one.
+  pure real(wp) function slenderness(self)
+    class(lattice_t), intent(in) :: self
+
+    associate (edges => norm2(self%basis, dim=1))
+      slenderness = maxval(edges)/minval(edges)
+    end associate
+  end function slenderness
+
+  !> Return the dimension along which the edges of a cell are shorter.
+  pure integer function short_side(self)
+    class(lattice_t), intent(in) :: self
+
+    short_side = minloc(norm2(self%basis, dim=1), dim=1)
+  end function short_side
 
   !> Return whether the window repeats.
   pure logical function is_periodic(self)

@@ -12,6 +12,7 @@ module hc_symbol_preconditioner
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
+  use hc_flexibility, only: transform_length
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -30,6 +31,10 @@ module hc_symbol_preconditioner
     type(preconditioner_options_t) :: options
     !> Columns and rows of a field in the memory of this rank
     integer :: extent(2) = 0
+    !> Columns and rows beside it on each side, where the surface is continued across slender cells, and those of all
+    integer :: margin(2) = 0, wide(2) = 0
+    !> On slender cells: rings of the continuation by the width of the contact
+    real(wp) :: by_width = 0.0_wp
     !> Neighbours at the ends of short edges
     logical :: beside(6) = .true.
     !> Space of the fields
@@ -77,21 +82,45 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> For shear tractions: numbers of single precision that `take_memory` takes beside; absent: for the pressure
     integer, intent(in), optional :: more
+    type(lattice_t) :: wider
     integer(int64) :: n
 
-    n = product(space%own_extent(lattice%extent))
+    self%beside = lattice%near_neighbors()
+    self%by_width = options%rings_by_ratio*log(lattice%slenderness()/options%least_ratio)
+    if (.not. present(more)) self%margin = margin_of(lattice, self%beside, options, space)
+    wider = lattice
+    wider%first = lattice%first - self%margin
+    wider%extent = lattice%extent + 2*self%margin
+    self%wide = space%own_extent(wider%extent)
+    n = product(self%wide)
     if (present(more)) then
       n = 2*n + more
       self%n_more = more
     end if
-    call new_inverse_symbol(self%inverse, lattice, medium, space, error, present(more), cache, &
-                            beside=n*(storage_size(1.0_sp)/8))
+    call new_inverse_symbol(self%inverse, wider, medium, space, error, present(more), cache, beside=n*(storage_size(1.0_sp)/8))
+    ! work counts in applications of the operator over the window
+    self%inverse%cost = self%inverse%cost*product(real(transform_length(wider), wp))/product(real(transform_length(lattice), wp))
     self%unit = self%inverse%unit
     self%extent = space%own_extent(lattice%extent)
     self%space = space
     self%options = options
-    self%beside = lattice%near_neighbors()
   end subroutine new_symbol_preconditioner
+
+  !> Return the columns and rows beside a window of slender cells: on a grid that fits the contact its images would be next to it.
+  pure function margin_of(lattice, near, options, space) result(margin)
+    type(lattice_t), intent(in) :: lattice
+    !> Neighbours at the ends of short edges
+    logical, intent(in) :: near(6)
+    type(preconditioner_options_t), intent(in) :: options
+    type(field_space_t), intent(in) :: space
+    integer :: margin(2), across
+
+    margin = 0
+    ! several ranks share the rows
+    if (lattice%is_periodic() .or. space%ranks%size > 1 .or. lattice%slenderness() < options%slender) return
+    across = lattice%short_side()
+    margin(across) = int(options%margins(merge(1, 2, all(near)))*lattice%extent(across))
+  end function margin_of
 
   !> Set the nodes in contact, and their springs.
   subroutine set_contact(self, active, compliance, direction)
@@ -99,7 +128,9 @@ contains
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
-    if (present(compliance)) then
+    if (any(self%margin > 0)) then
+      call set_wide_contact(self, active, compliance)
+    else if (present(compliance)) then
       call self%inverse%set_springs(self%options, compliance, active)
       ! displacements continue beyond the nodes on stiff springs
       call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
@@ -107,6 +138,37 @@ contains
       call self%continue_beyond(self%extent, active)
     end if
   end subroutine set_contact
+
+  !> Set the nodes in contact of a window with a margin, and their springs.
+  subroutine set_wide_contact(self, active, compliance)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    !> Active nodes of the window, and compliances of their springs
+    logical, intent(in) :: active(self%extent(1), self%extent(2))
+    real(wp), intent(in), optional :: compliance(self%extent(1), self%extent(2))
+    type(preconditioner_options_t) :: options
+    logical, allocatable :: wide(:, :)
+    real(wp), allocatable :: springs(:, :)
+
+    allocate (wide(self%wide(1), self%wide(2)), source=.false.)
+    associate (from => self%margin + 1, to => self%margin + self%extent)
+      wide(from(1):to(1), from(2):to(2)) = active
+      if (present(compliance)) then
+        allocate (springs(self%wide(1), self%wide(2)), source=0.0_wp)
+        springs(from(1):to(1), from(2):to(2)) = compliance
+        call self%inverse%set_springs(self%options, reshape(springs, [size(springs)]), reshape(wide, [size(wide)]))
+        wide = wide .and. .not. self%inverse%is_loose(springs)
+      end if
+    end associate
+    options = self%options
+    options%patches = self%patches
+    if (.not. allocated(self%edge)) allocate (self%edge)
+    if (all(self%beside)) then
+      call new_edge_extension(self%edge, wide, self%space, options)
+    else
+      call new_edge_extension(self%edge, wide, self%space, options, near=self%beside, by_width=self%by_width)
+      call self%edge%set_floor(wide, maxloc(self%margin, dim=1), options%floor)
+    end if
+  end subroutine set_wide_contact
 
   !> Set up the continuation beyond some nodes, which are handed on without a copy.
   subroutine continue_beyond(self, extent, active)
@@ -155,6 +217,10 @@ contains
     real(wp), intent(inout) :: work
     integer :: i, k, shift
 
+    if (any(self%margin > 0)) then
+      call apply_wide_packed(self, nodes, n, displacement, traction, work)
+      return
+    end if
     call self%take_memory(n)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(nodes%first)
@@ -183,9 +249,56 @@ contains
     real(sp), intent(out), contiguous, target :: traction(:)
     real(wp), intent(inout) :: work
 
-    call self%inverse%apply_single(displacement, traction, self%edge)
+    if (any(self%margin > 0)) then
+      call apply_wide(self, displacement, traction)
+    else
+      call self%inverse%apply_single(displacement, traction, self%edge)
+    end if
     work = work + self%inverse%cost
   end subroutine apply_to_pressure_single
+
+  !> Estimate it on a window with a margin.
+  subroutine apply_wide(self, displacement, traction)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    real(sp), intent(in) :: displacement(self%extent(1), self%extent(2))
+    real(sp), intent(out) :: traction(self%extent(1), self%extent(2))
+    real(sp), allocatable :: wide(:, :)
+
+    allocate (wide(self%wide(1), self%wide(2)), source=0.0_sp)
+    associate (from => self%margin + 1, to => self%margin + self%extent)
+      wide(from(1):to(1), from(2):to(2)) = displacement
+      call self%inverse%apply_in_place(wide, self%edge)
+      traction = wide(from(1):to(1), from(2):to(2))
+    end associate
+  end subroutine apply_wide
+
+  !> The same for the nodes in contact of a window of n nodes.
+  subroutine apply_wide_packed(self, nodes, n, displacement, traction, work)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp), intent(inout) :: work
+    real(sp), allocatable :: given(:), found(:)
+    integer :: i, k, shift
+
+    allocate (given(n), found(n))
+    given = 0.0_sp
+    do k = 1, size(nodes%first)
+      shift = nodes%place(k) - nodes%first(k)
+      do i = nodes%first(k), nodes%last(k)
+        given(i) = real(displacement(i + shift)/self%unit, sp)
+      end do
+    end do
+    call apply_to_pressure_single(self, given, found, work)
+    do k = 1, size(nodes%first)
+      shift = nodes%place(k) - nodes%first(k)
+      do i = nodes%first(k), nodes%last(k)
+        traction(i + shift) = found(i)
+      end do
+    end do
+  end subroutine apply_wide_packed
 
   !> Forget the nodes in contact.
   subroutine clear_contact(self)

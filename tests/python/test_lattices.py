@@ -265,16 +265,17 @@ def test_influence_of_flat_cells(ratio: int, col: int, row: int) -> None:
 
 
 def test_counted_work_of_slender_contacts() -> None:
-    """Beside a round contact of as many nodes: the same up to 3:1, a fifth more at 4.4:1."""
+    """Beside a round contact of as many nodes: a tenth more up to 4.4:1, 1.3 times up to 45:1."""
     cases = [
         slender(radius, "0 deg", lattice="rectangular", nodes_in_radius=47)[0]
-        for radius in (0.01, 0.042, 0.05, 0.1, 0.5)
+        for radius in (0.01, 0.042, 0.05, 0.1, 0.5, 5.0)
     ]
     work = [float(case.run().dataset["operator_applications"][-1]) for case in cases]
     assert work[1] < 1.2 * work[0]
     assert work[2] < 1.2 * work[0]
-    assert work[3] < 1.35 * work[0]
-    assert work[4] < 1.7 * work[0]
+    assert work[3] < 1.2 * work[0]
+    assert work[4] < 1.35 * work[0]
+    assert work[5] < 1.4 * work[0]
 
 
 def test_counted_work_of_slender_contacts_with_friction() -> None:

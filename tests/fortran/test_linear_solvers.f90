@@ -72,7 +72,7 @@ contains
     call check(error, recurrence%step_length(8.0_wp), 0.0_wp, 0.0_wp, 'no step uphill')
     if (allocated(error)) return
     call recurrence%last_share(1.0_wp, share, anew)
-    call check_true(error, anew, 'a direction uphill is forgotten')
+    call check_true(error, anew, 'a direction uphill is discarded')
     if (allocated(error)) return
     call recurrence%restart()
     call recurrence%last_share(1.0_wp, share, anew)
@@ -99,7 +99,8 @@ contains
     call new_active_set(nodes, active, system%space)
     call pack_columns(nodes, constraint, constraints%columns)
     call pack_single(nodes, mb, constraints%mb)
-    allocate (right, source=rhs)
+    allocate (right(nodes%n_active))
+    call nodes%pack(rhs, right)
     iteration = iteration_t(tolerance=tolerance, most=max_iterations)
     call freeing_cg(system, nodes, constraints, right, x, ax, iteration, error)
     multiplier = constraints%multiplier
@@ -175,7 +176,6 @@ contains
     real(wp), intent(out), optional :: drift
     !> Directions that are stored; absent: all of them
     integer, intent(in), optional :: max_directions
-    real(wp), allocatable :: right(:)
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(active_set_t) :: nodes
@@ -185,11 +185,10 @@ contains
     call pack_single(nodes, mb, constraints%mb)
     call pack_columns(nodes, rows, constraints%rows)
     constraints%multiplier = multiplier
-    allocate (right, source=rhs)
     iteration = iteration_t(tolerance=tolerance, most=max_iterations, most_directions=max_iterations)
     if (present(max_directions)) iteration%most_directions = max_directions
     iteration%weight = weight
-    call freeing_gmres(system, nodes, constraints, right, x, ax, iteration, error)
+    call gmres_over_all(system, nodes, constraints, rhs, x, ax, iteration, error)
     multiplier = constraints%multiplier
     independent = iteration%independent
     residual = iteration%residual
@@ -197,6 +196,24 @@ contains
     outcome = iteration%outcome
     if (present(drift)) drift = iteration%drift
   end subroutine projected_gmres
+
+  !> GMRES on vectors over all nodes.
+  subroutine gmres_over_all(system, nodes, constraints, rhs, x, ax, iteration, error)
+    type(dense_system_t), intent(inout) :: system
+    type(active_set_t), intent(in) :: nodes
+    type(constraints_t), intent(inout) :: constraints
+    real(wp), intent(in) :: rhs(:)
+    real(wp), intent(inout), contiguous :: x(:), ax(:)
+    type(iteration_t), intent(inout) :: iteration
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: right(:), unknown(:)
+
+    allocate (right(nodes%n_active), unknown(nodes%n_active))
+    call nodes%pack(rhs, right)
+    call nodes%pack(x, unknown)
+    call freeing_gmres(system, nodes, constraints, right, unknown, ax, iteration, error)
+    call nodes%unpack(unknown, x)
+  end subroutine gmres_over_all
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
   subroutine test_projected_cg(error)
@@ -398,7 +415,7 @@ contains
         left(1) = dot_product(c, x)
         iteration = iteration_t(tolerance=1.0e-5_wp, most=40, most_directions=most)
         iteration%weight = [1.0_wp]
-        call freeing_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
+        call gmres_over_all(system, nodes, constraints, rhs, x, ax, iteration, error)
         if (allocated(error)) return
         call check(error, dot_product(c, x), left(1), 1.0e-14_wp, 'constraint')
       end associate
@@ -506,8 +523,8 @@ contains
       rhs = given
       iteration = iteration_t(tolerance=1.0e-12_wp, most=5, most_directions=5)
       iteration%weight = [1.0_wp]
-      if (i == 1) call freeing_gmres(system, nodes, whole, rhs, x(:, i), ax(:, i), iteration, error)
-      if (i == 2) call freeing_gmres(system, nodes, parts, rhs, x(:, i), ax(:, i), iteration, error)
+      if (i == 1) call gmres_over_all(system, nodes, whole, rhs, x(:, i), ax(:, i), iteration, error)
+      if (i == 2) call gmres_over_all(system, nodes, parts, rhs, x(:, i), ax(:, i), iteration, error)
       if (allocated(error)) return
     end do
     call check(error, whole%number() + parts%number(), 4, 'number of constraints')
@@ -647,7 +664,7 @@ contains
     call pack_columns(nodes, columns, constraints%columns)
     call pack_single(nodes, mb, constraints%mb)
     call pack_columns(nodes, rows, constraints%rows)
-    call step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
+    call step_ahead(system, nodes, constraints, pack(rhs, active), ax, length, x, error)
     if (allocated(error)) return
     r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)
     z = r/[(1.0_wp + i, i=1, 5)]
@@ -658,7 +675,7 @@ contains
     if (allocated(error)) return
     before = x
     constraints%rows = 0.0_wp*constraints%rows
-    call step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
+    call step_ahead(system, nodes, constraints, pack(rhs, active), ax, length, x, error)
     if (allocated(error)) return
     call check(error, x, before, 0.0_wp, 'no step where constraints depend on each other')
   end subroutine test_step_ahead

@@ -408,10 +408,11 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
         return 0.0, None, None
     largest = max((_load_ratio(case, step) for step in case.load_steps), default=0.0)
     slipping = max(largest, _NOTICED) if largest else 0.8 * (abs(case.pair.beta) > _ALIKE)
-    targets = [(step.x, step.y, step.twist) for step in case.load_steps]
-    if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
+    targets = [target for step in case.load_steps for target in (step.x, step.y, step.twist)]
+    controls = np.array([target.control for target in targets]).reshape(-1, 3)
+    if (controls != controls[0]).any():
         return slipping, None, None
-    values = np.array([[target.value for target in motions] for motions in targets])
+    values = np.array([target.value for target in targets]).reshape(-1, 3)
     scale = np.abs(values).max(axis=0)
     scale[:2] = scale[:2].max()
     shear = values / np.where(scale > 0.0, scale, 1.0)

@@ -138,8 +138,8 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     """Return the rows of an overview of a case."""
     lattice, pair, bulk, solver = case.lattice, case.pair, case.deck.bulk, case.solver
     # without the coordinates, for which the window may be too large; a period has a cell for each node
-    last = 0 if lattice.periodic else 1
-    width, height = [lattice.n_col - last, lattice.n_row - last] @ abs(lattice.basis)
+    ends = 0 if lattice.periodic else 1
+    width, height = [lattice.n_col - ends, lattice.n_row - ends] @ abs(lattice.basis)
     constants = (
         f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
     )

@@ -132,13 +132,11 @@ class Problem:
         self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
-        surfaces = self.surfaces.surface_1, self.surfaces.surface_2
-        self.chamfered = [
-            part
-            for surface in surfaces
-            for part in (surface.parts if isinstance(surface, SurfaceSum) else (surface,))
-            if isinstance(part, Roller) and part.chamfer
-        ]
+        self.chamfered: list[Roller] = []
+        for surface in (self.surfaces.surface_1, self.surfaces.surface_2):
+            for part in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
+                if isinstance(part, Roller) and part.chamfer:
+                    self.chamfered.append(part)
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         try:
             self.pair = pair_of(one, two)

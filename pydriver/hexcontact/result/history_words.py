@@ -103,9 +103,7 @@ def contact_size(history: History) -> tuple[str, str]:
     """
     if repeats(history):
         window = float(history["normal_load"] / history["mean_pressure"])
-        share, bar = (
-            100 * float(history[name]) / window for name in ("contact_area", "contact_area_error")
-        )
+        share, bar = (100 * float(history[name]) / window for name in ("contact_area", "contact_area_error"))
         return "contact area", f"{share:.1f} ± {bar:.1g} % of the window"
     if (axes := half_axes(history)) is None:
         error = error_of("contact_radius", history)

@@ -179,23 +179,13 @@ perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  
 mutants: install $(STAMPS)/extra-test  ## wrong lines in copies of the sources: which tests find them? (hours; goes on where it was stopped)
 	@$(py) tests/mutants/run.py --build $(BUILD) $(MUTANTS_ARGS)
 
-# What coverage leaves out: tests that judge time, memory or standard error, on which counters tell; and many
-# that only repeat what others reach.
-UNCOUNTED := memory_estimates operator_counts pages threads fuzz_decks fuzz_files first_step validation_friction \
-    examples short_of_memory fortran_library developer_guide
-UNCOUNTED_TESTS := test_store.py::test_a_full_disk_is_told_apart_from_wrong_input \
-    test_deck_sources.py::test_the_time_is_estimated_to_its_order_of_magnitude \
-    test_resume.py::test_runs_killed_at_random_moments_go_on \
-    test_exit_codes.py::test_signals_at_random_moments_leave_what_the_code_says
-
 # In one thread: others would spoil the counts.
-coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMPS)/extra-coverage  ## tests on a build with counters: lists the lines that no test reaches
+coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMPS)/extra-coverage  ## the tests of make check on a build with counters: lists the lines that they do not reach
 	@echo "Building hexcontact with counters ($(COVERAGE_BUILD))"
 	$(call build_apart,$(COVERAGE_SITE),$(COVERAGE_BUILD),b_coverage=true buildtype=debugoptimized)
 	@rm -rf build/coverage-data && find $(COVERAGE_BUILD) -name '*.gcda' -delete
 	@OMP_NUM_THREADS=1 meson test -C $(COVERAGE_BUILD) --print-errorlogs --timeout-multiplier 5
-	@OMP_NUM_THREADS=1 PYTHONPATH=$(CURDIR)/$(COVERAGE_SITE) $(py) -m coverage run $(pytest) \
-	    $(UNCOUNTED:%=--ignore=tests/python/test_%.py) $(UNCOUNTED_TESTS:%=--deselect=tests/python/%)
+	@OMP_NUM_THREADS=1 PYTHONPATH=$(CURDIR)/$(COVERAGE_SITE) $(py) -m coverage run -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 	@$(MAKE) --no-print-directory coverage-report
 
 # Reads what the tests left.

@@ -365,7 +365,7 @@ def test_a_tilted_map_is_levelled_as_asked(file: Any) -> None:
     assert np.ptp(flat.field.gap) == pytest.approx(4e-8, rel=2e-2)
     np.testing.assert_allclose(mean.field.gap, raw.field.gap, atol=1e-19)
     assert "levelled: mean of 3.00 µm and slopes of 0.001 along x, 0.002 along y subtracted" in "".join(
-        flat.rows(1e-6)
+        flat.rows(lambda _: 1e-6)
     )
 
 
@@ -410,7 +410,7 @@ def test_linear_interpolation_is_bilinear() -> None:
         upwards=False, interpolation="linear", x=[0.0, 1.0], y=[0.0, 2.0], heights=[[0.0, 1.0], [2.0, 5.0]]
     )
     assert float(grid.height(0.5, 1.0)) == pytest.approx(2.0)
-    assert "bilinear" in " ".join(grid.rows(1.0))
+    assert "bilinear" in " ".join(grid.rows(lambda _: 1.0))
 
 
 def test_a_step_in_a_file_has_no_ridges(file: Any) -> None:

@@ -135,8 +135,11 @@ contains
     call self%extend_rings(field)
     self%floor = real(share, sp)*(1.0_sp - reshape(field, shape(active)))
     do row = 1, size(active, 2)
-      if (across == 1 .and. self%n_line(row) == 0) self%floor(:, row) = 0.0_sp
-      if (across == 2) where (self%n_line == 0) self%floor(:, row) = 0.0_sp
+      if (across == 2) then
+        where (self%n_line == 0) self%floor(:, row) = 0.0_sp
+      else if (self%n_line(row) == 0) then
+        self%floor(:, row) = 0.0_sp
+      end if
       where (active(:, row)) self%floor(:, row) = 0.0_sp
     end do
   end subroutine set_floor

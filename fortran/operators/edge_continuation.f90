@@ -46,8 +46,8 @@ module hc_edge_continuation
     !> Ranks that share the fields; on several ones the rings are those in `rows`, own rows and those that their values depend on
     type(field_space_t) :: fields
     integer :: own(2) = 0, rows(2) = 0, n_row = 0
-    !> On slender cells: the dimension across the contact, and lines on each side that share a mean; what is added beyond the edge
-    !> to a line over its mean, 0 on active nodes (n_col, n_row); 1 over the weights of the mean; active nodes of each line
+    !> On slender cells: the dimension across the contact, and lines on each side that share a mean; increment of a line beyond
+    !> the edge over its mean, 0 on active nodes (n_col, n_row); 1 over the weights of the mean; active nodes of each line
     integer :: across = 0, reach = 0
     real(sp), allocatable :: floor(:, :), weight(:)
     integer, allocatable :: n_line(:)

@@ -300,7 +300,7 @@ contains
     end do
   end subroutine apply_wide_packed
 
-  !> Forget the nodes in contact.
+  !> Discard the nodes in contact.
   subroutine clear_contact(self)
     class(pressure_preconditioner_t), intent(inout) :: self
 

@@ -59,7 +59,7 @@ _NOISE = 1e-3  # of energies beside the normal load times the contact radius
 
 
 _POSITIVE, _NOT_NEGATIVE, _BELOW_PI = (SMALLEST, LARGEST), (0.0, LARGEST), math.nextafter(math.pi, 0.0)
-# Rules of attributes: text, one or more of a few words, a count of finite numbers, or a number between two bounds.
+# Rules of attributes: text, one or more of a few words, a count of finite numbers, or a number in a range.
 _HALF_SPACES: dict[str, Any] = {  # that bodies with coatings do not have
     **{"effective_modulus": _POSITIVE, "dundurs_beta": (-LARGEST, LARGEST)},
     "tangential_compliance_ratio": (-LARGEST, LARGEST),

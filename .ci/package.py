@@ -2,8 +2,8 @@
 
 The source archive holds every file of the last commit; the wheel is built from it without a network, with
 pocketfft, installed into an empty environment and used by its command in a folder outside the checkout. Then
-the same with ``pip install .``, in isolation and with FFTW. Run by an interpreter that has the build tools;
-archive and wheel go to build/dist.
+``pip install .``, in isolation and with FFTW, takes its place there. Both are compiled quickly, with little
+optimization. Run by an interpreter that has the build tools; archive and wheel go to build/dist.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ ENVIRONMENT["PATH"] = os.pathsep.join(
     folder for folder in os.environ["PATH"].split(os.pathsep) if not Path(folder).is_relative_to(ROOT)
 )
 run = partial(commands.run, environment=ENVIRONMENT)
+
+QUICK = ["-Csetup-args=-Doptimization=0"]
 
 SESSION = [  # words of the command, and a file that it leaves
     (["new", "sphere", "-o", "sphere.toml"], "sphere.toml"),
@@ -76,7 +78,7 @@ def wheel_from(archive: Path) -> Path:
     for old in DIST.glob("*.whl"):
         old.unlink()
     pip = [*no_network(), sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps"]
-    settings = ["--no-build-isolation", "-Csetup-args=-Dfft=pocketfft", "--wheel-dir", DIST]
+    settings = ["--no-build-isolation", *QUICK, "-Csetup-args=-Dfft=pocketfft", "--wheel-dir", DIST]
     run(*pip, *settings, archive, environment=os.environ)
     [path] = DIST.glob("*.whl")
     tracked = run("git", "ls-tree", "-r", "--name-only", "HEAD", "pydriver/hexcontact").splitlines()
@@ -92,13 +94,11 @@ def wheel_from(archive: Path) -> Path:
     return path
 
 
-def use(requirement: Path, scratch: Path) -> None:
-    """Install into an empty environment and use the command in a folder of its own."""
-    environment, folder = scratch / "venv", scratch / "work"
-    folder.mkdir(parents=True)
-    run(sys.executable, "-m", "venv", environment)
+def use(environment: Path, folder: Path, *words: str | Path) -> None:
+    """Install by the pip of an environment and use the command in a new folder."""
+    folder.mkdir()
     bin_ = environment / "bin"
-    run(bin_ / "python", "-m", "pip", "install", "--quiet", requirement)
+    run(bin_ / "python", "-m", "pip", "install", "--quiet", *words)
     run(bin_ / "python", "-m", "pip", "check")
     version = run(bin_ / "hexcontact", "--version", folder=folder).split()[-1]
     place = run(bin_ / "python", "-c", "import hexcontact; print(hexcontact.__file__)", folder=folder).strip()
@@ -107,10 +107,10 @@ def use(requirement: Path, scratch: Path) -> None:
     archives = [path.name for path in DIST.glob("*.tar.gz")]
     if f"hexcontact-{version}.tar.gz" not in archives:
         sys.exit(f"hexcontact --version says {version}; the archives are {archives}")
-    for words, left in SESSION:
-        run(bin_ / "hexcontact", *words, folder=folder)
+    for command, left in SESSION:
+        run(bin_ / "hexcontact", *command, folder=folder)
         if left and not (folder / left).is_file():
-            sys.exit(f"hexcontact {' '.join(words)} left no {left}")
+            sys.exit(f"hexcontact {' '.join(command)} left no {left}")
 
 
 def main() -> None:
@@ -120,8 +120,10 @@ def main() -> None:
         old.unlink()
     wheel = wheel_from(source_archive())
     with tempfile.TemporaryDirectory(prefix="hexcontact-") as scratch:
-        use(wheel, Path(scratch, "wheel"))
-        use(ROOT, Path(scratch, "checkout"))
+        environment = Path(scratch, "venv")
+        run(sys.executable, "-m", "venv", environment)
+        use(environment, Path(scratch, "wheel"), wheel)
+        use(environment, Path(scratch, "checkout"), "--force-reinstall", "--no-deps", *QUICK, ROOT)
     print(f"{wheel.name} works outside the checkout, and so does pip install .")
 
 

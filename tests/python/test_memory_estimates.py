@@ -35,8 +35,7 @@ def check(text: str) -> None:
         ("friction, unlike", 256, {"share": 0.4}),
         # tractions corrected at the edges, of the last step and of all
         ("friction, unlike", 256, {"more": POINTS}),
-        ("friction, alike", 192, {"more": POINTS + 'steps = "all"\n', "steps": 5}),
-        ("friction, alike", 384, {"more": POINTS}),
+        ("friction, alike", 128, {"more": POINTS + 'steps = "all"\n', "steps": 5}),
         ("wear", 128, {}),
         ("wear", 128, {"steps": 6}),
     ],
@@ -65,7 +64,7 @@ def test_the_estimate_of_a_window_that_repeats(problem: str) -> None:
     [
         ("frictionless", (384, 768), 170),
         ("friction, alike", (192, 384), 520),
-        ("friction, unlike", (384, 512), 680),
+        ("friction, unlike", (256, 384), 680),
     ],
 )
 def test_bytes_of_a_further_node(problem: str, sides: tuple[int, int], most: int) -> None:
@@ -76,7 +75,7 @@ def test_bytes_of_a_further_node(problem: str, sides: tuple[int, int], most: int
 
 def test_the_estimate_of_fatigue_parameters() -> None:
     """Stress histories of twelve load steps."""
-    text = deck("wear", 64, steps=4)
+    text = deck("wear", 48, steps=4)
     wear = text[text.index("[wear]") :]
     text = text.replace(wear[: wear.index("jump = 10\n") + 10], "")
     text = text.replace('[[load]]\nlabel = "cycle"', '[[load]]\nrepeat = 2\nlabel = "cycle"')

@@ -48,6 +48,8 @@ module hc_interior_pyramid
   contains
     !> Derivatives of the potentials at up to most_points points
     procedure :: potentials
+    !> Sums of these derivatives over loaded nodes
+    procedure :: sum_over_nodes
     !> Displacement and stress at any number of points
     procedure :: fields
   end type interior_pyramid_t
@@ -122,6 +124,43 @@ contains
       if (x(i)**2 + y(i)**2 + z(i)**2 < far_radius**2) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
     end do
   end subroutine potentials
+
+  !> Sum the derivatives of the potentials of loaded nodes at a point, the nodes in the order of their distance: those far away
+  !> need few moments.
+  pure subroutine sum_over_nodes(self, x, y, z, load, sums)
+    class(interior_pyramid_t), intent(in) :: self
+    !> The point relative to the nodes and its depth, in longest edges
+    real(wp), intent(in) :: x(:), y(:), z
+    !> Loads (node, load)
+    real(wp), intent(in) :: load(:, :)
+    !> Sums (derivative, load)
+    real(wp), intent(out) :: sums(:, :)
+
+    real(wp) :: d(most_points, n_derivative), depth(most_points)
+    integer, allocatable :: band(:), node(:)
+    integer :: next(0:size(band_radius) + 2), first, last, n, i
+
+    allocate (band(size(x)), node(size(x)))
+    next = 1
+    do i = 1, size(x)
+      band(i) = count(x(i)**2 + y(i)**2 + z**2 >= [far_radius, band_radius]**2)
+      next(band(i) + 1:) = next(band(i) + 1:) + 1
+    end do
+    do i = 1, size(x)
+      node(next(band(i))) = i
+      next(band(i)) = next(band(i)) + 1
+    end do
+    sums = 0.0_wp
+    depth = z
+    do first = 1, size(node), most_points
+      last = min(first + most_points - 1, size(node))
+      n = last - first + 1
+      associate (some => node(first:last))
+        call self%potentials(n, x(some), y(some), depth(:n), d(:n, :))
+        sums = sums + matmul(transpose(d(:n, :)), load(some, :))
+      end associate
+    end do
+  end subroutine sum_over_nodes
 
   !> Compute displacement times the shear modulus, and stress, by unit peak tractions.
   subroutine fields(self, x, y, z, poisson_ratio, displacement, stress, error)

@@ -14,7 +14,7 @@ module hc_interior_points
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
   use hc_interior_fields, only: n_derivative, check_interior, yz, xz
-  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior
   !$ use omp_lib, only: omp_get_thread_num
@@ -223,21 +223,9 @@ contains
     !> Sums (derivative, load), lengths in longest edges
     real(wp), intent(out) :: sums(:, :)
 
-    real(wp) :: at(most_points, 3), d(most_points, n_derivative)
-    integer :: first, last, n, direction
-
-    sums = 0.0_wp
-    associate (pyramid => loaded%pyramid, node => loaded%position)
-      at(:, 3) = point(3)/pyramid%spacing
-      do first = 1, size(node, 1), most_points
-        last = min(first + most_points - 1, size(node, 1))
-        n = last - first + 1
-        do direction = 1, 2
-          at(:n, direction) = (point(direction) - node(first:last, direction))/pyramid%spacing
-        end do
-        call pyramid%potentials(n, at(:n, 1), at(:n, 2), at(:n, 3), d(:n, :))
-        sums = sums + matmul(transpose(d(:n, :)), loaded%traction(first:last, :))
-      end do
+    associate (spacing => loaded%pyramid%spacing, node => loaded%position)
+      call loaded%pyramid%sum_over_nodes( &
+        (point(1) - node(:, 1))/spacing, (point(2) - node(:, 2))/spacing, point(3)/spacing, loaded%traction, sums)
     end associate
   end subroutine sum_pyramids
 

@@ -393,30 +393,24 @@ contains
     real(wp), intent(in) :: point(2)
     !> Sums (derivative, component and step, depth)
     real(wp), intent(out) :: sums(:, :, :)
-    real(wp) :: load(most_points, size(self%load, 1)), x(most_points, 2), z(most_points), d(most_points, n_derivative)
+    real(wp), allocatable :: load(:, :), x(:, :)
     integer, allocatable :: node(:, :)
-    integer :: first, last, n, i, j
+    integer :: n, i, j
 
-    sums = 0.0_wp
     associate (lattice => self%lattice, spacing => self%pyramid%spacing)
       call nodes_around(lattice, point, near*spacing, node)
-      do first = 1, size(node, 2), most_points
-        last = min(first + most_points - 1, size(node, 2))
-        n = last - first + 1
-        do i = 1, n
-          associate (there => node(:, first + i - 1))
-            x(i, :) = (point - lattice%origin - matmul(lattice%basis, real(there, wp)))/spacing
-            associate (inside => modulo(there - lattice%first, lattice%extent) + 1)
-              load(i, :) = self%load(:, inside(1), inside(2))
-            end associate
-          end associate
-        end do
-        if (.not. any(abs(load(:n, :)) > 0.0_wp)) cycle
-        do j = 1, size(sums, 3)
-          z = at%near%depth(j)/spacing
-          call self%pyramid%potentials(n, x(:n, 1), x(:n, 2), z(:n), d(:n, :))
-          sums(:, :, j) = sums(:, :, j) + matmul(transpose(d(:n, :)), load(:n, :))
-        end do
+      allocate (load(size(node, 2), size(self%load, 1)), x(size(node, 2), 2))
+      n = 0
+      do i = 1, size(node, 2)
+        associate (inside => modulo(node(:, i) - lattice%first, lattice%extent) + 1)
+          if (.not. any(abs(self%load(:, inside(1), inside(2))) > 0.0_wp)) cycle
+          n = n + 1
+          load(n, :) = self%load(:, inside(1), inside(2))
+          x(n, :) = (point - lattice%origin - matmul(lattice%basis, real(node(:, i), wp)))/spacing
+        end associate
+      end do
+      do j = 1, size(sums, 3)
+        call self%pyramid%sum_over_nodes(x(:n, 1), x(:n, 2), at%near%depth(j)/spacing, load(:n, :), sums(:, :, j))
       end do
     end associate
   end subroutine sum_near

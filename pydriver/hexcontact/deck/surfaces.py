@@ -331,6 +331,11 @@ class Punch(Surface):
         """The radius."""
         return self.radius
 
+    @classmethod
+    def meant(cls, key: str) -> str:
+        """Return the shape that has sides, or a known key that an unknown one may mean."""
+        return 'shape = "rectangular_punch"' if key in ("width", "height", "length") else super().meant(key)
+
     def _height(self, x: Array, y: Array) -> Array:
         return np.where(np.hypot(x, y) <= self.radius * _RIM, 0.0, np.inf)
 

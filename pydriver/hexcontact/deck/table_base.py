@@ -43,6 +43,7 @@ SYMBOLS = {
     **dict.fromkeys(("R", "r", "diameter"), "radius"),
     **{f"diameter_{axis}": f"radius_{axis}" for axis in "xy"},
     **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
+    "height": "length",
     **dict.fromkeys(("coatings", "layer", "layers", "film"), "coating"),
 }
 """Keys of decks by the symbols and words of engineers, with the table if several have such a key."""

@@ -217,10 +217,6 @@ contains
     real(wp), intent(inout) :: work
     integer :: i, k, shift
 
-    if (any(self%margin > 0)) then
-      call apply_wide_packed(self, nodes, n, displacement, traction, work)
-      return
-    end if
     call self%take_memory(n)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(nodes%first)
@@ -230,7 +226,11 @@ contains
       end do
     end do
     !$omp end parallel do
-    call self%inverse%apply_in_place(self%values, self%edge)
+    if (any(self%margin > 0)) then
+      call apply_wide(self, self%values)
+    else
+      call self%inverse%apply_in_place(self%values, self%edge)
+    end if
     work = work + self%inverse%cost
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(nodes%first)
@@ -250,55 +250,27 @@ contains
     real(wp), intent(inout) :: work
 
     if (any(self%margin > 0)) then
-      call apply_wide(self, displacement, traction)
+      traction = displacement
+      call apply_wide(self, traction)
     else
       call self%inverse%apply_single(displacement, traction, self%edge)
     end if
     work = work + self%inverse%cost
   end subroutine apply_to_pressure_single
 
-  !> Estimate it on a window with a margin.
-  subroutine apply_wide(self, displacement, traction)
+  !> Turn displacements of a window with a margin into tractions.
+  subroutine apply_wide(self, field)
     class(pressure_preconditioner_t), intent(inout) :: self
-    real(sp), intent(in) :: displacement(self%extent(1), self%extent(2))
-    real(sp), intent(out) :: traction(self%extent(1), self%extent(2))
+    real(sp), intent(inout) :: field(self%extent(1), self%extent(2))
     real(sp), allocatable :: wide(:, :)
 
     allocate (wide(self%wide(1), self%wide(2)), source=0.0_sp)
     associate (from => self%margin + 1, to => self%margin + self%extent)
-      wide(from(1):to(1), from(2):to(2)) = displacement
+      wide(from(1):to(1), from(2):to(2)) = field
       call self%inverse%apply_in_place(wide, self%edge)
-      traction = wide(from(1):to(1), from(2):to(2))
+      field = wide(from(1):to(1), from(2):to(2))
     end associate
   end subroutine apply_wide
-
-  !> The same for the nodes in contact of a window of n nodes.
-  subroutine apply_wide_packed(self, nodes, n, displacement, traction, work)
-    class(pressure_preconditioner_t), intent(inout) :: self
-    type(active_set_t), intent(in) :: nodes
-    integer, intent(in) :: n
-    real(wp), intent(in), contiguous :: displacement(:)
-    real(wp), intent(inout), contiguous :: traction(:)
-    real(wp), intent(inout) :: work
-    real(sp), allocatable :: given(:), found(:)
-    integer :: i, k, shift
-
-    allocate (given(n), found(n))
-    given = 0.0_sp
-    do k = 1, size(nodes%first)
-      shift = nodes%place(k) - nodes%first(k)
-      do i = nodes%first(k), nodes%last(k)
-        given(i) = real(displacement(i + shift)/self%unit, sp)
-      end do
-    end do
-    call apply_to_pressure_single(self, given, found, work)
-    do k = 1, size(nodes%first)
-      shift = nodes%place(k) - nodes%first(k)
-      do i = nodes%first(k), nodes%last(k)
-        traction(i + shift) = found(i)
-      end do
-    end do
-  end subroutine apply_wide_packed
 
   !> Discard the nodes in contact.
   subroutine clear_contact(self)

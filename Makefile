@@ -133,7 +133,7 @@ test-python: install $(STAMPS)/extra-test  ## Python tests
 debug-test debug-check: export OPENBLAS_CORETYPE := $(if $(filter x86_64,$(shell uname -m)),Nehalem)
 
 # What debug-check tests in Python: whatever solves.
-CHECKED := first_step friction_driver friction_properties entry fuzz_arrays comparison nonconvergence solve validation_friction
+CHECKED := first_step friction_driver friction_properties entry fuzz_arrays comparison nonconvergence solve
 
 debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test
 	@echo "Building hexcontact with checks ($(DEBUG_BUILD))"

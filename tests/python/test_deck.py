@@ -126,6 +126,16 @@ WRONG = [
         "body.1.surface.exat: unknown key; did you mean exact?",
     ),
     (
+        '"sphere", radius = "1 mm" }',
+        '"punch", width = "1 mm", height = "2 mm" }',
+        'body.1.surface.width: unknown key; did you mean shape = "rectangular_punch"?',
+    ),
+    (
+        '"sphere", radius = "1 mm" }',
+        '"rectangular_punch", width = "1 mm", height = "2 mm" }',
+        "body.1.surface.height: unknown key; did you mean length?",
+    ),
+    (
         'young_modulus = "432 GPa"\n',
         "",
         'body.1.young_modulus: missing; expected a pressure such as "210 GPa", or rigid = true',

@@ -586,9 +586,10 @@ def test_direct_and_fft_agree(seed: int) -> None:
     direct = replace(problem, method="direct")
     path = random_path(problem, rng, 4)
     states = [each.follow(path, max_cuts=1)[1:] for each in (problem, direct)]
+    assert not any(state.cuts for each in states for state in each[:2])
     for a, b in zip(*states, strict=True):
         if a.cuts or b.cuts:
-            break  # in parts, as some processors need at one of these steps: another history
+            break  # some processors cut the third step of seed 101, which then has another history
         scale = min(problem.friction_coefficient, 1.0) * a.pressure.max() + 1e-3 * a.pressure.max()
         assert_same(vector(a), vector(b), 1e-6 * scale)
         assert_same(a.relative_displacement_x, b.relative_displacement_x, 1e-6 * APPROACH)

@@ -98,7 +98,7 @@ def test_damaged_files_get_a_sentence_and_stay_as_they_are(part: int, sources: P
     opened, refused = codes["info 0"], codes["info 2"]
     assert opened > 0.15 * tried  # some damage is to what nobody looks at, or leaves a whole part
     assert refused > 0.4 * tried
-    assert codes["resume 0"] > 0.1 * tried  # of 60 files 7 or more, by what is damaged
+    assert codes["resume 0"] > 0.1 * tried  # at least 7 of 60 files; the number varies with the damage
     assert {"export 0", "report 0", "plot 0"} <= codes.keys()
 
 

@@ -3,7 +3,8 @@
 The source archive holds every file of the last commit; the wheel is built from it without a network, with
 pocketfft, installed into an empty environment and used by its command in a folder outside the checkout. Then
 ``pip install .``, in isolation and with FFTW, takes its place there. Both are compiled without
-optimization, which is quick. Run by an interpreter that has the build tools; archive and wheel go to build/dist.
+optimization, which is quick. Run by an interpreter that has the build tools; archive and wheel go to
+build/dist.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@
 !> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_rolling, only: rolling_t
@@ -346,7 +346,7 @@ contains
     !$omp end parallel do
 
     state%load = self%resultants(state%pressure, state%traction)
-    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
+    state%residual_normal = normal_residual(state%pressure, state%gap, logical(self%candidate), self%normal_compliance, &
                                             self%space, self%normal_law)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
                                                     self%friction, self%tangential_compliance, self%space)

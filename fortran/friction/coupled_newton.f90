@@ -19,7 +19,7 @@
 !>
 !> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
@@ -65,7 +65,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(coupled_step_t), target :: step
-    logical, allocatable :: shear_active(:)
+    logical(lk), allocatable :: shear_active(:)
     real(wp), allocatable :: missing(:)
 
     ! 1.
@@ -107,9 +107,9 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Components of the shear traction that are unknown (2 n)
-    logical, allocatable, intent(out) :: shear_active(:)
+    logical(lk), allocatable, intent(out) :: shear_active(:)
     real(wp), allocatable :: gap(:)
-    logical, allocatable :: contact(:)
+    logical(lk), allocatable :: contact(:)
 
     call now%find_gap(gap)
     allocate (contact(size(gap)))
@@ -126,7 +126,7 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Components of the shear traction that are unknown (2 n)
-    logical, intent(in), contiguous :: shear_active(:)
+    logical(lk), intent(in), contiguous :: shear_active(:)
     !> The step
     type(coupled_step_t), intent(inout) :: step
     real(wp), dimension(:), allocatable :: ahead, aside, bound
@@ -170,7 +170,7 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(in) :: now
     !> Components of the shear traction that are unknown (2 n); freed
-    logical, allocatable, intent(inout) :: shear_active(:)
+    logical(lk), allocatable, intent(inout) :: shear_active(:)
     !> The step
     type(coupled_step_t), intent(inout), target :: step
     integer :: n
@@ -328,7 +328,7 @@ contains
     call step%nodes%pack(step%x, unknown)
     call step%system%space%fill(zero, 0.0_wp)
     call step%nodes%unpack(zero, step%x)
-    call new_active_set(fixed, abs(step%x) > 0.0_wp, step%system%space)
+    call new_active_set(fixed, logical(abs(step%x) > 0.0_wp, lk), step%system%space)
     allocate (kept(fixed%n_active))
     call fixed%pack(step%x, kept)
     deallocate (step%x)

@@ -5,7 +5,7 @@
 module hc_shared_friction
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, raise, status
   use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
@@ -92,7 +92,7 @@ contains
   subroutine spread_mask(ranks, field)
     type(communicator_t), intent(in) :: ranks
     !> Mask (n_col, n_row), of one shape on all ranks
-    logical, intent(in), contiguous, target :: field(:, :)
+    logical(lk), intent(in), contiguous, target :: field(:, :)
 
     call spread(ranks, shape(field), c_loc(field))
   end subroutine spread_mask

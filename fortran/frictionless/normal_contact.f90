@@ -5,7 +5,7 @@
 !>
 !> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_options, only: options_t
@@ -23,7 +23,7 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal, force_control
   use hc_contact_solver, only: contact_solver_t
   use hc_normal_law, only: normal_law_t, tangent_t
-  use hc_normal_problem, only: new_normal_problem
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
@@ -59,7 +59,7 @@ module hc_normal_contact
     type(communicator_t) :: ranks
   contains
     procedure :: solve_step
-    procedure :: copy_gap
+    procedure :: normal_part
     !> Solve for a normal load or an approach
     procedure :: solve
   end type normal_contact_t
@@ -142,13 +142,12 @@ contains
     normal_contact_memory = normal_contact_memory + n*(2*field + 6*half)
   end function normal_contact_memory
 
-  !> Copy the gap before loading.
-  pure subroutine copy_gap(self, gap)
-    class(normal_contact_t), intent(in) :: self
-    real(wp), intent(out), contiguous :: gap(:, :)
+  function normal_part(self) result(problem)
+    class(normal_contact_t), intent(in), target :: self
+    class(normal_problem_t), pointer :: problem
 
-    gap = self%level(1)%initial_gap
-  end subroutine copy_gap
+    problem => self%level(1)
+  end function normal_part
 
   !> Solve a load step, of which the normal load or the approach matters.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)

@@ -13,7 +13,7 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
 module hc_edge_continuation
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbor_steps
   use hc_field_space, only: field_space_t
@@ -68,13 +68,13 @@ contains
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
     !> Nodes beyond which there are no rings (n_col, n_row), on one rank; absent: all of the window
-    logical, intent(in), contiguous, optional :: within(:, :)
+    logical(lk), intent(in), contiguous, optional :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
     !> Rings by the width of the contact, in nodes, on one rank; absent: those of `options`
@@ -118,7 +118,7 @@ contains
   subroutine set_floor(self, active, across, share)
     class(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, n_row), on one rank
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Dimension across the contact
     integer, intent(in) :: across
     !> Height at the end of a line over the mean
@@ -175,12 +175,12 @@ contains
   subroutine share_rings(self, active, space, options, step)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
     !> Steps to the neighbors of a node
     integer, intent(in), contiguous :: step(:)
-    logical, allocatable :: wider(:, :)
+    logical(lk), allocatable :: wider(:, :)
     integer, allocatable :: mark(:), frontier(:)
     integer :: counts(3), n_ring
 
@@ -206,11 +206,11 @@ contains
   subroutine take_rows(self, active, more, wider)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Number of further rows
     integer, intent(in) :: more
     !> Active nodes of all of these rows
-    logical, allocatable, intent(out) :: wider(:, :)
+    logical(lk), allocatable, intent(out) :: wider(:, :)
 
     self%rows = [max(self%own(1) - more, 1), min(self%own(2) + more, self%n_row)]
     allocate (wider(size(active, 1), self%rows(2) - self%rows(1) + 1))
@@ -303,13 +303,13 @@ contains
   !> Mark all nodes before there are rings.
   subroutine mark_window(active, space, mark, within)
     !> Active nodes (n_col, n_row)
-    logical, intent(in) :: active(:, :)
+    logical(lk), intent(in) :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Marks of the nodes, with those around the window
     integer, allocatable, intent(out) :: mark(:)
     !> Nodes that are not outside (n_col, n_row); absent: all of the window
-    logical, intent(in), optional :: within(:, :)
+    logical(lk), intent(in), optional :: within(:, :)
     integer :: row, width, start
 
     width = size(active, 1) + 2
@@ -339,7 +339,7 @@ contains
   !> Find the active nodes with a neighbor that is not; a node at the rim of the window has none there.
   subroutine find_edge(active, mark, step, space, edge)
     !> Active nodes (n_col, n_row)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Marks of all nodes, and steps to the neighbors of a node
     integer, intent(in), contiguous :: mark(:)
     integer, intent(in) :: step(:)
@@ -373,7 +373,7 @@ contains
   !> List the nodes of a row at the edge.
   pure subroutine list_edge(active, mark, step, before, node)
     !> Active nodes of the row
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
     integer, intent(in), contiguous :: mark(:)
     integer, intent(in) :: step(:), before

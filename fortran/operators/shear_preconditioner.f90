@@ -17,7 +17,7 @@
 !> Equations: docs/theory/preconditioner.md, (P2) to (P6).
 module hc_shear_preconditioner
   use, intrinsic :: iso_fortran_env, only: int8
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t, neighbor_steps
@@ -84,9 +84,9 @@ contains
   !> Set the nodes in contact, and the springs of those that slip.
   subroutine set_sheared(self, active, compliance, direction)
     class(shear_preconditioner_t), intent(inout) :: self
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
-    logical, allocatable :: slips(:)
+    logical(lk), allocatable :: slips(:)
     real(wp) :: ratio
     integer :: i, k, at
     logical :: known
@@ -133,7 +133,7 @@ contains
     !> Columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact, and those of them that slip
-    logical, intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
+    logical(lk), intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
 
     call new_edge_extension(self%front, active .and. .not. slips, self%space, self%options, within=active, &
                             near=self%beside)
@@ -145,11 +145,11 @@ contains
     !> Columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact, and those of them that slip
-    logical, intent(in), contiguous :: active(:), slips(:)
+    logical(lk), intent(in), contiguous :: active(:), slips(:)
     !> 1 at nodes near slip along their rows; of one row at those that slip, and at those near slip
     integer(int8), allocatable :: along(:, :)
     integer(int8) :: slip(extent(1)), beside(extent(1))
-    logical, allocatable :: near(:)
+    logical(lk), allocatable :: near(:)
     integer :: row, other, first, last, k
 
     allocate (along(extent(1), extent(2)), near(size(active)))

@@ -107,6 +107,7 @@ contains
     do l = 2, size(self%level)
       call self%level(l - 1)%coarsen(self%level(l))
     end do
+    call free_coarse_gaps(self)
     do l = 1, size(self%level)
       ! operators for iterations on the finest lattice are set up on demand: a part of it may be enough
       call self%level(l)%prepare(self%kernel, l == 1, l > 1, space_of(self, self%level(l)%lattice), error, self%cache)
@@ -194,6 +195,9 @@ contains
     if (allocated(error)) return
     goal = load_target_t([control], [target])
     work = 0.0_wp
+    do l = 2, size(self%level)
+      call self%level(l - 1)%coarsen_gap(self%level(l))
+    end do
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
         if (level%space%count(level%candidate) == 0) cycle
@@ -225,6 +229,7 @@ contains
             deallocate (passing)
           end if
           coarse = contact_state_t()
+          call free_coarse_gaps(self)
           call solve_finest(self, goal, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
         end if
@@ -236,6 +241,16 @@ contains
     call self%scratch%free()
     call give_back(self%level(1)%own_size())
   end subroutine solve
+
+  !> Free the gaps of the coarse lattices, whose memory set-up and iterations on the finest one take; each load finds them anew.
+  subroutine free_coarse_gaps(self)
+    class(normal_contact_t), intent(inout) :: self
+    integer :: l
+
+    do l = 2, size(self%level)
+      deallocate (self%level(l)%initial_gap)
+    end do
+  end subroutine free_coarse_gaps
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.
   pure logical function is_smooth(level, p_max)

@@ -68,17 +68,18 @@ contains
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, own rows)
-    logical(lk), intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous, target :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
     !> Nodes beyond which there are no rings (n_col, n_row), on one rank; absent: all of the window
-    logical(lk), intent(in), contiguous, optional :: within(:, :)
+    logical(lk), intent(in), contiguous, optional, target :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
     !> Rings by the width of the contact, in nodes, on one rank; absent: those of `options`
     real(wp), intent(in), optional :: by_width
+    logical(lk), pointer, contiguous :: around(:, :), until(:, :)
     integer, allocatable :: mark(:), frontier(:), step(:)
     integer :: n_ring
 
@@ -87,8 +88,17 @@ contains
     if (space%ranks%size > 1) then
       call share_rings(self, active, space, options, step)
     else
-      call mark_window(active, space, mark, within)
-      call find_edge(active, mark, step, space, frontier)
+      ! marks take memory: rows that no ring reaches have none
+      self%rows = [1, size(active, 2)]
+      if (.not. present(by_width)) then
+        call find_span(any(active, dim=1), self%rows(1), self%rows(2))
+        self%rows = [max(self%rows(1) - options%max_rings - 1, 1), min(self%rows(2) + options%max_rings + 1, size(active, 2))]
+      end if
+      around => active(:, self%rows(1):self%rows(2))
+      until => null()                                                          ! the same as absent
+      if (present(within)) until => within(:, self%rows(1):self%rows(2))
+      call mark_window(around, space, mark, until)
+      call find_edge(around, mark, step, space, frontier)
       n_ring = number_of_rings(options, space%count(active), size(frontier))
       if (present(by_width)) n_ring = int(by_width*space%count(active)/max(size(frontier), 1))
       call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
@@ -242,7 +252,7 @@ contains
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
     integer, allocatable :: next(:), node(:)
-    integer :: n_ring, width, r, n, k
+    integer :: n_ring, width, before, r, n, k
     real(wp) :: fall, found(1)
 
     width = n_col + 2
@@ -268,6 +278,7 @@ contains
     end if
     n = size(node)
     n_ring = size(self%ring) - 1
+    before = merge(self%rows(1) - 1, 0, space%ranks%size == 1)
     self%smoothings = options%smoothings
     if (n >= worth_sharing) self%space = space
     allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%mean(n), self%inner(6, n), &
@@ -295,7 +306,7 @@ contains
       integer, intent(in) :: place
       integer :: row
       row = (place - 1)/width
-      in_window = place - 1 - row*width + (row - 1)*n_col
+      in_window = place - 1 - row*width + (row - 1 + before)*n_col
     end function in_window
 
   end subroutine find_rings

@@ -124,8 +124,8 @@ contains
     !> The window repeats
     logical, intent(in) :: periodic
     integer, parameter :: long = selected_int_kind(18)
-    !> Bytes of a field of numbers, and of logical values or in single precision
-    integer, parameter :: field = 8, half = 4
+    !> Bytes of a field of numbers, in single precision, and of marks
+    integer, parameter :: field = 8, half = 4, mark = 1
     integer(long) :: n, exact, each
 
     n = int(extent(1), long)*extent(2)
@@ -133,14 +133,14 @@ contains
     exact = fft_memory(extent, .true., threads, shared=.true., periodic=periodic)
     ! on all lattices: the inverse symbol, buffers; gap, candidates
     each = preconditioner_memory(extent, threads, .false., shared=.true.) &
-           + convolution_memory(extent, padded_length(extent, periodic), 0, 0, threads) + n*(field + half)
+           + convolution_memory(extent, padded_length(extent, periodic), 0, 0, threads) + n*(field + mark)
     normal_contact_memory = each + exact + (each + merge(exact, exact/2, periodic))/3
     ! on the finest: row transforms in single precision, beside them those in double precision or two fields, and a third one
     associate (rows => transform_memory(extent, padded_length(extent, periodic), 1))
       normal_contact_memory = normal_contact_memory + rows + max(rows, 2*half*n) + half*n
     end associate
-    ! pressure, closing; direction, punch, zones now and next, marks about the edge of the contact
-    normal_contact_memory = normal_contact_memory + n*(2*field + 6*half)
+    ! pressure, closing; direction, punch, places about the edge of the contact; zones now and next
+    normal_contact_memory = normal_contact_memory + n*(2*field + 3*half + 2*mark)
   end function normal_contact_memory
 
   function normal_part(self) result(problem)

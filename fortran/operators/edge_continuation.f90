@@ -492,7 +492,7 @@ contains
         return
       end if
       lines(1:size(self%floor, 1), 1:size(self%floor, 2)) => field
-      mean = self%mean_of_lines(lines)
+      allocate (mean, source=self%mean_of_lines(lines))
       call self%extend_rings(field)
       !$omp parallel do schedule(static) num_threads(self%fields%threads)
       do row = 1, size(lines, 2)

@@ -154,7 +154,11 @@ BAD = {
         {"shortest": "1 mm"},
         "^body.1.surface: shortest, rolloff, longest: expected wavelengths that",
     ),
-    "waves": ({"shortest": "1.2 mm", "longest": "1.3 mm"}, "no wave between shortest and longest fits"),
+    "waves": (
+        {"shortest": "1.2 mm", "longest": "1.3 mm", "period": [SIDE, SIDE]},
+        "no wave between shortest and longest fits",
+    ),
+    "longest": ({"longest": "1 mm"}, "no such waves in a window of"),
     "points": ({"shortest": "1 nm"}, "expected at most 67,108,864"),
     "period": ({"period": ["0.2 mm", "0.2 mm"]}, "the gap does not repeat"),
 }

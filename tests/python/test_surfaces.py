@@ -320,6 +320,22 @@ def test_a_profile_by_moduli_needs_them() -> None:
         Roller(radius=1.0, length=2.0, profile="logarithmic", design_load=1.0).height(0.0, 0.0)
 
 
+@pytest.mark.parametrize("surface", [Torus(ring_radius=1e-3, radius=1e-2), Dent(depth=1e-6, radius=1e-4)])
+def test_a_spacing_of_its_own_needs_one_spot(surface: Surface) -> None:
+    with pytest.raises(DeckError, match="^grid.spacing = .*touch in one ellipse"):
+        Case(body_1={**STEEL, "surface": surface}, body_2=STEEL, normal_load=20.0, spacing="auto")
+
+
+def test_waves_that_the_lattice_does_not_resolve_warn() -> None:
+    surfaces = [Sphere(radius=1e-2), Waviness(amplitude=1e-8, wavelength=1e-5)]
+    body = {**STEEL, "surface": [one.written() for one in surfaces]}
+    found = [
+        Case(body_1=body, body_2=STEEL, normal_load=20.0, spacing=spacing).warnings
+        for spacing in (4e-6, 2e-6)
+    ]
+    assert ["shortest wave" in " ".join(warnings) for warnings in found] == [True, False]
+
+
 def test_a_crown_that_ends_the_contact_stands_beside_its_ellipse() -> None:
     """Contact within the length of a crowned roller is that of an ellipsoid (Hertz)."""
     roller = Roller(radius=5e-3, length=2e-3, profile="crown", crown_radius=0.2, angle="20 deg")
@@ -329,7 +345,9 @@ def test_a_crown_that_ends_the_contact_stands_beside_its_ellipse() -> None:
     rows = against_hertz(result.deck, result.dataset.attrs, result.history.to_dict("records")[-1])
     assert {name for name, *_ in rows} >= {"max_pressure", "approach", "contact_semi_major"}
     assert all(computed == pytest.approx(exact, rel=5e-3) for _, exact, computed, _ in rows)
-    assert {entry.quantity: entry.exact for entry in result.compare()}["max_pressure"] == pytest.approx(rows[0][1])
+    assert {entry.quantity: entry.exact for entry in result.compare()}["max_pressure"] == pytest.approx(
+        rows[0][1]
+    )
 
 
 def test_a_logarithmic_roller_is_loaded_evenly_at_its_design_load() -> None:

@@ -34,6 +34,9 @@ _EVEN = 1e-9  # rounding of a wave of just the shortest or the longest length
 class Rough(Surface):
     """A self-affine rough surface; heights count from its highest point."""
 
+    one_spot: ClassVar[bool] = False
+    wave: ClassVar[str] = "shortest"
+
     hurst: Annotated[float, Quantity(NUMBER, above=0, at_most=1)] = meaning(..., "Hurst exponent H")
     shortest: PositiveLength = meaning(..., "shortest wavelength")
     longest: PositiveLength = meaning(..., "longest wavelength")
@@ -72,6 +75,11 @@ class Rough(Surface):
             raise DeckError(
                 'a rough surface repeats along x and y only; expected grid.lattice = "rectangular", and '
                 "grid.direction = 0"
+            )
+        if not self.period and self.longest > (1 + _EVEN) * max(sides):
+            raise DeckError(
+                f"a rough surface with longest = {readable(self.longest)} has no such waves in a window of "
+                f"{' by '.join(map(readable, sides))} that repeats; expected at most its larger side"
             )
         other = self.model_copy()
         for key in ("_heights", "_step"):

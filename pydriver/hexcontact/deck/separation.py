@@ -36,6 +36,11 @@ class Separation:
         return Separation(self.surface_1.moved(by), self.surface_2.moved(by), self.at_rest or self)
 
     @property
+    def shapes(self) -> tuple[Surface, ...]:
+        """The shapes of both surfaces."""
+        return (*self.surface_1.shapes, *self.surface_2.shapes)
+
+    @property
     def moves(self) -> bool:
         """Whether shapes are bound to rolling bodies."""
         return bool(self.surface_1.moving or self.surface_2.moving)

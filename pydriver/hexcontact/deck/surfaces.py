@@ -98,7 +98,7 @@ class Surface(Argument):
     offset: Point = meaning((0.0, 0.0), "moves the shape in x and y")
     tilt: Tilt = meaning(
         (0.0, 0.0),
-        "turns the shape about the axes through its center along x and y; the surface rises with y, x",
+        "turns the shape about the axes through its center along x and y; the gap opens towards y, x",
     )
     moves: Annotated[bool, Flag()] = meaning(
         False, "true: bound to its rolling body, with which it passes through the contact"
@@ -108,6 +108,15 @@ class Surface(Argument):
     """Height about the shape's own center, for the documentation."""
     as_given: ClassVar[bool] = False
     """Whether its heights are used unshifted, wherever it would touch first."""
+    one_spot: ClassVar[bool] = True
+    """Whether it touches a flat in about an ellipse, for a spacing of "auto"."""
+    wave: ClassVar[str] = ""
+    """Key of its shortest wavelength."""
+
+    @property
+    def shapes(self) -> tuple[Surface, ...]:
+        """The shapes that it is the sum of."""
+        return (self,)
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the height (m) at points of the plane.
@@ -206,6 +215,7 @@ class Flat(Surface):
     """A plane."""
 
     as_given: ClassVar[bool] = True
+    one_spot: ClassVar[bool] = False
 
     formula: ClassVar[str] = "h = 0"
 
@@ -382,6 +392,8 @@ class RectangularPunch(Surface):
 class Torus(Surface):
     """A ring that lies on the plane: it touches along a circle."""
 
+    one_spot: ClassVar[bool] = False
+
     ring_radius: Radius = meaning(..., "radius of the circle")
     radius: CurvatureRadius = meaning(..., "radius R of the section")
     formula: ClassVar[str] = "h = (r − ring_radius)²/(2R)"
@@ -393,6 +405,9 @@ class Torus(Surface):
 @shape("waviness")
 class Waviness(Surface):
     """A wave in one direction."""
+
+    one_spot: ClassVar[bool] = False
+    wave: ClassVar[str] = "wavelength"
 
     amplitude: Radius = meaning(..., "amplitude a")
     wavelength: Radius = meaning(..., "wavelength λ")
@@ -418,6 +433,8 @@ class Waviness(Surface):
 @shape("dent")
 class Dent(Surface):
     """A round dent in a plane, with a rim of displaced material."""
+
+    one_spot: ClassVar[bool] = False
 
     depth: Radius = meaning(..., "depth d")
     radius: Radius = meaning(..., "radius R of the dent")
@@ -572,6 +589,11 @@ class SurfaceSum(Surface):
     as_given: ClassVar[bool] = True
 
     parts: tuple[Surface, ...] = ()
+
+    @property
+    def shapes(self) -> tuple[Surface, ...]:
+        """The shapes."""
+        return self.parts
 
     @property
     def curvature(self) -> Array | None:

@@ -14,7 +14,6 @@ from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MOST_STEPS
-from ..deck.surfaces import SurfaceSum
 from ..errors import DeckError
 from ..text import did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
@@ -97,8 +96,8 @@ def _repeating(
     """Return the window that repeats, and faults of it and of the gap over it."""
     bodies = enumerate((tables["body"].body_1, tables["body"].body_2), 1)
     for number, surface in ((number, body.surface) for number, body in bodies):
-        parts = surface.parts if isinstance(surface, SurfaceSum) else (surface,)
-        for place in (place for place, part in enumerate(parts) if part is not None and any(part.tilt)):
+        parts = surface.shapes if surface else ()
+        for place in (place for place, part in enumerate(parts) if any(part.tilt)):
             inner = (place,) if len(parts) > 1 else ()
             fault = "expected none in a window that repeats, which a tilted surface does not"
             given = [f"{math.degrees(angle):g} deg" for angle in parts[place].tilt]
@@ -458,6 +457,8 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
     if not gap_given and bodies.separation.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:
+        if grid and grid.spacing == "auto" and not any(part.one_spot for part in bodies.separation.shapes):
+            yield ("grid", "spacing"), "expected a length: surfaces that touch in one ellipse alone give one"
         yield from _touching_problems(bodies.separation)
     elif bodies.body_1.surface or bodies.body_2.surface:
         yield ("gap",), "expected either a gap or surfaces of the bodies, not both"

@@ -22,7 +22,6 @@ from ..core.measures import (
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
-from ..deck.surfaces import SurfaceSum
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -131,6 +130,13 @@ LIMITS = (
         least=2.0,
     ),
     Limit(
+        "wave_spacings",
+        "the shortest wave of the surfaces has {wave_spacings:.2g} spacings, expected at least 4: the "
+        "lattice does not resolve it",
+        "Tractions that are linear between nodes have no waves shorter than two spacings",
+        least=4.0,
+    ),
+    Limit(
         "holes_near_contact",
         "{holes_near_contact} holes of the height map lie near the estimated contact: a contact that comes "
         "within two points of one ends the run; fill them, as by gap.interpolate_na",
@@ -180,6 +186,10 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if layers:
         thinnest = min(layer.thickness for layer in layers)
         found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
+    waves = [getattr(part, part.wave) for part in case.surfaces.shapes if part.wave]
+    if waves and not case.gap_given:
+        apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
+        found["wave_spacings"] = min(waves) / apart
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)
@@ -341,15 +351,12 @@ def rounded_distances(case: Problem) -> str:
 def equal_seeds(case: Problem) -> str:
     """Return a note on rough surfaces whose waves coincide; empty without two of them."""
     found = set()
-    for surface in (case.surfaces.surface_1, case.surfaces.surface_2):
-        for part in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
-            if not isinstance(part, Rough):
-                continue
-            if (waves := (part.seed, part.sides, part.offset)) in found:
-                return (
-                    f"two rough surfaces have seed = {part.seed}: their waves coincide, and peaks meet peaks"
-                )
-            found.add(waves)
+    for part in case.surfaces.shapes:
+        if not isinstance(part, Rough):
+            continue
+        if (waves := (part.seed, part.sides, part.offset)) in found:
+            return f"two rough surfaces have seed = {part.seed}: their waves coincide, and peaks meet peaks"
+        found.add(waves)
     return ""
 
 

@@ -290,7 +290,7 @@ def surfaces_in_words(case: Problem) -> list[dict[str, Any]]:
     return [
         {"body": number, "shape": one.shape, "lines": lines}
         for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
-        for one in (surface.parts if isinstance(surface, SurfaceSum) else (surface,))
+        for one in surface.shapes
         if (lines := [*one.rows(case.lattice.apart)])
     ]
 

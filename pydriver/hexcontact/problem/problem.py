@@ -25,7 +25,7 @@ from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.surfaces import Roller, SurfaceSum
+from ..deck.surfaces import Roller
 from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
@@ -132,11 +132,7 @@ class Problem:
         self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
-        self.chamfered: list[Roller] = []
-        for surface in (self.surfaces.surface_1, self.surfaces.surface_2):
-            for part in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
-                if isinstance(part, Roller) and part.chamfer:
-                    self.chamfered.append(part)
+        self.chamfered = [part for part in self.surfaces.shapes if isinstance(part, Roller) and part.chamfer]
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         try:
             self.pair = pair_of(one, two)

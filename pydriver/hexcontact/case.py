@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array
 from .core.lattice import Lattice
-from .deck.keys import FINENESS, Grid, Solver
+from .deck.keys import FINENESS, MEANS, Grid, Solver
 from .deck.read import Assembled, assemble
 from .deck.toml import plain, refuse_deep, with_overrides
 from .deck.units import angle_text
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Body", "Case", "LoadStep", "Target"]
 
-_LOADS = ("normal_load", "approach", "mean_pressure", "mean_gap", "steps")
+_LOADS = ("normal_load", "approach", *MEANS, "steps")
 _ARGUMENTS = {  # of a case, with their keys in a deck
     "title": "title",
     "body_1": "body.1",
@@ -71,8 +71,10 @@ class Case(Problem):
         Keys of [grid].
     cell_ratio, cell_angle, direction, boundary : optional
         Keys of [grid]; an angle carries its unit: "90 deg".
-    normal_load, approach, mean_pressure, mean_gap : float, optional
-        The only load (N, Pa) or motion (m), in one step or in `steps`.
+    normal_load, approach : float, optional
+        The only load (N) or motion (m), in one step or in `steps`.
+    mean_pressure, mean_gap, mean_traction_x, mean_traction_y : optional
+        The same in a window that repeats (Pa, m).
     steps : int or "auto", optional
         Number of equal increments of it; "auto": chosen by `step_tolerance`.
     loads : sequence of mappings, or mapping, optional
@@ -146,6 +148,8 @@ class Case(Problem):
         approach: float | str | None = None,
         mean_pressure: float | str | None = None,
         mean_gap: float | str | None = None,
+        mean_traction_x: float | str | None = None,
+        mean_traction_y: float | str | None = None,
         steps: int | str | None = None,
         interface: Mapping[str, Any] | None = None,
         loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,

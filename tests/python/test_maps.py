@@ -282,7 +282,7 @@ def test_keys_that_the_file_answers_are_refused_if_they_differ(file: Any) -> Non
     two = {"x": [0.0, 1.0], "y": [0.0, 1.0], "heights": [[0.0, 1.0], [1.0, 2.0]]}
     assert 'units = "um": expected nothing beside points' in complaint(of_file("", units="um", **two))
     holed = {**two, "heights": [[0.0, 1.0], [np.nan, 2.0]]}
-    assert "holes: 1 points have no height, one of them at x = 1.000 m, y = 0 m" in complaint(
+    assert "holes: 1 point has no height, one of them at x = 1.000 m, y = 0 m" in complaint(
         of_file("", **holed)
     )
     for key in two:
@@ -341,7 +341,7 @@ def test_formats_of_microscopes_are_read_by_surface_topography(
     assert found.x is not None
     np.testing.assert_allclose(found.x, X + 400.0, atol=1e-12)
     assert np.isnan(found.values).sum() == 1
-    assert "holes: 1 points have no height" in complaint(of_file(path, variable="Height"))
+    assert "holes: 1 point has no height" in complaint(of_file(path, variable="Height"))
 
 
 def test_a_file_of_surface_topography_itself(tmp_path: Path) -> None:

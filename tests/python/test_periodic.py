@@ -430,7 +430,7 @@ BAD = {
         r"gross sliding: the mean traction of 400\.0 kPa .* x mean_pressure = 300\.0 kPa",
     ),
     "direct": ({"method": "direct"}, 'solver.method = "direct": expected "fft"'),
-    "accuracy": ({"accuracy": 0.02}, "accuracy: is not available yet beside a window that repeats"),
+    "accuracy": ({"accuracy": 0.02}, "accuracy: expected none beside a window that repeats"),
 }
 
 

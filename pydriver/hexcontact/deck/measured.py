@@ -237,7 +237,8 @@ class Measured(Surface):
             row, col = np.argwhere(np.isnan(z))[-1]
             at = [f"x = {quantity(float(x[row]), 'm')}", f"y = {quantity(float(y[col]), 'm')}"]
             where = ", ".join(at[self.extruded :])
-            sentence = f"{count} points have no height, one of them at {where}; expected "
+            points = "1 point has" if count == 1 else f"{count} points have"
+            sentence = f"{points} no height, one of them at {where}; expected "
             refuse_key("holes", MISSING, f'{sentence}"fill", or "open" if nothing can touch there')
         mean, along, across = self.plane
         height = z - mean - along * _centered(x)[:, None] - across * _centered(y)

@@ -14,7 +14,7 @@ from ..arrays import Array
 from ..deck.measured import Measured
 from ..text import scaled
 from .registry import figure
-from .style import EDGED, EXACT, new_figure, set_title
+from .style import EDGED, EXACT, legend_below, new_figure, set_title
 
 _WIDTH, _HEIGHT = 4.8, 4.2  # inches of a panel
 _POINTS = 201  # along a side of the gap, if no surface was measured
@@ -78,7 +78,7 @@ def _colored(
     axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
     axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
     axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})", aspect="equal")
-    axes.legend(loc="upper right", labelcolor="w", fontsize=8)
+    legend_below(axes, ncols=2, fontsize=8)
 
 
 def _window(case: Any) -> tuple[Array, Array]:

@@ -158,7 +158,7 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep], perio
     if tables["solver"].method == "direct":
         yield ("solver", "method"), f'expected "fft" {whole}'
     if tables["accuracy"]:
-        yield ("accuracy",), f"is not available yet {whole}"
+        yield ("accuracy",), f"expected none {whole}: the period sets the window; choose the spacing"
     if tables["wear"]:
         for key, segment in _segments(tables["load"]):
             if segment.mean_gap is not None:

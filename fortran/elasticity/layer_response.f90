@@ -175,12 +175,14 @@ contains
     class(layered_body_t), intent(in) :: self
     !> Depth [m]
     real(wp), intent(in) :: z
+    !> Of a depth, over it
+    real(wp), parameter :: rounding = 1.0e-12_wp
     real(wp) :: bottom
 
     bottom = 0.0_wp
     do layer_at = 1, size(self%layer)
       bottom = bottom + self%layer(layer_at)%thickness
-      if (z <= bottom) return
+      if (z <= bottom*(1.0_wp + rounding)) return
     end do
   end function layer_at
 

@@ -3,7 +3,7 @@
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
   use hc_precision, only: wp, lk
-  use hc_contact_state, only: separated, stick, slip, n_motion, force_control
+  use hc_contact_state, only: separated, stick, slip, along_x, along_y, n_motion, force_control
   use hc_active_set, only: active_set_t, find_span
   use hc_frame_rows, only: plane_row
   use hc_friction_iterate, only: friction_iterate_t
@@ -42,6 +42,26 @@ contains
     if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
   end function shear_parameter
 
+  !> Compute a parameter under which all nodes slip by a shift that no traction takes up: that of a window that repeats and is in
+  !> contact everywhere, whose mean displacement is zero; else zero [Pa/m].
+  real(wp) function sliding_parameter(now) result(r)
+    type(friction_iterate_t), intent(in) :: now
+    real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
+    real(wp) :: total(2, now%problem%lattice%extent(2)), mean(2), scale
+    integer :: row
+
+    r = 0.0_wp
+    if (.not. (now%problem%lattice%is_periodic() .and. now%problem%friction%is_bounded())) return
+    if (.not. all(now%contact)) return
+    do row = 1, size(total, 2)
+      call now%slip_row(row, 1, dsx, dsy)
+      total(:, row) = [sum(dsx), sum(dsy)]
+    end do
+    mean = merge(0.0_wp, sum(total, dim=2)/size(now%p), now%target%control([along_x, along_y]) == force_control)
+    scale = now%traction_scale()
+    if (norm2(mean) > now%tolerance*now%problem%tangential_compliance*scale) r = 2.0_wp*scale/norm2(mean)
+  end function sliding_parameter
+
   !> Find stick, slip and frames that the present tractions call for.
   !>
   !> The shear traction is put on the cone where a node slips, and its component across
@@ -61,7 +81,7 @@ contains
     n = size(now%p)
     n_col = now%problem%lattice%extent(1)
     allocate (zone(n), active(2*n))
-    r = shear_parameter(now)
+    r = max(shear_parameter(now), sliding_parameter(now))
     soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)

@@ -98,8 +98,11 @@ contains
                                                               known(of_coupling), -known(of_coupling)], 1.0e-13_wp, 'surface')
       end associate
       if (allocated(error)) return
+      f = body%at_depth(k, 0.5_wp) - body%at_depth(k, 0.5_wp*(1.0_wp + 1.0e-11_wp))
+      call check(error, largest_of(f(continuous)), 0.0_wp, 1.0e-9_wp, 'jumps')
+      if (allocated(error)) return
       f = body%at_depth(k, 0.5_wp) - body%at_depth(k, 0.5_wp*(1.0_wp + 1.0e-14_wp))
-      call check(error, largest_of(f(continuous)), 0.0_wp, 1.0e-12_wp, 'jumps')
+      call check(error, largest_of(f), 0.0_wp, 1.0e-12_wp, 'rounding leaves the layer above an interface')
       if (allocated(error)) return
       z = 0.14_wp*i - 0.09_wp
       here = body%material_at(z)

@@ -132,6 +132,11 @@ WRONG = [
     ),
     (
         '"sphere", radius = "1 mm" }',
+        '"punch", radius = "1 mm", edge_radius = "2 mm" }',
+        'body.1.surface.edge_radius: unknown key; did you mean shape = "rounded_punch" or "rectangular_punch"?',
+    ),
+    (
+        '"sphere", radius = "1 mm" }',
         '"rectangular_punch", width = "1 mm", height = "2 mm" }',
         "body.1.surface.height: unknown key; did you mean length?",
     ),

@@ -460,3 +460,13 @@ def test_lattices_of_python_repeat_too() -> None:
         gap = lambda x, y: 0 * x  # noqa: E731
         lattice = Lattice(1e-5, 0, 0, 10, 10, cell_angle=math.pi / 2, periodic=True)
         Case(body_1=STEEL, body_2=STEEL, gap=gap, lattice=lattice, loads={"mean_pressure": 1e6}).run()
+
+
+@pytest.mark.parametrize("other", [STEEL, {"young_modulus": 70e9, "poisson_ratio": 0.2}])
+def test_no_traction_takes_up_the_shift_of_a_complete_contact(other: dict) -> None:
+    """Flat on flat: the mean displacement of a window that repeats is zero, so that any shift slides."""
+    grid = {"extent": ["100 um", "50 um"], "nodes_across": 16, "boundary": "periodic"}
+    loads = [{"mean_pressure": 3e8}, {"shift_x": 1e-9, "steps": 2}]
+    result = Case(body_1=STEEL, body_2=other, friction_coefficient=0.3, loads=loads, **grid).run()
+    np.testing.assert_allclose(result.dataset.traction_x[-1], 9e7, rtol=1e-9)
+    assert float(result.dissipated_energy[-1]) == pytest.approx(0.3 * 3e8 * 100e-6 * 50e-6 * 1e-9, rel=1e-9)

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
+from ..interior.files import files_of
 from ..problem.preview import parameters_of
 from ..problem.problem import Problem
 from ..result.history_words import Extent, extent_of
@@ -91,8 +92,8 @@ class Messages:
             return written | summary.as_run()
         if not self.quiet:
             summary.print()
-            files = f"{target}, {picture}" if picture else f"{target}"
-            printed.console().print(visible(f"written: {files}"), soft_wrap=True)
+            files = [target, *files_of(case.deck_text, target).values(), *([picture] if picture else [])]
+            printed.console().print(visible(f"written: {', '.join(map(str, files))}"), soft_wrap=True)
         if shortfall:
             raise SystemExit(AccuracyWarning.exit_code)
         return None

@@ -344,6 +344,8 @@ class Punch(Surface):
     @classmethod
     def meant(cls, key: str) -> str:
         """Return the shape that has sides, or a known key that an unknown one may mean."""
+        if key == "edge_radius":
+            return 'shape = "rounded_punch" or "rectangular_punch"'
         return 'shape = "rectangular_punch"' if key in ("width", "height", "length") else super().meant(key)
 
     def _height(self, x: Array, y: Array) -> Array:

@@ -133,7 +133,7 @@ WRONG = [
     (
         '"sphere", radius = "1 mm" }',
         '"punch", radius = "1 mm", edge_radius = "2 mm" }',
-        'body.1.surface.edge_radius: unknown key; did you mean shape = "rounded_punch" or "rectangular_punch"?',
+        'body.1.surface.edge_radius: unknown key; did you mean shape = "rounded_punch" or ',
     ),
     (
         '"sphere", radius = "1 mm" }',

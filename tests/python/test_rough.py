@@ -7,6 +7,7 @@ import pytest
 from validation import repeating
 
 from hexcontact import Case, DeckError
+from hexcontact.plotting.surface import surface as picture
 from hexcontact.problem import plausibility
 from hexcontact.surfaces import Rough
 
@@ -179,3 +180,17 @@ def test_a_lattice_of_60_degrees_does_not_fit(tmp_path: Path) -> None:
     surface = {"shape": "rough", **WAVES, "rms_slope": 0.05}
     with pytest.raises(DeckError, match='expected grid.lattice = "rectangular"'):
         Case(body_1={**STEEL, "surface": surface}, body_2=STEEL, loads={"mean_pressure": 1e6}, **grid)
+
+
+def test_the_picture_has_the_period_of_the_window() -> None:
+    surface = {"shape": "rough", **WAVES, "rms_height": 1e-7}
+    grid = {"boundary": "periodic", "extent": [SIDE, SIDE], "nodes_across": 64}
+    case = Case(body_1={**STEEL, "surface": surface}, body_2=STEEL, loads={"mean_pressure": 1e6}, **grid)
+    gap, _ = case.initial_gap(case.lattice)
+    [drawn] = picture(case).axes[0].collections
+    row, col = np.unravel_index(np.argmax(drawn.get_array()), drawn.get_array().shape)
+    highest = np.unravel_index(gap.argmax(), gap.shape)
+    middles = drawn.get_coordinates()[row : row + 2, col : col + 2].mean(axis=(0, 1)) * 1e-6
+    assert (
+        np.hypot(*(middles - [case.lattice.x[highest], case.lattice.y[highest]])) < 2 * case.lattice.spacing
+    )

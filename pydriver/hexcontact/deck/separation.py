@@ -38,7 +38,7 @@ class Separation:
     @property
     def shapes(self) -> tuple[Surface, ...]:
         """The shapes of both surfaces."""
-        return (*self.surface_1.shapes, *self.surface_2.shapes)
+        return self.surface_1.shapes + self.surface_2.shapes
 
     @property
     def moves(self) -> bool:

@@ -186,10 +186,11 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if layers:
         thinnest = min(layer.thickness for layer in layers)
         found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
-    waves = [getattr(part, part.wave) for part in case.surfaces.shapes if part.wave]
-    if waves and not case.gap_given:
-        apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
-        found["wave_spacings"] = min(waves) / apart
+    for part in () if case.gap_given else case.surfaces.shapes:
+        if part.wave:
+            apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
+            waves = getattr(part, part.wave) / apart
+            found["wave_spacings"] = min(found.get("wave_spacings", waves), waves)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)

@@ -186,7 +186,7 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if layers:
         thinnest = min(layer.thickness for layer in layers)
         found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
-    for part in () if case.gap_given else case.surfaces.shapes:
+    for part in () if case.gap_given else case.shapes:
         if part.wave:
             apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
             waves = getattr(part, part.wave) / apart
@@ -352,7 +352,7 @@ def rounded_distances(case: Problem) -> str:
 def equal_seeds(case: Problem) -> str:
     """Return a note on rough surfaces whose waves coincide; empty without two of them."""
     found = set()
-    for part in case.surfaces.shapes:
+    for part in case.shapes:
         if not isinstance(part, Rough):
             continue
         if (waves := (part.seed, part.sides, part.offset)) in found:

@@ -132,8 +132,8 @@ class Problem:
         self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
-        self.chamfered: list[Roller] = []
-        for part in self.surfaces.shapes:
+        self.shapes, self.chamfered = self.surfaces.shapes, list[Roller]()
+        for part in self.shapes:
             if isinstance(part, Roller) and part.chamfer:
                 self.chamfered.append(part)
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import Banded, Dataset, in_bands
+from ..arrays import Banded, Dataset
 from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
-from .step import Step
+from .step import Step, in_bands
 
 COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}

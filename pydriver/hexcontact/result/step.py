@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..analytic.hertz_gap import friction_of, is_compliant
-from ..arrays import Array, Banded, Dataset, Mask, in_bands
+from ..arrays import BAND, Array, Banded, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
@@ -466,3 +466,19 @@ def _read_only(values: NDArray[Any]) -> NDArray[Any]:
 
 
 _NO_VALUES = _read_only(np.empty(0))  # of the fields of a head
+
+
+def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
+    """Join and cut bands so that each but the last has so many rows."""
+    left: list[NDArray[Any]] = []
+    for part in parts:
+        start = 0
+        while start < len(part):
+            missing = rows - sum(map(len, left))
+            left.append(part[start : start + missing])
+            start += missing
+            if sum(map(len, left)) == rows:
+                yield left[0] if len(left) == 1 else np.concatenate(left)
+                left = []
+    if left:
+        yield left[0] if len(left) == 1 else np.concatenate(left)

@@ -92,9 +92,13 @@ contains
   subroutine spread_mask(ranks, field)
     type(communicator_t), intent(in) :: ranks
     !> Mask (n_col, n_row), of one shape on all ranks
-    logical(lk), intent(in), contiguous, target :: field(:, :)
+    logical(lk), intent(inout) :: field(:, :)
+    integer, allocatable, target :: marks(:, :)
 
-    call spread(ranks, shape(field), c_loc(field))
+    ! a row of bytes is no number of words, which ranks exchange
+    marks = merge(1, 0, field)
+    call spread(ranks, shape(marks), c_loc(marks))
+    field = marks > 0
   end subroutine spread_mask
 
   !> Copy zones of the first rank to the other ranks.

@@ -136,6 +136,10 @@ mean_pressure = "200 MPa"
 mean_traction_x = "20 MPa"
 """
 )
+# The sphere ends within the window.
+ENDING = (
+    '[{ shape = "sphere", radius = "1 mm" }, { shape = "punch", radius = "20 um", offset = ["8 um", 0] }]'
+)
 WORN = """
 [[load]]
 label = "fretting"
@@ -156,8 +160,9 @@ cycles = 1_000
         (2, SHEARED.replace("steps = 2", "") + WORN),
         (3, ADAPTIVE),
         (2, SHEARED_WAVES),
+        (2, SHEARED.replace('{ shape = "sphere", radius = "1 mm" }', ENDING)),
     ],
-    ids=["unlike", "alike", "worn", "adaptive", "waves"],
+    ids=["unlike", "alike", "worn", "adaptive", "waves", "ends"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)

@@ -116,7 +116,7 @@ class Surface(Argument):
     @property
     def shapes(self) -> tuple[Surface, ...]:
         """The shapes that it is the sum of."""
-        return getattr(self, "parts", ()) or (self,)
+        return (self,)
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the height (m) at points of the plane.
@@ -591,6 +591,11 @@ class SurfaceSum(Surface):
     as_given: ClassVar[bool] = True
 
     parts: tuple[Surface, ...] = ()
+
+    @property
+    def shapes(self) -> tuple[Surface, ...]:
+        """Its parts."""
+        return self.parts
 
     @property
     def curvature(self) -> Array | None:

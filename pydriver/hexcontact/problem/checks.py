@@ -149,10 +149,10 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep], perio
     for key, segment in _segments(tables["load"]) if closes else ():
         if segment.approach is not None and segment.approach >= _ALL_TOUCH * period.mean_height:
             height = quantity(period.mean_height, "m")
-            sentence = (
-                f"expected less than {height}, the mean gap before loading: there all of the window touches"
-            )
-            yield (*key, "approach"), f"{sentence}, and mean_pressure goes on"
+            sentence = f"expected mean_pressure, or less than {height}, at which all of the window touches"
+            if not period.mean_height > 0.0:
+                sentence = "expected mean_pressure: all of the window touches before loading"
+            yield (*key, "approach"), sentence
     if tables.get("bulk"):
         yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
     if tables["solver"].method == "direct":

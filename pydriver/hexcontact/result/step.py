@@ -469,7 +469,7 @@ _NO_VALUES = _read_only(np.empty(0))  # of the fields of a head
 
 
 def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
-    """Join and cut bands so that each but the last has so many rows."""
+    """Join and cut bands into bands of a number of rows; the last may have fewer."""
     left: list[NDArray[Any]] = []
     for part in parts:
         start = 0

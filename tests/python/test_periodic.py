@@ -8,6 +8,8 @@ import pytest
 import xarray
 
 from hexcontact import Case, DeckError, Lattice, open_result, plotting
+from hexcontact.analytic.hertz_gap import against_hertz
+from hexcontact.cli.printed import hertz_rows
 from hexcontact.plotting.report_data import charts_of
 from hexcontact.problem.preview import case_rows
 
@@ -472,3 +474,14 @@ def test_no_traction_takes_up_the_shift_of_a_complete_contact(other: dict) -> No
     result = Case(body_1=STEEL, body_2=other, friction_coefficient=0.3, loads=loads, **grid).run()
     np.testing.assert_allclose(result.dataset.traction_x[-1], 9e7, rtol=1e-9)
     assert float(result.dissipated_energy[-1]) == pytest.approx(0.3 * 3e8 * 100e-6 * 50e-6 * 1e-9, rel=1e-9)
+
+
+def test_no_approach_of_hertz_stands_beside_mean_planes() -> None:
+    """A sphere in a cell of ten contact diameters: its pressure is that of Hertz, its approach is another."""
+    body = {**STEEL, "surface": {"shape": "sphere", "radius": "10 mm"}}
+    grid = {"extent": ["2 mm", "2 mm"], "nodes_across": 128, "boundary": "periodic"}
+    result = Case(body_1=body, body_2=STEEL, normal_load=10.0, **grid).run()
+    last = result.history.to_dict("records")[-1]
+    compared = against_hertz(result.deck, result.dataset.attrs, last)
+    assert [name for name, *_ in compared] == ["max_pressure", "contact_radius"]
+    assert "plane" not in hertz_rows(compared, last)[0][0]

@@ -96,7 +96,7 @@ contains
     integer, allocatable, target :: marks(:, :)
 
     ! a row of bytes is no number of words, which ranks exchange
-    marks = merge(1, 0, field)
+    allocate (marks, source=merge(1, 0, field))
     call spread(ranks, shape(marks), c_loc(marks))
     field = marks > 0
   end subroutine spread_mask

@@ -17,6 +17,7 @@ module hc_edge_continuation
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbor_steps
   use hc_field_space, only: field_space_t
+  use hc_line_means, only: line_means_t, new_line_means
   use hc_active_set, only: find_span
   implicit none
   private
@@ -46,11 +47,8 @@ module hc_edge_continuation
     !> Ranks that share the fields; on several ones the rings are those in `rows`, own rows and those that their values depend on
     type(field_space_t) :: fields
     integer :: own(2) = 0, rows(2) = 0, n_row = 0
-    !> On slender cells: the dimension across the contact, and lines on each side that share a mean; increment of a line beyond
-    !> the edge over its mean, 0 on active nodes (n_col, n_row); 1 over the weights of the mean; active nodes of each line
-    integer :: across = 0, reach = 0
-    real(sp), allocatable :: floor(:, :), weight(:)
-    integer, allocatable :: n_line(:)
+    !> On slender cells: lines across the contact
+    type(line_means_t), allocatable :: lines
   contains
     !> Continue the mean of each line across a slender contact further than the rest
     procedure :: set_floor
@@ -58,7 +56,7 @@ module hc_edge_continuation
     procedure :: extend
     !> The transpose: add loads on the rings to the active nodes
     procedure :: fold
-    procedure, private :: extend_rings, fold_rings, mean_of_lines
+    procedure, private :: extend_rings, fold_rings
   end type edge_extension_t
 
 contains
@@ -123,8 +121,7 @@ contains
     number_of_rings = min(options%max_rings, number_of_rings)
   end function number_of_rings
 
-  !> Continue the mean of each line across a slender contact to the end of the line: there the surface falls off with the logarithm
-  !> of the distance, over the length of the contact.
+  !> Continue the mean of each line across a slender contact to the end of the line.
   subroutine set_floor(self, active, across, share)
     class(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, n_row), on one rank
@@ -133,52 +130,15 @@ contains
     integer, intent(in) :: across
     !> Height at the end of a line over the mean
     real(wp), intent(in) :: share
-    real(sp), allocatable, target :: field(:)
-    integer :: row
+    real(sp), allocatable :: field(:)
 
-    self%across = across
-    self%reach = (size(self%ring) - 1)/2
-    self%n_line = count(active, dim=across)
-    self%weight = 1.0_sp/max(tent(self%reach, real(self%n_line, sp)), 1.0_sp)
     allocate (field(size(active)))
     field = reshape(merge(1.0_sp, 0.0_sp, active), [size(active)])
     call self%extend_rings(field)
-    self%floor = real(share, sp)*(1.0_sp - reshape(field, shape(active)))
-    do row = 1, size(active, 2)
-      if (across == 2) then
-        where (self%n_line == 0) self%floor(:, row) = 0.0_sp
-      else if (self%n_line(row) == 0) then
-        self%floor(:, row) = 0.0_sp
-      end if
-      where (active(:, row)) self%floor(:, row) = 0.0_sp
-    end do
+    allocate (self%lines)
+    call new_line_means(self%lines, active, reshape(field, shape(active)), across, (size(self%ring) - 1)/2, real(share, sp), &
+                        self%fields%threads)
   end subroutine set_floor
-
-  !> Sum the values of lines over those nearby, with weights that fall off evenly.
-  pure function tent(reach, value) result(total)
-    !> Lines on each side
-    integer, intent(in) :: reach
-    real(sp), intent(in) :: value(:)
-    real(sp) :: total(size(value))
-    integer :: k
-
-    total = (reach + 1)*value
-    do k = 1, min(reach, size(value) - 1)
-      total = total + (reach + 1 - k)*(eoshift(value, k) + eoshift(value, -k))
-    end do
-  end function tent
-
-  !> Compute the means of the active nodes of the lines across a slender contact, each over lines nearby.
-  function mean_of_lines(self, field) result(mean)
-    class(edge_extension_t), intent(in) :: self
-    !> Field (n_col, n_row)
-    real(sp), intent(in), contiguous :: field(:, :)
-    real(sp) :: mean(size(self%n_line))
-
-    mean = sum(field, dim=self%across, mask=.not. self%floor > 0.0_sp)
-    where (self%n_line == 0) mean = 0.0_sp
-    mean = self%weight*tent(self%reach, mean)
-  end function mean_of_lines
 
   !> Find the rings in own rows and in those that their values depend on: smoothed rings further in or out, and the active nodes
   !> that these begin at.
@@ -482,27 +442,16 @@ contains
     !> Height of the continuation in the first ring; absent: 1
     real(sp), intent(in), optional :: first
     real(sp), allocatable :: wider(:), wider_own(:)
-    real(sp), pointer, contiguous :: lines(:, :)
     real(sp), allocatable :: mean(:)
-    integer :: row
 
     if (self%fields%ranks%size == 1) then
-      if (.not. allocated(self%floor) .or. present(own)) then
+      if (.not. allocated(self%lines) .or. present(own)) then
         call self%extend_rings(field, own, first)
         return
       end if
-      lines(1:size(self%floor, 1), 1:size(self%floor, 2)) => field
-      allocate (mean, source=self%mean_of_lines(lines))
+      allocate (mean, source=self%lines%mean(field))
       call self%extend_rings(field)
-      !$omp parallel do schedule(static) num_threads(self%fields%threads)
-      do row = 1, size(lines, 2)
-        if (self%across == 1) then
-          lines(:, row) = lines(:, row) + mean(row)*self%floor(:, row)
-        else
-          lines(:, row) = lines(:, row) + mean*self%floor(:, row)
-        end if
-      end do
-      !$omp end parallel do
+      call self%lines%add(mean, field)
       return
     end if
     call widen(self, field, wider)
@@ -595,27 +544,16 @@ contains
     !> Height of the continuation in the first ring; absent: 1
     real(sp), intent(in), optional :: first
     real(sp), allocatable :: wider(:), wider_own(:)
-    real(sp), pointer, contiguous :: lines(:, :)
     real(sp), allocatable :: share(:)
-    integer :: row
 
     if (self%fields%ranks%size == 1) then
-      if (.not. allocated(self%floor) .or. present(own)) then
+      if (.not. allocated(self%lines) .or. present(own)) then
         call self%fold_rings(field, own, first)
         return
       end if
-      lines(1:size(self%floor, 1), 1:size(self%floor, 2)) => field
-      share = tent(self%reach, self%weight*sum(lines*self%floor, dim=self%across))
+      allocate (share, source=self%lines%share(field))
       call self%fold_rings(field)
-      !$omp parallel do schedule(static) num_threads(self%fields%threads)
-      do row = 1, size(lines, 2)
-        if (self%across == 1) then
-          if (self%n_line(row) > 0) where (.not. self%floor(:, row) > 0.0_sp) lines(:, row) = lines(:, row) + share(row)
-        else
-          where (self%n_line > 0 .and. .not. self%floor(:, row) > 0.0_sp) lines(:, row) = lines(:, row) + share
-        end if
-      end do
-      !$omp end parallel do
+      call self%lines%hand_back(share, field)
       return
     end if
     call widen(self, field, wider)

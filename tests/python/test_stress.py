@@ -449,8 +449,9 @@ components = ["von_mises_stress", "displacement_z"]
 depths = ["0 um", "0.1 mm"]
 """
     (tmp_path / "deck.toml").write_text(DECK + tables)
-    done = commands.inside(tmp_path, "run", "deck.toml", "--quiet")
+    done = commands.inside(tmp_path, "run", "deck.toml")
     assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("written: deck.nc, deck_axis.nc, deck_stress_2.nc\n")
     with xarray.open_dataset(tmp_path / "deck_axis.nc") as axis:
         assert axis["von_mises_stress"].sizes == {"step": 2, "distance": 21}
         assert axis["von_mises_stress"].attrs["units"] == "Pa"

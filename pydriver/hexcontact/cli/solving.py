@@ -13,11 +13,10 @@ from typing import Any, NoReturn
 
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
-from ..interior.files import files_of
 from ..problem.preview import parameters_of
 from ..problem.problem import Problem
 from ..result.history_words import Extent, extent_of
-from ..result.netcdf import missing_stresses
+from ..result.netcdf import missing_stresses, stress_files
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..solve import log
@@ -92,7 +91,7 @@ class Messages:
             return written | summary.as_run()
         if not self.quiet:
             summary.print()
-            files = [target, *files_of(case.deck_text, target).values(), *([picture] if picture else [])]
+            files = [target, *stress_files(case.deck_text, target).values(), *([picture] if picture else [])]
             printed.console().print(visible(f"written: {', '.join(map(str, files))}"), soft_wrap=True)
         if shortfall:
             raise SystemExit(AccuracyWarning.exit_code)

@@ -374,6 +374,26 @@ def test_a_logarithmic_roller_is_loaded_evenly_at_its_design_load() -> None:
     assert middle == pytest.approx(2 * by_length / (math.pi * half_width), rel=3e-3)
 
 
+# A node lies on the end at 8 um along the axis, and at 4 and 2 um; none does on the others.
+@pytest.mark.parametrize(
+    ("spacing", "ratio"),
+    [(2e-6, 4.0), (2.005e-6, 4.0), (2.01e-6, 4.0), (2e-6, 2.0), (2e-6, 1.0), (2.003e-6, 1.0)],
+)
+@pytest.mark.parametrize("share", [0.6, 0.75, 1.1, 1.25])
+def test_the_end_of_a_logarithmic_roller_is_unbounded_from_its_design_load_on(
+    share: float, spacing: float, ratio: float
+) -> None:
+    """Below it contact ends before the roller, on 1 um as well; p_max there is that of 1 um."""
+    roller = Roller(radius=5e-3, length=2e-3, angle="90 deg", profile="logarithmic", design_load=20.0)
+    lattice = {"spacing": spacing, "cell_ratio": ratio, "cell_angle": "90 deg"}
+    case = Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, **lattice, normal_load=20.0 * share)
+    found = float(case.run().max_pressure[-1])
+    if share > 1.0:
+        assert math.isinf(found)
+    else:
+        assert found == pytest.approx({0.6: 215.76e6, 0.75: 238.14e6}[share], rel=2e-3)
+
+
 # --- two surfaces ------------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, DeckError, Lattice, open_result, plotting
+from hexcontact import Case, DeckError, FrictionalContact, Lattice, NormalContact, open_result, plotting
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import hertz_rows
 from hexcontact.plotting.report_data import charts_of
@@ -63,6 +63,24 @@ def test_no_approach_closes_more_than_the_mean_gap() -> None:
             DeckError, match="approach = .*expected mean_pressure, or less than 1.000 µm, at which"
         ):
             waves(approach=approach)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.002, 2.0])
+def test_solvers_refuse_an_approach_beyond_the_mean_gap(share: float) -> None:
+    """They reported convergence under a pressure without bound, over which the residual is taken."""
+    case = waves(nodes=16, mean_pressure=1e8)
+    gap, approach = case.initial_gap(case.lattice)[0], share * HEIGHT
+    expected = "the approach: less than the mean gap expected in a window that repeats"
+    pressed = NormalContact(case.lattice, case.pair, gap)
+    assert pressed.solve(approach=0.9 * HEIGHT).converged
+    with pytest.raises(DeckError, match=expected):
+        pressed.solve(approach=approach)
+    sheared = FrictionalContact(case.lattice, case.pair, gap, friction_coefficient=0.3)
+    controls = ["displacement", "force", "force", "displacement"]
+    with pytest.raises(DeckError, match=expected):
+        sheared.advance(sheared.virgin(), controls, [approach, 0.0, 0.0, 0.0])
+    layer = NormalContact(case.lattice, case.pair, gap, interface=(1e14, 1.0, 0.0))
+    assert layer.solve(approach=approach).converged
 
 
 @pytest.mark.parametrize("rows", [1, 4, 8])

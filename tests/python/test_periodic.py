@@ -49,6 +49,39 @@ def test_loads_by_means_are_arguments_of_a_case() -> None:
     assert waves(nodes=16, mean_gap="0.2 um").deck.load[0].mean_gap == pytest.approx(2e-7)
 
 
+def test_means_in_a_series_are_those_of_segments(tmp_path: Path) -> None:
+    """Also from a file, and as shares of mu P."""
+    pressure = 0.3 * FULL
+    one = waves(
+        nodes=16,
+        friction_coefficient=0.3,
+        loads=[
+            {"mean_pressure": pressure},
+            {"mean_pressure": pressure, "mean_traction_x": "0.5 mu P"},
+            {"mean_gap": 1e-7, "mean_traction_x": 0.15 * pressure},
+        ],
+    )
+    arrays = {
+        "mean_pressure": [pressure, pressure, ""],
+        "mean_gap": ["", "", 1e-7],
+        "mean_traction_x": [0.0, 0.15 * pressure, 0.15 * pressure],
+    }
+    series = waves(nodes=16, friction_coefficient=0.3, loads=[{"series": arrays}])
+    rows = zip(*arrays.values(), strict=True)
+    text = "mean_pressure [Pa],mean_gap [m],mean_traction_x [Pa]\n" + "\n".join(
+        ",".join(map(str, r)) for r in rows
+    )
+    (tmp_path / "means.csv").write_text(text)
+    read = waves(
+        nodes=16, friction_coefficient=0.3, loads=[{"series": {"file": str(tmp_path / "means.csv")}}]
+    )
+    assert read.deck == series.deck
+    expected = one.run()
+    assert float(expected.dataset.tangential_load_x[1]) == pytest.approx(0.15 * pressure * WAVE**2, rel=1e-9)
+    for name in ("approach", "normal_load", "tangential_load_x", "dissipated_energy"):
+        np.testing.assert_allclose(series.run().dataset[name], expected.dataset[name], rtol=1e-9)
+
+
 def test_two_spacings_need_no_lattice() -> None:
     """Cells of a window that repeats are rectangles."""
     lattice = waves(nodes=None, spacing=["25 um", "50 um"], mean_pressure=1e8).lattice
@@ -417,6 +450,18 @@ BAD = {
     "none": (
         {"loads": {"mean_pressure": 0}},
         r"load\.1\.mean_pressure = 0.*: expected a mean pressure above",
+    ),
+    "series": (
+        {"loads": [{"series": {"mean_pressure": [1e6, 2e6], "approach": ["", 1e-7]}}]},
+        "series.mean_pressure = .*: expected approach or mean_pressure in each row, not both .entry 2.",
+    ),
+    "share": (
+        {"friction_coefficient": 0.3, "loads": [{"mean_gap": "0.2 um", "mean_traction_x": "0.2 mu P"}]},
+        "mean_traction_x = .0.2 mu P.: expected pascals, since the approach is given",
+    ),
+    "series without a period": (
+        {"boundary": None, "loads": [{"series": {"mean_pressure": [1e6, 2e6]}}]},
+        "expected a window that repeats",
     ),
     "seam": ({"expression": "1e-6*(1 - cos(6*x/1e-3 + 1))"}, "grid.boundary .*: the gap does not repeat"),
     "punch": (

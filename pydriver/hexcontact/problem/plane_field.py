@@ -13,7 +13,7 @@ from ..arrays import Array, Mask, has_entries, reals
 from ..core.contact import shaped
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
-from ..deck.height_map import HeightMap, Placed, in_si
+from ..deck.height_map import HeightMap, Placed, in_si, place
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
 from ..deck.map_file import MOST_POINTS
 from ..deck.separation import Separation
@@ -164,7 +164,7 @@ class PlaneField:
         """Refuse values at the first of some points."""
         if not bad.any():
             return
-        value, where = values[bad][0], f"x = {x[bad][0]:.4g} m, y = {y[bad][0]:.4g} m"
+        value, where = values[bad][0], place(x[bad][0], y[bad][0])
         if self.map and np.isinf(value):
             raise DeckError(f"{self.rule.key}: the map does not cover the window: it has no value at {where}")
         shown = "NaN" if np.isnan(value) else f"{value:g}"

@@ -315,6 +315,19 @@ def test_the_plane_contact_stands_beside_a_roller(tmp_path: Path) -> None:
     assert math.isinf(entry.computed)  # contact reaches the ends
 
 
+@pytest.mark.parametrize("number", ["1", "2"])
+@pytest.mark.parametrize(
+    "parts", [[Dent(depth=5e-6, radius=5e-5)], [Sphere(radius=9e-3), Ellipsoid(radius_x=-8e-3, radius_y=1e6)]]
+)
+def test_a_contact_without_end_blames_the_surface(parts: list[Surface], number: str) -> None:
+    """A dent leaves the plane about it, and a ball no groove that is sharper."""
+    bodies = {"body_1": STEEL, "body_2": STEEL} | {f"body_{number}": {**STEEL, "surface": parts}}
+    with pytest.raises(
+        DeckError, match=rf"^body\.{number}\.surface: the contact has no end; expected a shape"
+    ):
+        Case(**bodies, spacing=1e-5, normal_load=10.0)
+
+
 def test_a_profile_by_moduli_needs_them() -> None:
     with pytest.raises(DeckError, match="design_load: its profile follows from the moduli of the bodies"):
         Roller(radius=1.0, length=2.0, profile="logarithmic", design_load=1.0).height(0.0, 0.0)

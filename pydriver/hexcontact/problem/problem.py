@@ -417,7 +417,11 @@ class Problem:
         except NoContactFound as error:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
-            raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
+            key: tuple[str, ...] = ("grid",)
+            if not (self._gap.given or grid.center):
+                key = ("body", "2" if self.surfaces.surface_1.shape == "flat" else "1", "surface")
+                sentence = f"{error}{soft}; expected a shape that bounds the contact"
+            raise deck_error([Mistake(key, MISSING, sentence)], source) from None
         # by force, and by approach
         self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())
         if grid.fits and lattice is None:

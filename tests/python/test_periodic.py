@@ -9,9 +9,10 @@ import xarray
 
 from hexcontact import Case, DeckError, FrictionalContact, Lattice, NormalContact, open_result, plotting
 from hexcontact.analytic.hertz_gap import against_hertz
-from hexcontact.cli.printed import hertz_rows
+from hexcontact.cli.printed import _columns, hertz_rows
 from hexcontact.plotting.report_data import charts_of
 from hexcontact.problem.preview import case_rows
+from hexcontact.result.history_words import step_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 E_STAR = 210e9 / (2 * (1 - 0.3**2))
@@ -80,6 +81,30 @@ def test_means_in_a_series_are_those_of_segments(tmp_path: Path) -> None:
     assert float(expected.dataset.tangential_load_x[1]) == pytest.approx(0.15 * pressure * WAVE**2, rel=1e-9)
     for name in ("approach", "normal_load", "tangential_load_x", "dissipated_energy"):
         np.testing.assert_allclose(series.run().dataset[name], expected.dataset[name], rtol=1e-9)
+
+
+def test_no_radius_stands_for_a_contact_that_is_no_disc() -> None:
+    """In a window that repeats the share of its area, in a long contact the stick area."""
+    strips = (
+        waves(nodes=16, expression=f"{HEIGHT}*(1 - cos(2*pi*x/{WAVE}))", mean_pressure=2e7)
+        .run()
+        .history.iloc[-1]
+        .to_dict()
+    )
+    columns = _columns([strips], with_errors=False)
+    assert "contact area" in columns
+    assert "radius" not in columns
+    assert columns["contact area"](strips).endswith("% of the window")
+    long = {"shape": "paraboloid", "radius_x": "100 mm", "radius_y": "1 mm"}
+    loads = [{"normal_load": 10.0}, {"tangential_load_x": 1.0}]
+    bodies = {"body_1": {**STEEL, "surface": long}, "body_2": STEEL}
+    sheared = (
+        Case(**bodies, spacing="auto", friction_coefficient=0.3, loads=loads).run().history.iloc[-1].to_dict()
+    )
+    rows = dict(step_rows(sheared))
+    assert "contact half-axes" in rows
+    assert "stick area" in rows
+    assert "stick radius" not in rows
 
 
 def test_two_spacings_need_no_lattice() -> None:

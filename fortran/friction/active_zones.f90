@@ -42,22 +42,30 @@ contains
     if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
   end function shear_parameter
 
-  !> Compute a parameter under which all nodes slip by a shift that no traction takes up: that of a window that repeats and is in
-  !> contact everywhere, whose mean displacement is zero; else zero [Pa/m].
+  !> Compute a parameter under which all nodes slip by a shift that no traction takes up where all nodes stick: that of a window
+  !> that repeats and is in contact everywhere, whose mean displacement is zero; else r of (F8) [Pa/m].
   real(wp) function sliding_parameter(now) result(r)
     type(friction_iterate_t), intent(in) :: now
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: total(2, now%problem%lattice%extent(2)), mean(2), scale
-    integer :: row
+    real(wp) :: total(3, now%problem%lattice%extent(2)), mean(2), scale
+    integer :: zone(now%problem%lattice%extent(1)), n, row, from, to
 
-    r = 0.0_wp
+    r = shear_parameter(now)
     if (.not. (now%problem%lattice%is_periodic() .and. now%problem%friction%is_bounded())) return
-    if (.not. all(now%contact)) return
+    if (now%operators%space%count(logical(.not. now%contact, lk)) > 0) return
+    n = size(now%p)
+    scale = 1.0_wp/now%operators%space%max(now%p)
     do row = 1, size(total, 2)
+      to = row*size(dsx)
+      from = to - size(dsx) + 1
       call now%slip_row(row, 1, dsx, dsy)
-      total(:, row) = [sum(dsx), sum(dsy)]
+      call now%problem%friction%find_zones(from, scale, r, now%p(from:to), now%q(from:to), now%q(n + from:n + to), &
+                                           dsx, dsy, zone)
+      total(:, row) = [sum(dsx), sum(dsy), real(count(zone == slip), wp)]
     end do
-    mean = merge(0.0_wp, sum(total, dim=2)/size(now%p), now%target%control([along_x, along_y]) == force_control)
+    if (now%operators%space%total(total(3, :)) > 0.0_wp) return
+    mean = [now%operators%space%total(total(1, :)), now%operators%space%total(total(2, :))]/now%operators%space%count(now%contact)
+    where (now%target%control([along_x, along_y]) == force_control) mean = 0.0_wp
     scale = now%traction_scale()
     if (norm2(mean) > now%tolerance*now%problem%tangential_compliance*scale) r = 2.0_wp*scale/norm2(mean)
   end function sliding_parameter
@@ -81,7 +89,7 @@ contains
     n = size(now%p)
     n_col = now%problem%lattice%extent(1)
     allocate (zone(n), active(2*n))
-    r = max(shear_parameter(now), sliding_parameter(now))
+    r = sliding_parameter(now)
     soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)

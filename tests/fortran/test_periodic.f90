@@ -470,8 +470,8 @@ contains
                1.0e-8_wp*maxval(pressed%pressure), 'back')
   end subroutine test_shifts
 
-  !> A wave along a window of 512 columns and one row, in incomplete and in complete contact under a shift, nu = 0: zones of contacts
-  !> that go on across do not alternate.
+  !> A wave along a window of 512 columns and one row, in incomplete and in complete contact under a shift, nu = 0: zones of
+  !> contacts that go on across do not alternate.
   subroutine test_narrow(error)
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 512

@@ -37,6 +37,8 @@ module hc_normal_problem
     procedure :: inherit
     !> Return whether the bodies will touch
     procedure :: is_pressed
+    !> Refuse an approach that no pressure belongs to
+    procedure :: check_approach
     !> Classification parameter r' of the conditions along the normal
     procedure :: normal_classification_parameter
     !> Compliance beyond which a spring of a compliant law has no effect; that of a node with the stiffest of them
@@ -115,6 +117,25 @@ contains
       is_pressed = target%value(normal) > self%space%min(self%initial_gap, self%candidate)
     end if
   end function is_pressed
+
+  !> Refuse an approach of the mean gap or more in a window that repeats: all of it touches, under any mean pressure.
+  subroutine check_approach(self, target, error)
+    class(normal_problem_t), intent(in) :: self
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: all_touch = 1.0_wp - 1.0e-9_wp
+    real(wp) :: lowest, mean
+
+    if (.not. self%lattice%is_periodic() .or. target%control(normal) == force_control) return
+    if (self%normal_law%is_compliant() .or. self%space%count(self%candidate) < self%lattice%size()) return
+    lowest = self%space%min(self%initial_gap, self%candidate)
+    mean = self%space%sum(self%initial_gap)/self%lattice%size()
+    if (target%value(normal) > lowest .and. target%value(normal) - lowest >= all_touch*(mean - lowest)) then
+      call raise(error, status%invalid_input, 'the approach: less than the mean gap expected in a window that repeats')
+    end if
+  end subroutine check_approach
 
   !> Compute r' = kappa/(2 pi lambda a), lambda_1 on half-spaces [Pa/m].
   pure real(wp) function normal_classification_parameter(self, n_contact) result(r)

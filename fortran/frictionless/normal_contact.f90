@@ -194,6 +194,8 @@ contains
     call self%ranks%agree(error)
     if (allocated(error)) return
     goal = load_target_t([control], [target])
+    call self%level(1)%check_approach(goal, error)
+    if (allocated(error)) return
     work = 0.0_wp
     do l = 2, size(self%level)
       call self%level(l - 1)%coarsen_gap(self%level(l))

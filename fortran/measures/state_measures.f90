@@ -359,60 +359,71 @@ contains
 
   !> Test whether the pressure rises to an end of the surface, where it has no bound.
   !>
-  !> A node beside one that cannot touch has more pressure than its neighbor on the other side.
-  logical function rises_to_end(candidate, pressure, space, n_row) result(rises)
-    !> Nodes that can touch (n_col, own rows)
-    logical, intent(in), contiguous :: candidate(:, :)
+  !> The last node before it has more pressure than its neighbor, or both together more than the next one. A node bears the length
+  !> between the middle to its neighbor and the end, which is no whole cell.
+  logical function rises_to_end(share, pressure, space, n_row) result(rises)
+    !> Part of a cell that a node bears, 0 where nothing can touch (n_col, own rows)
+    real(wp), intent(in), contiguous :: share(:, :)
     !> Pressure (n_col, own rows) [Pa]
     real(wp), intent(in), contiguous :: pressure(:, :)
     !> Space of the fields, and rows of the window
     type(field_space_t), intent(in) :: space
     integer, intent(in) :: n_row
-    real(wp), allocatable :: near(:, :)
-    logical(lk), allocatable :: touching(:, :)
+    real(wp), allocatable :: near(:, :), shares(:, :)
     real(wp) :: found(1)
     integer :: own(2)
 
     if (space%ranks%size == 1) then
-      rises = rises_in(candidate, pressure)
+      rises = rises_in(share, pressure)
       return
     end if
     own = space%own_rows(n_row)
-    own = [max(own(1) - 1, 1), min(own(2) + 1, n_row)]
-    allocate (near(size(pressure, 1), own(2) - own(1) + 1), touching(size(pressure, 1), own(2) - own(1) + 1))
+    own = [max(own(1) - 2, 1), min(own(2) + 2, n_row)]
+    allocate (near(size(pressure, 1), own(2) - own(1) + 1), shares(size(pressure, 1), own(2) - own(1) + 1))
     call space%fetch(n_row, pressure, own(1), near)
-    call space%fetch(n_row, logical(candidate, lk), own(1), touching)
-    found = merge(1.0_wp, 0.0_wp, rises_in(logical(touching), near))
+    call space%fetch(n_row, share, own(1), shares)
+    found = merge(1.0_wp, 0.0_wp, rises_in(shares, near))
     call space%most(found)
     rises = found(1) > 0.5_wp
   end function rises_to_end
 
   !> Test whether the pressure rises to an end of the surface in some rows.
-  pure logical function rises_in(candidate, pressure) result(rises)
-    logical, intent(in) :: candidate(:, :)
-    real(wp), intent(in) :: pressure(:, :)
+  pure logical function rises_in(share, pressure) result(rises)
+    real(wp), intent(in) :: share(:, :), pressure(:, :)
     integer :: n, m
 
     rises = .false.
-    if (all(candidate)) return
+    if (all(share > 0.0_wp)) return
     n = size(pressure, 1)
     m = size(pressure, 2)
-    associate (touch => candidate, p => pressure)
-      rises = any(rises_beside(touch(3:, :), touch(:n - 2, :), p(3:, :), p(2:n - 1, :), p(:n - 2, :)))
-      if (.not. rises) rises = any(rises_beside(touch(:, 3:), touch(:, :m - 2), p(:, 3:), p(:, 2:m - 1), p(:, :m - 2)))
+    associate (s => share, p => pressure)
+      rises = any(rises_before(s(3:, :), s(2:n - 1, :), s(:n - 2, :), p(2:n - 1, :), p(:n - 2, :))) .or. &
+              any(rises_before(s(:n - 2, :), s(2:n - 1, :), s(3:, :), p(2:n - 1, :), p(3:, :))) .or. &
+              any(rises_before(s(:, 3:), s(:, 2:m - 1), s(:, :m - 2), p(:, 2:m - 1), p(:, :m - 2))) .or. &
+              any(rises_before(s(:, :m - 2), s(:, 2:m - 1), s(:, 3:), p(:, 2:m - 1), p(:, 3:)))
+      if (rises) return
+      rises = any(rises_before(s(4:, :), s(3:n - 1, :), s(2:n - 2, :), p(3:n - 1, :), p(2:n - 2, :), p(:n - 3, :))) .or. &
+              any(rises_before(s(:n - 3, :), s(2:n - 2, :), s(3:n - 1, :), p(2:n - 2, :), p(3:n - 1, :), p(4:, :))) .or. &
+              any(rises_before(s(:, 4:), s(:, 3:m - 1), s(:, 2:m - 2), p(:, 3:m - 1), p(:, 2:m - 2), p(:, :m - 3))) .or. &
+              any(rises_before(s(:, :m - 3), s(:, 2:m - 2), s(:, 3:m - 1), p(:, 2:m - 2), p(:, 3:m - 1), p(:, 4:)))
     end associate
   end function rises_in
 
-  !> Test whether the pressure rises from one neighbor of a node to it, and the other neighbor cannot touch.
-  elemental logical function rises_beside(after_touches, before_touches, after, here, before) result(rises)
-    !> Neighbors that can touch
-    logical, intent(in) :: after_touches, before_touches
-    !> Pressures of a node and its neighbors [Pa]
-    real(wp), intent(in) :: after, here, before
+  !> Test whether the pressure of the last node before an end is larger than that of its neighbor, or with it than that of the next.
+  elemental logical function rises_before(beyond, last_share, here_share, last, here, before) result(rises)
+    !> Parts of a cell that the node beyond the end, the last one and its neighbor bear
+    real(wp), intent(in) :: beyond, last_share, here_share
+    !> Pressures of the last node, of its neighbor and of the next one [Pa]
+    real(wp), intent(in) :: last, here
+    real(wp), intent(in), optional :: before
 
-    rises = (.not. after_touches .and. before > 0.0_wp .and. here > before) .or. &
-            (.not. before_touches .and. after > 0.0_wp .and. here > after)
-  end function rises_beside
+    if (present(before)) then
+      rises = before > 0.0_wp .and. last + here > (last_share + here_share)*before
+    else
+      rises = here > 0.0_wp .and. last > last_share*here
+    end if
+    rises = rises .and. .not. beyond > 0.0_wp .and. last_share > 0.0_wp .and. last > 0.0_wp
+  end function rises_before
 
   !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
   integer function edge_nodes(zone, n_row, space) result(n)

@@ -181,6 +181,8 @@ contains
 
     call check_target(target%control, target%value, settings%tolerance, settings%max_sweeps, error)
     if (allocated(error)) return
+    call solver%problem%check_approach(target, error)
+    if (allocated(error)) return
     call check_rolling(solver%problem, target, error)
     if (allocated(error)) return
     if (settings%max_cuts < 0) then

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array
 from .core.lattice import Lattice
-from .deck.keys import FINENESS, MEANS, Grid, Solver
+from .deck.keys import FINENESS, Grid, Solver
 from .deck.read import Assembled, assemble
+from .deck.series import MEANS
 from .deck.toml import plain, refuse_deep, with_overrides
 from .deck.units import angle_text
 from .errors import DeckError, PlausibilityWarning, warn

@@ -301,11 +301,12 @@ contains
     logical :: rises, rise_in_parts
 
     call measure_contact(lattice, gap, candidate, expected, space, of_all, edges)
-    rises = rises_to_end(candidate, expected%pressure, space, lattice%extent(2))
+    rises = rises_to_end(merge(1.0_wp, 0.0_wp, candidate), expected%pressure, space, lattice%extent(2))
     grown = grown_window(lattice, expected%zone > 0)
     space%ranks = ranks
     call measure_contact(lattice, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), found, space, of_parts, edges)
-    rise_in_parts = rises_to_end(candidate(:, rows(1):rows(2)), found%pressure, space, lattice%extent(2))
+    rise_in_parts = rises_to_end(merge(1.0_wp, 0.0_wp, candidate(:, rows(1):rows(2))), found%pressure, space, &
+                                 lattice%extent(2))
     grown_from_parts = shared_grown_window(lattice, found%zone > 0, space)
     call check(error, [of_parts%contact%area_error, of_parts%mean_gap, of_parts%elastic_energy], &
                [of_all%contact%area_error, of_all%mean_gap, of_all%elastic_energy], 0.0_wp, 'measures of windows that repeat')

@@ -40,6 +40,7 @@ contains
       new_test('three_cosines', test_three_cosines), &
       new_test('two_cosines', test_two_cosines), &
       new_test('mean_gap', test_mean_gap), &
+      new_test('beyond_the_mean_gap', test_beyond), &
       new_test('across_the_end', test_across), &
       new_test('bad_windows', test_bad), &
       new_test('superposition', test_superposition), &
@@ -324,6 +325,32 @@ contains
     call check(error, by_gap%load(1), by_load%load(1), 1.0e-8_wp*by_load%load(1), 'load')
     call check(error, largest(by_gap%pressure - by_load%pressure), 0.0_wp, 1.0e-7_wp*maxval(by_load%pressure), 'pressure')
   end subroutine test_mean_gap
+
+  !> No pressure belongs to an approach beyond the mean gap, and it is refused.
+  subroutine test_beyond(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 32
+    type(lattice_t) :: lattice
+    type(contact_state_t) :: state
+    type(normal_contact_t) :: contact
+    type(error_t), allocatable :: refused
+    real(wp) :: gap(n, n), share
+    logical :: candidate(n, n)
+    integer :: i
+
+    call waves(lattice, gap, error)
+    if (allocated(error)) return
+    gap = gap - minval(gap)
+    candidate = .true.
+    do i = 1, 2
+      share = merge(1.0_wp, 1.8_wp, i == 1)
+      call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
+      if (allocated(error)) return
+      call contact%solve(displacement_control, share*sum(gap)/n**2, 1.0e-8_wp, 100, state, refused)
+      call check_true(error, allocated(refused), 'refused')
+      if (allocated(error)) return
+    end do
+  end subroutine test_beyond
 
   !> A contact across the end of the window is the one in its middle.
   subroutine test_across(error)

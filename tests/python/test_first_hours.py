@@ -343,8 +343,8 @@ def test_a_result_shows_its_warnings_and_where_pictures_are() -> None:
 @pytest.mark.parametrize(
     ("size", "words"),
     [
-        ('diameter = "20 mm"', r'diameter = "20 mm": unknown key; use radius, half the diameter: 0\.01 m'),
-        ("Diameter = 0.02", r"Diameter = 0\.02: unknown key; use radius, half the diameter: 0\.01 m"),
+        ('diameter = "20 mm"', r'diameter = "20 mm": unknown key; use radius, half the diameter: 10 mm'),
+        ("Diameter = 0.02", r"Diameter = 0\.02: unknown key; use radius, half the diameter: 10 mm"),
         ('diameter = "wide"', r'diameter = "wide": unknown key; use radius, half the diameter'),
     ],
 )

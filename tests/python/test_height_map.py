@@ -13,6 +13,7 @@ from hexcontact import Case, DeckError, Lattice
 from hexcontact.deck.height_map import HeightMap
 from hexcontact.problem import plausibility
 from hexcontact.problem.preview import case_rows
+from hexcontact.text import quantity
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 X, Y = (
@@ -124,7 +125,7 @@ def test_a_contact_near_a_hole_is_an_error_with_its_place() -> None:
     assert complaint(on_grid(BALL).where(~EVERYWHERE)).startswith(sentence)
     one = on_grid(BALL)
     one.loc[{"x": X[53]}] = one.sel(x=X[53]).where(one.y != Y[30])  # at 130 um; the contact ends at 109
-    assert complaint(one).startswith(f"{sentence}{X[53]:.4g} m, y = 0 m; fill it")
+    assert complaint(one).startswith(f"{sentence}{quantity(X[53], 'm')}, y = 0 m; fill it")
     doubts = plausibility.warnings(case(on_grid(BALL).where(~EVERYWHERE)))
     assert any("holes of the height map lie near the estimated contact" in doubt for doubt in doubts)
     one = on_grid(BALL)

@@ -451,7 +451,7 @@ def test_a_contact_at_the_end_of_the_map_is_refused(file: Any) -> None:
     quarter = of_file(
         file("quarter.csv", rows_of(BALL[:, 40:])), **{**MATRIX, "extent": ["400 um", "600 um"]}
     )
-    assert "body.1.surface: the lowest point of the map lies at its end, at x = -0.0002 m" in complaint(
+    assert "body.1.surface: the lowest point of the map lies at its end, at x = -200.0 µm" in complaint(
         quarter
     )
 

@@ -7,11 +7,21 @@ import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, ConvergenceError, DeckError, Lattice, open_result, plotting
+from hexcontact import (
+    Case,
+    ConvergenceError,
+    DeckError,
+    FrictionalContact,
+    Lattice,
+    NormalContact,
+    open_result,
+    plotting,
+)
 from hexcontact.analytic.hertz_gap import against_hertz
-from hexcontact.cli.printed import hertz_rows
+from hexcontact.cli.printed import _columns, hertz_rows
 from hexcontact.plotting.report_data import charts_of
 from hexcontact.problem.preview import case_rows
+from hexcontact.result.history_words import step_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 E_STAR = 210e9 / (2 * (1 - 0.3**2))
@@ -49,6 +59,63 @@ def test_loads_by_means_are_arguments_of_a_case() -> None:
     assert waves(nodes=16, mean_gap="0.2 um").deck.load[0].mean_gap == pytest.approx(2e-7)
 
 
+def test_means_in_a_series_are_those_of_segments(tmp_path: Path) -> None:
+    """Also from a file, and as shares of mu P."""
+    pressure = 0.3 * FULL
+    one = waves(
+        nodes=16,
+        friction_coefficient=0.3,
+        loads=[
+            {"mean_pressure": pressure},
+            {"mean_pressure": pressure, "mean_traction_x": "0.5 mu P"},
+            {"mean_gap": 1e-7, "mean_traction_x": 0.15 * pressure},
+        ],
+    )
+    arrays = {
+        "mean_pressure": [pressure, pressure, ""],
+        "mean_gap": ["", "", 1e-7],
+        "mean_traction_x": [0.0, 0.15 * pressure, 0.15 * pressure],
+    }
+    series = waves(nodes=16, friction_coefficient=0.3, loads=[{"series": arrays}])
+    rows = zip(*arrays.values(), strict=True)
+    text = "mean_pressure [Pa],mean_gap [m],mean_traction_x [Pa]\n" + "\n".join(
+        ",".join(map(str, r)) for r in rows
+    )
+    (tmp_path / "means.csv").write_text(text)
+    read = waves(
+        nodes=16, friction_coefficient=0.3, loads=[{"series": {"file": str(tmp_path / "means.csv")}}]
+    )
+    assert read.deck == series.deck
+    expected = one.run()
+    assert float(expected.dataset.tangential_load_x[1]) == pytest.approx(0.15 * pressure * WAVE**2, rel=1e-9)
+    for name in ("approach", "normal_load", "tangential_load_x", "dissipated_energy"):
+        np.testing.assert_allclose(series.run().dataset[name], expected.dataset[name], rtol=1e-9)
+
+
+def test_no_radius_stands_for_a_contact_that_is_no_disc() -> None:
+    """In a window that repeats the share of its area, in a long contact the stick area."""
+    strips = (
+        waves(nodes=16, expression=f"{HEIGHT}*(1 - cos(2*pi*x/{WAVE}))", mean_pressure=2e7)
+        .run()
+        .history.iloc[-1]
+        .to_dict()
+    )
+    columns = _columns([strips], with_errors=False)
+    assert "contact area" in columns
+    assert "radius" not in columns
+    assert columns["contact area"](strips).endswith("% of the window")
+    long = {"shape": "paraboloid", "radius_x": "100 mm", "radius_y": "1 mm"}
+    loads = [{"normal_load": 10.0}, {"tangential_load_x": 1.0}]
+    bodies = {"body_1": {**STEEL, "surface": long}, "body_2": STEEL}
+    sheared = (
+        Case(**bodies, spacing="auto", friction_coefficient=0.3, loads=loads).run().history.iloc[-1].to_dict()
+    )
+    rows = dict(step_rows(sheared))
+    assert "contact half-axes" in rows
+    assert "stick area" in rows
+    assert "stick radius" not in rows
+
+
 def test_two_spacings_need_no_lattice() -> None:
     """Cells of a window that repeats are rectangles."""
     lattice = waves(nodes=None, spacing=["25 um", "50 um"], mean_pressure=1e8).lattice
@@ -63,6 +130,24 @@ def test_no_approach_closes_more_than_the_mean_gap() -> None:
             DeckError, match="approach = .*expected mean_pressure, or less than 1.000 µm, at which"
         ):
             waves(approach=approach)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.002, 2.0])
+def test_solvers_refuse_an_approach_beyond_the_mean_gap(share: float) -> None:
+    """They reported convergence under a pressure without bound, over which the residual is taken."""
+    case = waves(nodes=16, mean_pressure=1e8)
+    gap, approach = case.initial_gap(case.lattice)[0], share * HEIGHT
+    expected = "the approach: less than the mean gap expected in a window that repeats"
+    pressed = NormalContact(case.lattice, case.pair, gap)
+    assert pressed.solve(approach=0.9 * HEIGHT).converged
+    with pytest.raises(DeckError, match=expected):
+        pressed.solve(approach=approach)
+    sheared = FrictionalContact(case.lattice, case.pair, gap, friction_coefficient=0.3)
+    controls = ["displacement", "force", "force", "displacement"]
+    with pytest.raises(DeckError, match=expected):
+        sheared.advance(sheared.virgin(), controls, [approach, 0.0, 0.0, 0.0])
+    layer = NormalContact(case.lattice, case.pair, gap, interface=(1e14, 1.0, 0.0))
+    assert layer.solve(approach=approach).converged
 
 
 @pytest.mark.parametrize("rows", [1, 4, 8])
@@ -399,6 +484,18 @@ BAD = {
     "none": (
         {"loads": {"mean_pressure": 0}},
         r"load\.1\.mean_pressure = 0.*: expected a mean pressure above",
+    ),
+    "series": (
+        {"loads": [{"series": {"mean_pressure": [1e6, 2e6], "approach": ["", 1e-7]}}]},
+        "series.mean_pressure = .*: expected approach or mean_pressure in each row, not both .entry 2.",
+    ),
+    "share": (
+        {"friction_coefficient": 0.3, "loads": [{"mean_gap": "0.2 um", "mean_traction_x": "0.2 mu P"}]},
+        "mean_traction_x = .0.2 mu P.: expected pascals, since the approach is given",
+    ),
+    "series without a period": (
+        {"boundary": None, "loads": [{"series": {"mean_pressure": [1e6, 2e6]}}]},
+        "expected a window that repeats",
     ),
     "seam": ({"expression": "1e-6*(1 - cos(6*x/1e-3 + 1))"}, "grid.boundary .*: the gap does not repeat"),
     "punch": (

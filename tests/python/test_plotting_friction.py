@@ -1055,3 +1055,12 @@ def test_what_was_not_kept_is_said() -> None:
 def test_title_names_the_loads() -> None:
     assert StepView(cattaneo(), 3).title == "Made up, step 3 ($P$ = 800 mN, $Q_x$ = 120 mN)"
     assert "$M_z$ = " in StepView(torsion(), 3).title
+    untitled = cattaneo().isel(step=[1]).assign_attrs(title="")
+    assert StepView(untitled, -1).title.startswith("$P$ = 800 mN, $Q_x$ = ")
+
+
+def test_overview_shows_the_approach_beside_an_unbounded_pressure() -> None:
+    ended = cattaneo()
+    ended["max_pressure"] = ended["max_pressure"] * np.inf
+    *_, last = drawn.visible(plotting.overview(ended, 3))
+    assert last.get_ylabel().startswith("approach")

@@ -44,6 +44,31 @@ ODD_WAVES = ODD_WAVES.replace(
 REFINED = PRESSED.replace("nodes_in_radius = 20\nwindow = [261, 300]", "nodes_in_radius = 52") + (
     "\n[accuracy]\ntarget = 0.05\nmax_nodes = 100_000\n"
 )
+# The last nodes bear more than a cell; on a chamfer they can touch, and its corner is an end.
+ROLLER = """
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+[body.1.surface]
+shape = "roller"
+radius = "5 mm"
+length = "2 mm"
+angle = "90 deg"
+profile = "logarithmic"
+design_load = "14.5 N"
+[body.2]
+rigid = true
+[grid]
+spacing = "2.01 um"
+cell_ratio = 2
+cell_angle = "90 deg"
+window = [515, 150]
+[[load]]
+normal_load = "10 N"
+[[load]]
+normal_load = "20 N"
+"""
+CHAMFER = ROLLER.replace('"logarithmic"\ndesign_load = "14.5 N"', '"chamfer"\nchamfer = "0.2 mm"')
 with_mpi = pytest.mark.skipif("MPI: yes" not in flat.BUILT, reason="this build has no MPI")
 
 
@@ -99,7 +124,8 @@ def launched(
 
 @with_mpi
 @pytest.mark.parametrize(
-    ("ranks", "deck"), [(2, PRESSED), (3, PRESSED), (2, WAVES), (3, ODD_WAVES), (2, REFINED)]
+    ("ranks", "deck"),
+    [(2, PRESSED), (3, PRESSED), (2, WAVES), (3, ODD_WAVES), (2, REFINED), (3, ROLLER), (2, CHAMFER)],
 )
 def test_several_processes_write_the_file_of_one(ranks: int, deck: str, tmp_path: Path) -> None:
     (tmp_path / "sphere.toml").write_text(deck)

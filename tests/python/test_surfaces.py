@@ -315,6 +315,19 @@ def test_the_plane_contact_stands_beside_a_roller(tmp_path: Path) -> None:
     assert math.isinf(entry.computed)  # contact reaches the ends
 
 
+@pytest.mark.parametrize("number", ["1", "2"])
+@pytest.mark.parametrize(
+    "parts", [[Dent(depth=5e-6, radius=5e-5)], [Sphere(radius=9e-3), Ellipsoid(radius_x=-8e-3, radius_y=1e6)]]
+)
+def test_a_contact_without_end_blames_the_surface(parts: list[Surface], number: str) -> None:
+    """A dent leaves the plane about it, and a ball no groove that is sharper."""
+    bodies = {"body_1": STEEL, "body_2": STEEL} | {f"body_{number}": {**STEEL, "surface": parts}}
+    with pytest.raises(
+        DeckError, match=rf"^body\.{number}\.surface: the contact has no end; expected a shape"
+    ):
+        Case(**bodies, spacing=1e-5, normal_load=10.0)
+
+
 def test_a_profile_by_moduli_needs_them() -> None:
     with pytest.raises(DeckError, match="design_load: its profile follows from the moduli of the bodies"):
         Roller(radius=1.0, length=2.0, profile="logarithmic", design_load=1.0).height(0.0, 0.0)
@@ -372,6 +385,26 @@ def test_a_logarithmic_roller_is_loaded_evenly_at_its_design_load() -> None:
     assert abs(carried[abs(y) < 0.95 * half_length] - 1.0).max() < 0.01
     middle = last["pressure"].values[len(y) // 2].max()
     assert middle == pytest.approx(2 * by_length / (math.pi * half_width), rel=3e-3)
+
+
+# A node lies on the end at 8 um along the axis, and at 4 and 2 um; none does on the others.
+@pytest.mark.parametrize(
+    ("spacing", "ratio"),
+    [(2e-6, 4.0), (2.005e-6, 4.0), (2.01e-6, 4.0), (2e-6, 2.0), (2e-6, 1.0), (2.003e-6, 1.0)],
+)
+@pytest.mark.parametrize("share", [0.6, 0.75, 1.1, 1.25])
+def test_the_end_of_a_logarithmic_roller_is_unbounded_from_its_design_load_on(
+    share: float, spacing: float, ratio: float
+) -> None:
+    """Below it contact ends before the roller, on 1 um as well; p_max there is that of 1 um."""
+    roller = Roller(radius=5e-3, length=2e-3, angle="90 deg", profile="logarithmic", design_load=20.0)
+    lattice = {"spacing": spacing, "cell_ratio": ratio, "cell_angle": "90 deg"}
+    case = Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, **lattice, normal_load=20.0 * share)
+    found = float(case.run().max_pressure[-1])
+    if share > 1.0:
+        assert math.isinf(found)
+    else:
+        assert found == pytest.approx({0.6: 215.76e6, 0.75: 238.14e6}[share], rel=2e-3)
 
 
 # --- two surfaces ------------------------------------------------------------------------------------------

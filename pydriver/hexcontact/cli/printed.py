@@ -200,7 +200,9 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
         columns["stick"] = column(words.stick_share, "stick_area")
     else:
         columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
-        if any(half_axes(history) for history in histories):
+        if any(words.repeats(history) for history in histories):
+            columns["contact area"] = lambda h: words.contact_size(h)[1]
+        elif any(half_axes(history) for history in histories):
             columns["half-axes"] = lambda h: words.contact_size(h)[1]
         else:
             columns["radius"] = column(

@@ -24,6 +24,10 @@ class Field(Protocol):
         """Return the values at the nodes of a window."""
         ...
 
+    def share(self, touching: Mask, lattice: Lattice) -> Array:
+        """Return the part of a cell that each node bears at ends of surfaces."""
+        ...
+
 
 class Part(Handle):
     """The rows of this rank of a contact."""
@@ -35,7 +39,7 @@ class Part(Handle):
         with ranks.agreed():
             values = gap.over(self.own)
             self.touching: Mask = np.isfinite(values)
-            self.gap = np.where(self.touching, values, 0.0)
+            self.gap, self.share = np.where(self.touching, values, 0.0), gap.share
         self._create(flat.create_pressed_part, lattice, pair, self.gap, self.touching, interface, threads)
 
     def rows(self, values: NDArray[Any]) -> Array:
@@ -70,7 +74,10 @@ def _press(number: int, solution: int, *arguments: Any) -> Any:
 def _measure(number: int, solution: int) -> tuple[Any, bool]:
     """Return the measures of a solution, and whether its pressure rises to an end of the surface."""
     part = ranks.held[number]
-    found: tuple[Any, bool] = flat.measure_part(part.lattice, part.gap, part.touching, ranks.held[solution])
+    share = part.share(part.touching, part.own)
+    found: tuple[Any, bool] = flat.measure_part(
+        part.lattice, part.gap, part.touching, share, ranks.held[solution]
+    )
     return found
 
 

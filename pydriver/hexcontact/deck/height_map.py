@@ -176,7 +176,7 @@ class HeightMap:
                 f"inside; {turned}"
             )
         return (
-            f"the lowest point of the map lies at its end, at {_place(*self.first_touch)}, so that the data "
+            f"the lowest point of the map lies at its end, at {place(*self.first_touch)}, so that the data "
             "do not bound the contact; expected heights of a larger part, or center where the contact lies"
         )
 
@@ -201,7 +201,7 @@ class HeightMap:
         row, col = (index[apart.argmin()] for index in hole)
         return (
             f"comes within {_BESIDE_HOLE} points of a hole of the height map, at "
-            f"{_place(self.x[row], self.y[col])}; fill it, as by gap.interpolate_na, or set it to inf if "
+            f"{place(self.x[row], self.y[col])}; fill it, as by gap.interpolate_na, or set it to inf if "
             "nothing can touch there"
         )
 
@@ -312,8 +312,9 @@ def _is_at_end(values: Array) -> bool:
     return not np.isfinite(inner).any() or bool(np.nanmin(values) < np.nanmin(inner))
 
 
-def _place(x: float, y: float) -> str:
-    return f"x = {x:.4g} m, y = {y:.4g} m"
+def place(x: float, y: float) -> str:
+    """Return a point (m) in words."""
+    return f"x = {quantity(x, 'm')}, y = {quantity(y, 'm')}"
 
 
 def in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:

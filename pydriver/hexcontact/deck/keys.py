@@ -38,7 +38,7 @@ from .kinds import (
     refuse,
 )
 from .separation import Separation
-from .series import DRIVEN, MOST_STEPS, Series
+from .series import COLUMNS, CONTROLS, MEANS, MOST_STEPS, Series
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .table_base import Table, extended, meaning, problems_of
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, SPIN, Dimension
@@ -50,13 +50,6 @@ FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
 BOUNDARIES = ("free", "periodic")
 LATTICES = ("equilateral", "rectangular")
 AUTO_SPACINGS = 20.0  # in the contact radius, where the spacing is "auto"
-# Loads of a window that repeats, and the load or motion that each of them is.
-MEANS = {
-    "mean_pressure": "normal_load",
-    "mean_gap": "approach",
-    "mean_traction_x": "tangential_load_x",
-    "mean_traction_y": "tangential_load_y",
-}
 
 YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
@@ -343,7 +336,7 @@ class Fractions(Several):
 
 
 def _annotation(name: str, kind: Quantity) -> Any:
-    if name.startswith("tangential_load"):
+    if name.startswith(("tangential_load", "mean_traction")):
         return Annotated[float | Share, OrShare(kind)] | None
     return Annotated[float, kind] | None
 
@@ -352,7 +345,7 @@ _Driven: Any = extended(
     Table,
     {
         name: (_annotation(name, load.kind), meaning(None, load.of_segment, load.example))
-        for name, load in DRIVEN.items()
+        for name, load in COLUMNS.items()
     },
 )
 
@@ -401,18 +394,6 @@ class Segment(_Driven):
         ]
     }
 
-    mean_pressure: Annotated[float, Quantity(PRESSURE, at_least=0)] | None = meaning(
-        None, "normal load over the area of a window that repeats, instead of normal_load"
-    )
-    mean_gap: Annotated[float, Quantity(LENGTH, above=0)] | None = meaning(
-        None, "mean of the gap over a window that repeats, instead of normal_load", '"0.2 um"'
-    )
-    mean_traction_x: Annotated[float, Quantity(PRESSURE)] | None = meaning(
-        None, "tangential load along x over the area of a window that repeats"
-    )
-    mean_traction_y: Annotated[float, Quantity(PRESSURE)] | None = meaning(
-        None, "tangential load along y over the area of a window that repeats"
-    )
     steps: Annotated[int | str, WordOr("auto", Whole(1, MOST_STEPS))] | None = meaning(
         None,
         "number of load steps; auto: chosen by `solver.step_tolerance`; "
@@ -453,13 +434,11 @@ class Segment(_Driven):
         known = cls.known_keys()
         # an unknown key may be that of the load
         if not whole and not any(
-            key in DRIVEN or key in MEANS or key in _ROLLING or (key not in known and not cls.meant(key))
-            for key in data
+            key in COLUMNS or key in _ROLLING or (key not in known and not cls.meant(key)) for key in data
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
-        for force, displacement in LOADS.values():
-            meant = [name for name, load in MEANS.items() if load in (force, displacement)]
-            found = [key for key in (force, displacement, *meant) if key in data]
+        for names in CONTROLS:
+            found = [key for key in names if key in data]
             if found[1:]:
                 yield found[1], f"expected {found[0]} or {found[1]}, not both"
         yield from _rolling_conflicts(data)

@@ -262,12 +262,12 @@ class Share:
 
 
 class OrShare(Kind):
-    """A force, or a share of the limit of friction."""
+    """A force or pressure, or a share of the limit of friction."""
 
     def __init__(self, kind: Quantity) -> None:
         measured, self.kind = kind.dimension, kind
         self.expected = f'{measured.name}, or a share of mu P, such as {measured.example} or "0.6 mu P"'
-        self.schema = kind.schema | {"examples": ["10 N", "0.6 mu P"]}
+        self.schema = kind.schema | {"examples": [measured.example.strip('"'), "0.6 mu P"]}
 
     def written(self, value: float | Share) -> float | str:
         """Return newtons, or the share as text."""

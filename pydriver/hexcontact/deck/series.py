@@ -79,6 +79,47 @@ DRIVEN: dict[str, Driven] = {
 }
 """The loads and motions by key."""
 
+_PRESSURES = '["1 MPa", "2 MPa"]'
+MEAN_LOADS: dict[str, Driven] = {
+    "mean_pressure": Driven(
+        Quantity(PRESSURE, at_least=0),
+        "normal load over the area of a window that repeats, instead of normal_load",
+        "mean pressure of each row",
+        '"p [MPa]"',
+        _PRESSURES,
+    ),
+    "mean_gap": Driven(
+        Quantity(LENGTH, above=0),
+        "mean of the gap over a window that repeats, instead of normal_load",
+        "mean gap of each row",
+        '"gap [um]"',
+        _LENGTHS,
+        '"0.2 um"',
+    ),
+    **{
+        f"mean_traction_{axis}": Driven(
+            Quantity(PRESSURE),
+            f"tangential load along {axis} over the area of a window that repeats",
+            f"mean traction along {axis} of each row",
+            f'"q{axis} [MPa]"',
+            _PRESSURES,
+            '"20 MPa"',
+        )
+        for axis in "xy"
+    },
+}
+"""The loads of a window that repeats."""
+MEANS = {
+    "mean_pressure": "normal_load",
+    "mean_gap": "approach",
+    "mean_traction_x": "tangential_load_x",
+    "mean_traction_y": "tangential_load_y",
+}
+"""The load or motion that each of them is."""
+COLUMNS = DRIVEN | MEAN_LOADS
+CONTROLS = [(*pair, *(mean for mean, load in MEANS.items() if load in pair)) for pair in LOADS.values()]
+"""The keys of each motion, of which a segment or row has one."""
+
 _IGNORED = ("time", "step")  # columns of files that are no deck keys
 _MOST_SENTENCES = 10
 _LONGEST_LABEL = 1000  # characters
@@ -117,7 +158,7 @@ _Headers: Any = extended(
     Table,
     {
         name: (_Header, meaning(None, f"header of the column of {name}", load.header))
-        for name, load in DRIVEN.items()
+        for name, load in COLUMNS.items()
     },
 )
 
@@ -143,7 +184,7 @@ def _rows(load: Driven) -> Any:
 
 
 _Rows: Any = extended(
-    _File, {name: (_rows(load), meaning(None, load.of_row)) for name, load in DRIVEN.items()}
+    _File, {name: (_rows(load), meaning(None, load.of_row)) for name, load in COLUMNS.items()}
 )
 
 
@@ -158,15 +199,15 @@ class Series(_Rows):
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Require arrays of one length, one control of each motion in a row, and a file without arrays."""
         data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
-        arrays = {key: data[key] for key in (*DRIVEN, "label") if isinstance(data.get(key), list | tuple)}
+        arrays = {key: data[key] for key in (*COLUMNS, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
-            for key in (*DRIVEN, "label"):
+            for key in (*COLUMNS, "label"):
                 if key in data:
                     yield key, "expected in the file, not beside it"
             return
         if "columns" in data:
             yield "columns", "needs a file"
-        if not any(key in data for key in DRIVEN):
+        if not any(key in data for key in COLUMNS):
             yield "", "expected a file, or arrays such as normal_load = [10, 20, 30]"
         for key, array in arrays.items():
             if len(array) != (count := len(next(iter(arrays.values())))):
@@ -178,36 +219,34 @@ class Series(_Rows):
     @property
     def count(self) -> int:
         """Number of rows."""
-        return len(next(filled for key in DRIVEN if (filled := getattr(self, key)) is not None))
+        return len(next(filled for key in COLUMNS if (filled := getattr(self, key)) is not None))
 
     @property
     def missing(self) -> dict[str, int]:
         """Number of rows without a value of each load or motion that other rows have."""
-        arrays = {key: array for key in DRIVEN if (array := getattr(self, key)) is not None}
-        other = {one: two for pair in LOADS.values() for one, two in (pair, pair[::-1])}
-        counts = {
-            key: sum(
-                a is None and b is None
-                for a, b in zip(array, arrays.get(other.get(key, ""), array), strict=True)
-            )
-            for key, array in arrays.items()
-        }
+        arrays = {key: array for key in COLUMNS if (array := getattr(self, key)) is not None}
+        counts = {}
+        for key in arrays:
+            others = next((names for names in CONTROLS if key in names), (key,))
+            columns = [arrays[name] for name in others if name in arrays]
+            counts[key] = sum(all(entry is None for entry in row) for row in zip(*columns, strict=True))
         return {key: count for key, count in counts.items() if count}
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the values of each row, in SI, and its label."""
-        named = {key: array for key in (*DRIVEN, "label") if (array := getattr(self, key)) is not None}
+        named = {key: array for key in (*COLUMNS, "label") if (array := getattr(self, key)) is not None}
         for row in zip(*named.values(), strict=True):
             yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
 
 
 def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:
-    """Yield the first row in which force and displacement of a motion are both given, for each motion."""
-    for force, displacement in LOADS.values():
-        both = zip(arrays.get(force, ()), arrays.get(displacement, ()), strict=False)
-        for row, (one, other) in enumerate(both):
-            if one not in ("", None) and other not in ("", None):
-                yield row, force, displacement
+    """Yield the first row with two controls of a motion, and their keys, for each motion."""
+    for names in CONTROLS:
+        known = [name for name in names if name in arrays]
+        for row, entries in enumerate(zip(*(arrays[name] for name in known), strict=False)):
+            given = [name for name, entry in zip(known, entries, strict=True) if entry not in ("", None)]
+            if given[1:]:
+                yield row, given[0], given[1]
                 break
 
 
@@ -234,7 +273,7 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
         series[key] = []
         try:  # once instead of in each row
             if key != "label" and column.unit:
-                DRIVEN[key].kind.parse(f"1 {column.unit}")
+                COLUMNS[key].kind.parse(f"1 {column.unit}")
         except PydanticCustomError as error:
             problems.append(f"{path}, column {shown(column.header)}: {error.message()}")
             continue
@@ -279,7 +318,7 @@ def _value(key: str, cell: Any, unit: str) -> Any:
             refuse(f"expected a number without a unit, since the header has the unit [{unit}]")
         else:
             unit = ""  # it has its own
-    return DRIVEN[key].kind.written(DRIVEN[key].kind.parse(f"{cell} {unit}" if unit else cell))
+    return COLUMNS[key].kind.written(COLUMNS[key].kind.parse(f"{cell} {unit}" if unit else cell))
 
 
 def _number(text: str) -> float | None:
@@ -291,7 +330,7 @@ def _number(text: str) -> float | None:
 
 def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None) -> dict[str, _Column]:
     """Return the column of each key."""
-    keys, problems = (*DRIVEN, "label"), []
+    keys, problems = (*COLUMNS, "label"), []
     chosen: dict[str, _Column] = {}
     meant = {folded(key): key for key in keys}
     headers = [column.header for column in found]
@@ -324,7 +363,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
                 units = f"in {column.unit}, not in {unit} as in columns"
                 problems.append(f"{path}: column {shown(name)} is {units}")
             chosen[key] = _Column(column.header, unit or column.unit, column.cells)
-    if not problems and not any(key in DRIVEN for key in chosen):
+    if not problems and not any(key in COLUMNS for key in chosen):
         problems.append(f"{path}: expected a column of loads or motions, such as normal_load [N]")
     if not problems and not found[0].cells:
         problems.append(f"{path}: expected at least one row below the headers")
@@ -438,7 +477,7 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
                 )
             }
             longest = max(lengths.values(), default=0)
-            count = next((lengths[key] for key in DRIVEN if key in lengths), longest)
+            count = next((lengths[key] for key in COLUMNS if key in lengths), longest)
             _refuse_many(path, count)
             columns = []
             for name in (name for name, length in lengths.items() if length == count):

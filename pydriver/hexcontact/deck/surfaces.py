@@ -79,6 +79,7 @@ else:
 _SAME_FORM = 1e-10  # rounding errors of a quadratic form, as a share of its largest coefficient
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
+_LAST = 1.0 - 1e-9  # nodes less than a spacing from an end are the last ones
 _WHOLE = 1e-6  # rounding of the number of waves in a period
 
 
@@ -504,11 +505,18 @@ class Roller(Surface):
         half_width = math.sqrt(4.0 * by_length * self.radius / (math.pi * modulus))
         return half_width, 2.0 * by_length / (math.pi * half_width)
 
-    def chamfered(self, x: ArrayLike, y: ArrayLike) -> Mask:
-        """Return which points of the plane lie on the chamfers, whose corner is an end for the pressure."""
-        (a, b), _ = _axes(self.angle)
-        along = np.abs(a * (np.asarray(x) - self.offset[0]) + b * (np.asarray(y) - self.offset[1]))
-        return np.asarray(along > (self.length / 2 - (self.chamfer or 0.0)) * _RIM)
+    def share(self, x: Array, y: Array, basis: Array) -> Array:
+        """Return the part of a cell of a lattice basis that each node bears: 1 but for the last ones.
+
+        The last node before an end bears the length up to it; one on a chamfer none, its corner is an end.
+        """
+        axis, _ = _axes(self.angle)
+        center = np.asarray(self.offset, float)
+        left = 0.5 * self.length - np.abs(axis[0] * (x - center[0]) + axis[1] * (y - center[1]))
+        if self.chamfer:
+            return np.where(left >= self.chamfer - self.length / 2 * (_RIM - 1.0), 1.0, 0.0)
+        cells = left / np.abs(basis @ axis).max()
+        return np.where(cells < _LAST, np.maximum(cells, 0.0) + 0.5, 1.0)
 
     def beside(self, modulus: float) -> Surface:
         """Return the roller with the logarithmic profile of the modulus."""

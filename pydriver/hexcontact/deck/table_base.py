@@ -18,7 +18,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from ..text import folded, listed, nearest
 from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .kinds import Kind, Schema
-from .units import LENGTH, UnitError, to_si
+from .units import LENGTH, UnitError, readable, to_si
 
 
 def meaning(default: Any, words: str, example: str = "") -> Any:
@@ -196,7 +196,7 @@ class Table(BaseModel):
             if folded(word).startswith("diameter") and (radius := cls.meant(word)):
                 sentence = f"unknown key; use {radius}, half the diameter"
                 with contextlib.suppress(UnitError):
-                    sentence += f": {to_si(value, LENGTH) / 2.0:.12g} m"
+                    sentence += f": {readable(to_si(value, LENGTH) / 2.0, 12)}"
                 return Mistake(key, value, sentence)
             near = cls.meant(word)
             hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"

@@ -203,12 +203,12 @@ _NAMED_UNITS = {
 }
 
 
-def readable(length: float) -> str:
-    """Return a length (m) with three digits in a suitable unit, for messages: "0.182 mm"."""
+def readable(length: float, digits: int = 3) -> str:
+    """Return a length (m) in a suitable unit, for messages: "0.182 mm"."""
     for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "um")):
         if abs(length) >= 0.1 * 10.0**exponent:
-            return f"{length * 10.0**-exponent:.3g} {unit}"
-    return f"{length * 1e9:.3g} nm"
+            return f"{length * 10.0**-exponent:.{digits}g} {unit}"
+    return f"{length * 1e9:.{digits}g} nm"
 
 
 @functools.cache

@@ -152,7 +152,7 @@ class Part:
             scale_units="xy",
             scale=longest / (0.95 * min(along * view.spacing, min(sides) or max(sides)) * self.factor),
             pivot="mid",
-            width=0.0045,
+            width=0.0045 if self.aspect < 2.0 else 0.0025 * self.aspect,  # of the width of the axes
             color=color,
             edgecolor="white" if color == "black" else "black",
             linewidth=0.3,

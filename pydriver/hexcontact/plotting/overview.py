@@ -69,7 +69,8 @@ def _frictional(dataset: Dataset, view: StepView) -> Figure:
     draw_shear(below[0] if several else below, view, exact, Cut.of([view], 0.0, None))
     if several:
         draw_history(below[1], dataset, fitted(dataset, ("contact_area", "stick_area")))
-        draw_history(below[2], dataset, ("max_pressure",))
+        bounded = bool(np.isfinite(dataset["max_pressure"]).all())  # not at the end of a roller
+        draw_history(below[2], dataset, ("max_pressure" if bounded else "approach",))
         for axes in below[1:]:
             axes.axvline(view.number, color="0.8", lw=3.0, zorder=0)
     return canvas

@@ -100,7 +100,8 @@ def titled(words: str, unit: str) -> str:
 
 def legend_below(axes: Axes, **options: Any) -> None:
     """Draw a legend below the label of the x axis, for axes of any height."""
-    down = ScaledTranslation(0.0, -0.42, axes.figure.dpi_scale_trans)
+    lines = 1 + axes.get_xlabel().count("\n")
+    down = ScaledTranslation(0.0, -0.26 - 0.16 * lines, axes.figure.dpi_scale_trans)
     below = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down}
     axes.legend(loc="upper center", **below, **options)
 

@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 from ..core.lattice import Lattice
 from ..deck import keys as deck_keys
 from ..deck.interface import Interface
-from ..deck.series import DRIVEN
+from ..deck.series import COLUMNS
 from ..deck.surfaces import Surface
 from ..deck.table_base import SYMBOLS, Argument, Table, not_included
 from ..deck.toml import plain
@@ -90,7 +90,7 @@ def with_radians(value: Any, key: str = "") -> Any:
     if isinstance(value, dict):
         return {name: with_radians(entry, name) for name, entry in value.items()}
     if isinstance(value, list):
-        return [with_radians("" if key in DRIVEN and entry != entry else entry, key) for entry in value]
+        return [with_radians("" if key in COLUMNS and entry != entry else entry, key) for entry in value]
     bare = key == "twist" and isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value!r} rad" if bare else value
 

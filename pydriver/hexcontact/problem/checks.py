@@ -10,10 +10,10 @@ from ..core.lattice import Lattice
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
-from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
+from ..deck.keys import Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
-from ..deck.series import MOST_STEPS
+from ..deck.series import MEANS, MOST_STEPS
 from ..errors import DeckError
 from ..text import did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
@@ -128,7 +128,8 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep], perio
     if not tables["grid"].periodic:
         for place, load in enumerate(tables["load"]):
             for name in MEANS:
-                if any(getattr(part, name) is not None for part in (load, *(load.path or ()))):
+                parts = load, *(load.path or ()), *([load.series] if load.series else [])
+                if any(getattr(part, name) is not None for part in parts):
                     yield ("load", place, name), 'expected a window that repeats: grid.boundary = "periodic"'
         return
     whole = "beside a window that repeats"

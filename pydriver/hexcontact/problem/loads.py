@@ -13,9 +13,9 @@ from itertools import takewhile
 from typing import Any, Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
-from ..deck.keys import MEANS, Bulk, Load, Segment
+from ..deck.keys import Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
-from ..deck.series import MOST_STEPS
+from ..deck.series import MEANS, MOST_STEPS
 from ..text import quantity
 from ..variables import BULK_STRESS, LOADS, ROLLED
 
@@ -145,11 +145,15 @@ class Period(NamedTuple):
     area: float  # m^2
     mean_height: float  # mean of the gap before loading (m)
 
-    def driven(self, segment: Segment) -> dict[str, float]:
+    def driven(self, segment: Segment) -> dict[str, float | Share]:
         """Return the loads (N) and the approach (m) of the means of a segment."""
         given = {name: getattr(segment, name) for name in MEANS}
         return {
-            MEANS[name]: self.mean_height - value if name == "mean_gap" else value * self.area
+            MEANS[name]: self.mean_height - value
+            if name == "mean_gap"
+            else value
+            if isinstance(value, Share)  # of mu P, in newtons or pascals
+            else value * self.area
             for name, value in given.items()
             if value is not None
         }
@@ -265,22 +269,24 @@ class History:
         """Return a segment with its shares of mu P at its end as forces."""
         forces = {}
         for name, value in segment:
-            if isinstance(value, Share):
+            if isinstance(value, Share) and name not in MEANS:
+                mean = next((mean for mean in MEANS if getattr(segment, mean) is value), "")
+                units = "pascals" if mean else "newtons"
                 unknown = (
                     f"expected nothing, {_FRICTION}"
                     if self._mu is None
-                    else "expected newtons, since friction.coefficient is inf"
+                    else f"expected {units}, since friction.coefficient is inf"
                     if math.isinf(self._mu)
-                    else "expected newtons, since friction varies or has a bound, so that mu P is no number"
+                    else f"expected {units}, since friction varies or has a bound, so that mu P is no number"
                     if math.isnan(self._mu)
-                    else "expected newtons, since the approach is given and not the normal load"
+                    else f"expected {units}, since the approach is given and not the normal load"
                     if normal.control != "force"
                     else "expected 0, since the normal load at the end of this segment is 0"
                     if value.share and not normal.value
                     else ""
                 )
                 if unknown:
-                    self._complain(Mistake((*key, name), str(value), unknown))
+                    self._complain(Mistake((*key, mean or name), str(value), unknown))
                 forces[name] = 0.0 if unknown else value.share * (self._mu or 0.0) * normal.value
         return segment.model_copy(update=forces) if forces else segment
 

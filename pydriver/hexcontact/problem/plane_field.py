@@ -13,10 +13,11 @@ from ..arrays import Array, Mask, has_entries, reals
 from ..core.contact import shaped
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
-from ..deck.height_map import HeightMap, Placed, in_si
+from ..deck.height_map import HeightMap, Placed, in_si, place
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
 from ..deck.map_file import MOST_POINTS
 from ..deck.separation import Separation
+from ..deck.surfaces import Roller
 from ..deck.units import LENGTH, NUMBER, Dimension
 from ..errors import DeckError
 from ..text import listed
@@ -77,7 +78,7 @@ class PlaneField:
 
     `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
     the map, if it is one; `maps`: those of measured surfaces, or itself; `heights`: those (m) of both
-    surfaces, none if only their sum is known.
+    surfaces, none if only their sum is known; `rollers`: those among its shapes, which the problem sets.
     """
 
     def __init__(self, source: FieldSource, rule: Rule) -> None:
@@ -86,6 +87,7 @@ class PlaneField:
         self.map = source if isinstance(source, HeightMap) else None
         self.maps: tuple[Placed, ...] = (Placed(rule.key, self.map),) if self.map else ()
         self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
+        self.rollers: list[Roller] = []
         if isinstance(source, Separation):
             self.maps = source.placed
             self.heights = source.surface_1.height, source.surface_2.height
@@ -137,6 +139,13 @@ class PlaneField:
         ours = self.at_nodes or self.map or not self.given
         return values if ours else values.copy()  # a function may keep, and change, its result
 
+    def share(self, touching: Mask, lattice: Lattice) -> Array:
+        """Return the part of a cell that each node bears at ends of surfaces; 0 where nothing can touch."""
+        share = touching.astype(float)
+        for roller in self.rollers:
+            share *= roller.share(lattice.x, lattice.y, lattice.basis)
+        return share
+
     def repeats(self, lattice: Lattice, values: Array) -> bool:
         """Test whether a function has the same values one window further, along both directions."""
         if self.at_nodes or self.maps or not np.isfinite(values).all():
@@ -155,7 +164,7 @@ class PlaneField:
         """Refuse values at the first of some points."""
         if not bad.any():
             return
-        value, where = values[bad][0], f"x = {x[bad][0]:.4g} m, y = {y[bad][0]:.4g} m"
+        value, where = values[bad][0], place(x[bad][0], y[bad][0])
         if self.map and np.isinf(value):
             raise DeckError(f"{self.rule.key}: the map does not cover the window: it has no value at {where}")
         shown = "NaN" if np.isnan(value) else f"{value:g}"

@@ -132,10 +132,10 @@ class Problem:
         self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
         # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
         self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
-        self.shapes, self.chamfered = self.surfaces.shapes, list[Roller]()
+        self.shapes, self.rollers = self.surfaces.shapes, self._gap.rollers
         for part in self.shapes:
-            if isinstance(part, Roller) and part.chamfer:
-                self.chamfered.append(part)
+            if isinstance(part, Roller):
+                self.rollers.append(part)
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         try:
             self.pair = pair_of(one, two)
@@ -417,7 +417,11 @@ class Problem:
         except NoContactFound as error:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
-            raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
+            key: tuple[str, ...] = ("grid",)
+            if not (self._gap.given or grid.center):
+                key = ("body", "2" if self.surfaces.surface_1.shape == "flat" else "1", "surface")
+                sentence = f"{error}{soft}; expected a shape that bounds the contact"
+            raise deck_error([Mistake(key, MISSING, sentence)], source) from None
         # by force, and by approach
         self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())
         if grid.fits and lattice is None:
@@ -455,8 +459,9 @@ class Problem:
     def estimated(self, pattern: Pattern | None = None, /, **drive: Any) -> Estimate:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
         place = self._center, pattern or window.pattern_of(self.deck.grid)
+        share = self._gap.share if self.rollers else None
         return window.estimate_contact(
-            self.pair, self._gap.at, *place, self.interface, self._gap.heights, self.chamfered, **drive
+            self.pair, self._gap.at, *place, self.interface, self._gap.heights, share, **drive
         )
 
     @cached_property

@@ -24,7 +24,6 @@ from ..deck.faults import MISSING, Mistake
 from ..deck.height_map import Placed
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
-from ..deck.surfaces import Roller
 from ..deck.units import readable
 
 GapFunction = Callable[[Array, Array], Array]
@@ -124,7 +123,7 @@ def estimate_contact(
     pattern: Pattern,
     interface: Interface = UNILATERAL,
     heights: Sequence[GapFunction] = (),
-    chamfered: Sequence[Roller] = (),
+    share: Callable[[Mask, Lattice], Array] | None = None,
     **drive: float,
 ) -> Estimate:
     """Estimate the contact under a normal load (N) or at an approach (m)."""
@@ -142,9 +141,8 @@ def estimate_contact(
     surfaces = [height, *(surface(x, y) for surface in heights)]
     slope, *body_slopes = (_steepest(each, lattice, pressure > 0) for each in surfaces)
     inside = np.isfinite(height)
-    if chamfered:
-        inside = before_ends(inside, lattice, chamfered)
-    unbounded = interface == UNILATERAL and is_unbounded(inside, pressure)
+    ends = share(inside, lattice) if share else inside.astype(float)
+    unbounded = interface == UNILATERAL and is_unbounded(ends, pressure)
     xx, yy, xy = search.moment_xx, search.moment_yy, search.moment_xy
     # the principal second moments, with the inertia of a cell itself
     mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12
@@ -162,13 +160,6 @@ def estimate_contact(
         half_length=half_length,
         angle=0.5 * math.atan2(2 * xy, xx - yy),
     )
-
-
-def before_ends(candidate: Mask, lattice: Lattice, chamfered: Sequence[Roller]) -> Mask:
-    """Return the nodes that can touch, but for those on chamfers."""
-    for roller in chamfered:
-        candidate = candidate & ~roller.chamfered(lattice.x, lattice.y)
-    return candidate
 
 
 def starting_half_size(

@@ -239,11 +239,14 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
         for name in worth_showing([history])
     ]
     name_of_size, size = contact_size(history)
+    summary = SUMMARY
+    if half_axes(history):  # the stick area of a long contact is no disc
+        summary = tuple("stick_area" if name == "stick_radius" else name for name in SUMMARY)
     rows += [
         (name_of_size, size + _moments(history, extent))
         if name == "contact_radius"
         else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
-        for name in SUMMARY
+        for name in summary
         if name in history
         and not (name == "dissipated_energy" and rolls(history) and not history[name])
         and not (name == "stick_radius" and repeats(history))

@@ -68,7 +68,7 @@ class StepView:
         self.hertz = gap.contact(load) if gap and load > 0.0 and not is_worn(self.data) else None
         several = f"step {self.number}" if dataset.sizes["step"] > 1 else ""
         named = ", ".join(filter(None, (title_of(dataset), several)))
-        self.title = f"{named} ({_loads(self.data)})".lstrip()
+        self.title = f"{named} ({_loads(self.data)})" if named else _loads(self.data)
 
     @property
     def friction(self) -> float:

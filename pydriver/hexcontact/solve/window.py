@@ -21,7 +21,6 @@ from ..core.shared import Displacement, SharedContact, SharedFields, SharedOpera
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
-from ..problem.window import before_ends
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
 from .events import Listener
@@ -198,10 +197,10 @@ class Window:
     def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
         """Return the measures of a state, and whether the pressure rises to an end of the surface."""
         found = measures(self.contact, solution)
-        inside = self.candidate
-        if self.case.chamfered:
-            inside = before_ends(inside, self.lattice, self.case.chamfered)
-        return found, not inside.all() and is_unbounded(inside, solution.pressure)
+        if self.candidate.all() and not self.case.rollers:
+            return found, False
+        share = self.case.plane_gap.share(self.candidate, self.lattice)
+        return found, bool(is_unbounded(share, solution.pressure))
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.

@@ -7,14 +7,15 @@
 !> Theory: docs/theory/multilevel.md.
 module hc_frictional_contact
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_options, only: newton_options_t
-  use hc_field_space, only: space_over
+  use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
+  use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_operator_set, only: operators_t, new_operators, operators_memory
@@ -87,11 +88,25 @@ contains
     subroutine prepare(level, operators)
       type(friction_problem_t), intent(inout) :: level
       type(operators_t), intent(out) :: operators
+      type(field_space_t) :: space
+      logical :: by_rows
 
       level%space = space_over(level%lattice%extent, n_threads)
       level%space%scratch => scratch
-      if (present(ranks)) level%space%helpers = ranks%over(level%lattice%extent)
-      call new_operators(operators, level%lattice, level%medium, level%space, error, cache, level%options%preconditioner)
+      space = level%space
+      by_rows = .false.
+      select type (law => level%friction)
+      type is (coulomb_t)
+        by_rows = .true.
+      end select
+      if (present(ranks)) then
+        if (level%lattice%is_periodic() .or. .not. by_rows) then
+          space%helpers = ranks%over(level%lattice%extent)
+        else
+          space%ranks = ranks%over(level%lattice%extent)
+        end if
+      end if
+      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner)
     end subroutine prepare
 
   end subroutine new_frictional_contact
@@ -197,6 +212,10 @@ contains
     integer :: sweeps
     logical :: guessed, touching
 
+    if (target%rolling%steady .and. self%operators(1)%space%ranks%size > 1) then
+      call raise(error, status%invalid_input, 'steady rolling: expected one process, since several do not solve it')
+      return
+    end if
     call self%problem%friction%begin_step(start%zone)
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)

@@ -90,32 +90,56 @@ contains
   subroutine gather_state(problem, space, own, state)
     type(friction_problem_t), intent(in) :: problem
     type(field_space_t), intent(in) :: space
-    !> State on own rows, which is freed
+    !> State on own rows, which is freed field by field
     type(contact_state_t), intent(inout) :: own
     type(contact_state_t), intent(out) :: state
-    type(contact_state_t) :: whole
-    integer :: n_row
     real(wp), allocatable :: zone(:, :)
 
-    n_row = problem%lattice%extent(2)
-    call add_fields(whole, problem%lattice, problem%space)
-    allocate (zone, mold=whole%pressure)
-    call space%fetch(n_row, own%pressure, 1, whole%pressure)
-    call space%fetch(n_row, own%gap, 1, whole%gap)
-    call space%fetch(n_row, real(own%zone, wp), 1, zone)
-    whole%zone = nint(zone)
-    call gather(space, own%traction, whole%traction)
-    call gather(space, own%relative_displacement, whole%relative_displacement)
-    call gather(space, own%slip_increment, whole%slip_increment)
-    call move_alloc(whole%pressure, own%pressure)
-    call move_alloc(whole%gap, own%gap)
-    call move_alloc(whole%zone, own%zone)
-    call move_alloc(whole%traction, own%traction)
-    call move_alloc(whole%relative_displacement, own%relative_displacement)
-    call move_alloc(whole%slip_increment, own%slip_increment)
-    deallocate (own%accumulated_slip, own%dissipation_density)
-    call add_history(own)
     state = own
+    deallocate (own%accumulated_slip, own%dissipation_density, state%accumulated_slip, state%dissipation_density)
+    associate (n => problem%lattice%extent)
+      call gather_field(n, own%pressure, state%pressure)
+      call gather_field(n, own%gap, state%gap)
+      call gather_vector(n, own%traction, state%traction)
+      call gather_vector(n, own%relative_displacement, state%relative_displacement)
+      call gather_vector(n, own%slip_increment, state%slip_increment)
+      allocate (zone(n(1), n(2)))
+      call space%fetch(n(2), real(own%zone, wp), 1, zone)
+      state%zone = nint(zone)
+    end associate
+    deallocate (zone)
+    call add_history(state)
+
+  contains
+
+    !> Take all rows of a field.
+    subroutine gather_field(n, rows, field)
+      integer, intent(in) :: n(2)
+      !> Own rows, freed
+      real(wp), allocatable, intent(inout) :: rows(:, :)
+      !> All rows
+      real(wp), allocatable, intent(inout) :: field(:, :)
+
+      deallocate (field)
+      allocate (field(n(1), n(2)))
+      call space%fetch(n(2), rows, 1, field)
+      deallocate (rows)
+    end subroutine gather_field
+
+    !> Take all rows of a field with two components.
+    subroutine gather_vector(n, rows, field)
+      integer, intent(in) :: n(2)
+      !> Own rows, freed
+      real(wp), allocatable, intent(inout) :: rows(:, :, :)
+      !> All rows
+      real(wp), allocatable, intent(inout) :: field(:, :, :)
+
+      deallocate (field)
+      allocate (field(n(1), n(2), 2))
+      call gather(space, rows, field)
+      deallocate (rows)
+    end subroutine gather_vector
+
   end subroutine gather_state
 
   !> Take all rows of a field with several components.

@@ -180,7 +180,9 @@ def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) ->
             np.testing.assert_allclose(several[name][:] / p_max, one[name][:] / p_max, rtol=0.0, atol=1e-10)
         for name in ("approach", "shift_x", "stick_area", "dissipated_energy"):
             largest = np.abs(one[name][:]).max()
-            np.testing.assert_allclose(several[name][:] / largest, one[name][:] / largest, rtol=0.0, atol=1e-9)
+            np.testing.assert_allclose(
+                several[name][:] / largest, one[name][:] / largest, rtol=0.0, atol=1e-9
+            )
 
 
 @with_mpi

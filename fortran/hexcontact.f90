@@ -50,6 +50,7 @@ module hexcontact
   use hc_load_path, only: advance, step_settings_t
   use hc_creep_loads, only: creep_loads_t, find_creep_loads
   use hc_window_growth, only: grown_window, extend_state
+  use hc_contact_search, only: contact_search_t, find_rough_pressure
   use hc_adaptive_path, only: adaptive_path_t, adaptive_steps_t, two_paths_t
   use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown, &
                              pending

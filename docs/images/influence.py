@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from hexcontact.arrays import Array
 from hexcontact.core import flat
-from hexcontact.core.influence import linear_load_displacement, pyramid_functions
+from hexcontact.influence import linear_load_displacement, pyramid_functions
 from hexcontact.plotting.registry import styled
 from hexcontact.plotting.style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 

@@ -15,7 +15,7 @@ module hc_communicator
   implicit none
   private
 
-  public :: communicator_t, rows_held, block_layout_t, start_ranks, end_ranks, wait_for_words
+  public :: communicator_t, rows_held, block_layout_t, start_ranks, end_ranks
 
   !> Ranks that work together; by default one alone.
   type :: communicator_t
@@ -40,8 +40,10 @@ module hc_communicator
     procedure, non_overridable :: fetch
     !> Columns of transformed rows, and back
     procedure, non_overridable :: to_columns, to_rows
-    !> Words of the first rank on all of them
-    procedure, non_overridable :: share
+    !> Words of the first rank on other ranks, which wait for them
+    procedure, non_overridable :: tell, wait_for_words, hear
+    !> Words of another rank on the first one
+    procedure, non_overridable :: give, take
   end type communicator_t
 
   !> Transformed rows, and the columns that each rank works on; in words of four bytes.
@@ -64,12 +66,6 @@ module hc_communicator
     module subroutine end_ranks(ranks)
       type(communicator_t), intent(inout) :: ranks
     end subroutine end_ranks
-
-    !> Wait, without use of the processor, until the first rank shares words; return their number.
-    module subroutine wait_for_words(ranks, n)
-      type(communicator_t), intent(in) :: ranks
-      integer, intent(out) :: n
-    end subroutine wait_for_words
 
     !> Sum the values of all ranks in their order.
     module function total(self, part)
@@ -127,11 +123,38 @@ module hc_communicator
       type(c_ptr), intent(in) :: columns, rows
     end subroutine to_rows
 
-    !> Copy words of the first rank to all ranks.
-    module subroutine share(self, values)
+    !> Send words of the first rank to another one.
+    module subroutine tell(self, values, rank)
       class(communicator_t), intent(in) :: self
-      integer(int32), intent(inout), contiguous :: values(:)
-    end subroutine share
+      integer(int32), intent(in), contiguous :: values(:)
+      !> Rank; absent: each of the others
+      integer, intent(in), optional :: rank
+    end subroutine tell
+
+    !> Wait, without use of the processor, until the first rank sends words; return their number.
+    module subroutine wait_for_words(self, n)
+      class(communicator_t), intent(in) :: self
+      integer, intent(out) :: n
+    end subroutine wait_for_words
+
+    !> Receive the words that were waited for.
+    module subroutine hear(self, values)
+      class(communicator_t), intent(in) :: self
+      integer(int32), intent(out), contiguous :: values(:)
+    end subroutine hear
+
+    !> Send words to the first rank, which takes them.
+    module subroutine give(self, values)
+      class(communicator_t), intent(in) :: self
+      integer(int32), intent(in), contiguous :: values(:)
+    end subroutine give
+
+    !> Receive words that another rank gives.
+    module subroutine take(self, values, rank)
+      class(communicator_t), intent(in) :: self
+      integer(int32), intent(out), contiguous :: values(:)
+      integer, intent(in) :: rank
+    end subroutine take
   end interface
 
 contains

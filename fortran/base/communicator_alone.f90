@@ -14,11 +14,6 @@ contains
     ranks = communicator_t()
   end procedure end_ranks
 
-  !> No other rank shares anything.
-  module procedure wait_for_words
-    n = 0
-  end procedure wait_for_words
-
   !> Sum the values.
   module procedure total
     total = sum(part)
@@ -48,8 +43,27 @@ contains
   module procedure to_rows
   end procedure to_rows
 
-  !> The words are there.
-  module procedure share
-  end procedure share
+  !> There is no other rank.
+  module procedure tell
+  end procedure tell
+
+  !> No other rank sends anything.
+  module procedure wait_for_words
+    n = 0
+  end procedure wait_for_words
+
+  !> No words come.
+  module procedure hear
+    values = 0
+  end procedure hear
+
+  !> The first rank is this one.
+  module procedure give
+  end procedure give
+
+  !> No words come.
+  module procedure take
+    values = 0
+  end procedure take
 
 end submodule hc_communicator_alone

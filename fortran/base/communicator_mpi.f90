@@ -3,14 +3,14 @@ submodule (hc_communicator) hc_communicator_mpi
   use, intrinsic :: iso_c_binding, only: c_int, c_f_pointer
   use mpi_f08, only: MPI_Allgather, MPI_Allreduce, MPI_Alltoallv, MPI_Alltoallw, MPI_Bcast, MPI_CHARACTER, MPI_Comm, &
     MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_COMM_TYPE_SHARED, MPI_COMM_WORLD, &
-    MPI_Datatype, MPI_DOUBLE_PRECISION, MPI_Finalize, MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, &
+    MPI_Datatype, MPI_DOUBLE_PRECISION, MPI_Finalize, MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_Get_count, MPI_IN_PLACE, &
     MPI_INFO_NULL, MPI_Init_thread, MPI_Initialized, MPI_INTEGER, MPI_INTEGER4, MPI_Iprobe, MPI_MAX, MPI_MIN, &
-    MPI_ORDER_FORTRAN, MPI_Recv, MPI_Send, MPI_STATUS_IGNORE, MPI_SUM, MPI_THREAD_SERIALIZED, MPI_Type_commit, &
+    MPI_ORDER_FORTRAN, MPI_Recv, MPI_Send, MPI_Status, MPI_STATUS_IGNORE, MPI_SUM, MPI_THREAD_SERIALIZED, MPI_Type_commit, &
     MPI_Type_contiguous, MPI_Type_create_subarray, MPI_Type_free
   implicit none
 
-  !> Tag of the number of words that `share` announces.
-  integer, parameter :: announced = 1
+  !> Tags of words of the first rank, and of those for it.
+  integer, parameter :: told = 1, given_back = 2
 
   interface
     !> Sleep (POSIX)
@@ -54,20 +54,6 @@ contains
     if (.not. over) call MPI_Finalize()
     ranks = communicator_t()
   end procedure end_ranks
-
-  !> Look for the announcement every millisecond: MPI itself waits with the processor busy.
-  module procedure wait_for_words
-    integer(c_int), parameter :: millisecond = 1000
-    logical :: there
-    integer(c_int) :: ignored
-
-    do
-      call MPI_Iprobe(0, announced, world(ranks), there, MPI_STATUS_IGNORE)
-      if (there) exit
-      ignored = usleep(millisecond)
-    end do
-    call MPI_Recv(n, 1, MPI_INTEGER, 0, announced, world(ranks), MPI_STATUS_IGNORE)
-  end procedure wait_for_words
 
   !> Sum on the first rank, in the order of the ranks.
   module procedure total
@@ -230,17 +216,46 @@ contains
     end do
   end subroutine exchange
 
-  !> Announce the number of words, and copy them.
-  module procedure share
+  !> Send words.
+  module procedure tell
     integer :: r
 
-    if (self%size == 1) return
-    if (self%rank == 0) then
-      do r = 1, self%size - 1
-        call MPI_Send(size(values), 1, MPI_INTEGER, r, announced, world(self))
-      end do
-    end if
-    call MPI_Bcast(values, size(values), MPI_INTEGER4, 0, world(self))
-  end procedure share
+    do r = 1, self%size - 1
+      if (present(rank)) then
+        if (r /= rank) cycle
+      end if
+      call MPI_Send(values, size(values), MPI_INTEGER4, r, told, world(self))
+    end do
+  end procedure tell
+
+  !> Look for the words every millisecond: MPI itself waits with the processor busy.
+  module procedure wait_for_words
+    integer(c_int), parameter :: millisecond = 1000
+    type(MPI_Status) :: about
+    logical :: there
+    integer(c_int) :: ignored
+
+    do
+      call MPI_Iprobe(0, told, world(self), there, about)
+      if (there) exit
+      ignored = usleep(millisecond)
+    end do
+    call MPI_Get_count(about, MPI_INTEGER4, n)
+  end procedure wait_for_words
+
+  !> Receive words of the first rank.
+  module procedure hear
+    call MPI_Recv(values, size(values), MPI_INTEGER4, 0, told, world(self), MPI_STATUS_IGNORE)
+  end procedure hear
+
+  !> Send words to the first rank.
+  module procedure give
+    call MPI_Send(values, size(values), MPI_INTEGER4, 0, given_back, world(self))
+  end procedure give
+
+  !> Receive words of another rank.
+  module procedure take
+    call MPI_Recv(values, size(values), MPI_INTEGER4, rank, given_back, world(self), MPI_STATUS_IGNORE)
+  end procedure take
 
 end submodule hc_communicator_mpi

@@ -159,6 +159,8 @@ module hc_options
     !> nodes at the edge (the width of the contact), and the most rings
     real(wp) :: ring_factor = 0.7_wp, ring_power = 0.8_wp
     integer :: max_rings = 16
+    !> The same factor and power where sets of active nodes change without end: the continuations of many patches meet
+    real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.4_wp
     !> Times that a ring is smoothed: waves along the edge fall off the faster the shorter they are
     integer :: smoothings = 2
     !> Compliances of the shortest and of the longest waves in slip, over that of a node, (P5): the shortest ones are known, and

@@ -304,29 +304,35 @@ contains
   end function touches_rim
 
   !> Refuse a gap that does not fit the window, is not finite or has no candidate node.
-  pure subroutine check_problem(lattice, medium, initial_gap, candidate, error, n_threads)
+  subroutine check_problem(lattice, medium, initial_gap, candidate, error, space)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
-    !> Initial gap (n_col, n_row) [m]; any value at all where nothing can touch
+    !> Initial gap (n_col, own rows) [m]; any value at all where nothing can touch
     real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
+    !> Nodes that may come into contact (n_col, own rows)
     logical, intent(in) :: candidate(:, :)
-    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use
+    !> Allocated on failure, on all ranks: wrong shapes, no candidate at all, numbers of no use
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; 0: the default of OpenMP
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: possible(1)
 
-    call check_operator(lattice, medium, error, n_threads)
+    call check_operator(lattice, medium, error)
     if (allocated(error)) return
-    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
-      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
-    else if (.not. any(candidate)) then
-      call raise(error, status%invalid_input, 'no node of the window may come into contact')
-    else if (any(candidate .and. .not. ieee_is_finite(initial_gap))) then
-      call raise(error, status%invalid_input, 'the initial gap of nodes that may come into contact: finite numbers expected')
-    end if
+    associate (extent => space%own_extent(lattice%extent))
+      if (any(shape(initial_gap) /= extent) .or. any(shape(candidate) /= extent)) then
+        call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
+      else if (any(candidate .and. .not. ieee_is_finite(initial_gap))) then
+        call raise(error, status%invalid_input, 'the initial gap of nodes that may come into contact: finite numbers expected')
+      end if
+    end associate
+    call space%ranks%agree(error)
+    if (allocated(error)) return
+    possible = merge(1, 0, any(candidate))
+    call space%ranks%add_counts(possible)
+    if (possible(1) == 0) call raise(error, status%invalid_input, 'no node of the window may come into contact')
   end subroutine check_problem
 
   !> Refuse controls, loads, motions, tolerances and numbers of sweeps that no solver can work with.

@@ -72,7 +72,7 @@ contains
     type(field_space_t), intent(in), optional :: space
 
     if (present(space)) problem%space = space
-    if (problem%space%ranks%size == 1) call check_problem(lattice, medium, initial_gap, candidate, error)
+    call check_problem(lattice, medium, initial_gap, candidate, error, problem%space)
     if (allocated(error)) return
     if (present(law)) call law%check(error)
     if (allocated(error)) return

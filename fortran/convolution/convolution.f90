@@ -450,23 +450,26 @@ contains
     call c_f_pointer(self%held%scratch%place(), field, [product(self%extent)*n_component])
   end function in_place
 
-  !> Return the ends of the stages in which pairs of rows are transformed: one stage, but for fields in the memory of their
+  !> Find the ends of the stages in which pairs of rows are transformed: one stage, but for fields in the memory of their
   !> transforms, where a stage begins so late that these lie behind all of its rows.
-  function stages_of(self, field) result(last)
+  subroutine find_stages(self, field, last)
     class(convolution_t), intent(in) :: self
     !> Fields (n_col, n_row, component)
     real(wp), intent(in), contiguous, target :: field(:, :, :)
     !> Pairs before the first stage, 0, and up to the end of each
-    integer, allocatable :: last(:)
+    integer, allocatable, intent(out) :: last(:)
+    integer :: end_of(storage_size(0) + 1), n
 
-    last = [(self%n_row + 1)/2*size(field, 3)]
+    n = 1
+    end_of(1) = (self%n_row + 1)/2*size(field, 3)
     if (c_associated(c_loc(field), self%held%scratch%place())) then
-      do while (last(1) > 1)
-        last = [(last(1) + 1)/2, last]
+      do while (end_of(n) > 1)
+        end_of(n + 1) = (end_of(n) + 1)/2
+        n = n + 1
       end do
     end if
-    last = [0, last]
-  end function stages_of
+    allocate (last(0:n), source=[0, end_of(n:1:-1)])
+  end subroutine find_stages
 
   !> Transform the rows of fields.
   subroutine transform_fields(self, field)
@@ -477,12 +480,12 @@ contains
     integer :: stage, pair, n, thread
 
     n = (self%n_row + 1)/2
-    last = stages_of(self, field)
+    call find_stages(self, field, last)
     thread = 1
     !$omp parallel num_threads(self%space%threads) private(stage, pair) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     self%row_buffer(self%extent(1) + 1:, 1, thread) = 0.0_wp
-    do stage = size(last), 2, -1
+    do stage = ubound(last, 1), 1, -1
       !$omp do schedule(static)
       do pair = last(stage - 1), last(stage) - 1
         call transform_rows(self, 2*modulo(pair, n) + 1, pair/n + 1, thread, &
@@ -526,11 +529,11 @@ contains
     if (self%ranks%size > 1) then
       call self%ranks%to_rows(layout_of(self, size(self%work, 3)), c_loc(self%lines), c_loc(self%work))
     end if
-    last = stages_of(self, result)
+    call find_stages(self, result, last)
     thread = 1
     !$omp parallel num_threads(self%space%threads) private(stage, pair, o, row) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    do stage = 2, size(last)
+    do stage = 1, ubound(last, 1)
       !$omp do schedule(static)
       do pair = last(stage - 1), last(stage) - 1
         o = pair/((n(2) + 1)/2) + 1

@@ -7,7 +7,7 @@ module hc_shared_friction
   use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_communicator, only: communicator_t, wait_for_words
+  use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields
@@ -126,12 +126,11 @@ contains
   subroutine announce(self, order)
     class(shared_friction_t), intent(in) :: self
     type(call_t), intent(in) :: order
-    integer(int32) :: wake(size(self%wake)), words(size(transfer(order, [0_int32])))
+    integer(int32) :: words(size(transfer(order, [0_int32])))
 
-    wake = self%wake
-    call self%ranks%share(wake)
+    call self%ranks%tell(self%wake)
     words = transfer(order, words)
-    call self%ranks%share(words)
+    call self%ranks%tell(words)
   end subroutine announce
 
   !> Solve a load step; called on the first rank alone.
@@ -239,9 +238,9 @@ contains
     integer(int32), allocatable :: words(:)
     integer :: n
 
-    call wait_for_words(self%ranks, n)
+    call self%ranks%wait_for_words(n)
     allocate (words(n))
-    call self%ranks%share(words)
+    call self%ranks%hear(words)
     order = transfer(words, order)
     associate (lattice => self%problem%lattice)
       select case (order%what)

@@ -166,6 +166,7 @@ contains
       if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
       sweeps = sweeps + 1
       call progress%judge(now, level%options%normal, sweeps, compliant, changed)
+      level%preconditioner%patches = now%searches
       if (changed) then
         call set_active(level, now, next)
         call recurrence%restart()

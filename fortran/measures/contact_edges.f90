@@ -15,7 +15,7 @@ module hc_contact_edges
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
-  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, mesh_of_zone, distance_field
+  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, n_cell_sum, mesh_of_zone, distance_field
   implicit none
   private
 
@@ -33,8 +33,8 @@ module hc_contact_edges
     !> Tuning numbers
     type(edge_options_t) :: options
   contains
-    !> The edge of the contact area
-    procedure :: contact_edge
+    !> The edge of the contact area; sums of it by row
+    procedure :: contact_edge, contact_sums
     !> The edge of the part of it that sticks
     procedure :: stick_edge
     !> Triangles that fill either of them, and a field there
@@ -99,6 +99,20 @@ contains
     type(zone_edge_t) :: edge
     edge = edge_of_zone(self%lattice, self%candidate, self%contact, self%band, self%distance)
   end function contact_edge
+
+  !> Sum the cells of the contact by row, of which `edge_of_sums` finds its area.
+  pure function contact_sums(self, rows, below) result(sums)
+    class(contact_edges_t), intent(in) :: self
+    !> First and last row of cells, each named by the row of nodes below it
+    integer, intent(in) :: rows(2)
+    !> Rows of the window before those of the fields
+    integer, intent(in) :: below
+    real(wp) :: sums(n_cell_sum, rows(1):rows(2))
+    real(wp), allocatable :: found(:, :), segments(:, :, :)
+
+    call sum_cells(self%candidate, self%contact, self%band, self%distance, rows, below, found, segments)
+    sums = found
+  end function contact_sums
 
   !> Fill the contact area with triangles, and carry a field to its edge.
   pure function contact_mesh(self, field, vanishes) result(mesh)

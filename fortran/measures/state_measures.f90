@@ -8,8 +8,9 @@ module hc_state_measures
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_contact_state, only: contact_state_t, separated, stick, normal, remote_displacement
+  use hc_options, only: edge_options_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
-  use hc_zone_edge, only: zone_edge_t
+  use hc_zone_edge, only: zone_edge_t, edge_of_sums, n_cell_sum
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, tangential_scale
   use hc_normal_law, only: normal_law_t
   use hc_friction_law, only: friction_law_t
@@ -43,6 +44,8 @@ module hc_state_measures
     real(wp) :: max_pressure = 0.0_wp, max_traction = 0.0_wp
     !> Elastic energy of both bodies [J]
     real(wp) :: elastic_energy = 0.0_wp
+    !> Mean gap of a window that repeats [m]
+    real(wp) :: mean_gap = 0.0_wp
   end type state_measures_t
 
 contains
@@ -120,25 +123,28 @@ contains
     !> State, with friction or without
     type(contact_state_t), intent(in) :: state
 
-    energy = normal_energy(lattice, initial_gap, state%zone /= separated, state%pressure, state%gap, state%motion(normal))
+    energy = sum(normal_energy(lattice, initial_gap, state%zone /= separated, state%pressure, state%gap, state%motion(normal)))
     if (allocated(state%traction)) energy = energy + shear_energy(lattice, state)
   end function elastic_energy
 
-  !> Compute the part of the pressure [J].
-  pure real(wp) function normal_energy(lattice, initial_gap, contact, pressure, gap, approach) result(energy)
+  !> Compute the part of the pressure by row [J].
+  pure function normal_energy(lattice, initial_gap, contact, pressure, gap, approach) result(energy)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Gap before loading [m], nodes in contact, pressure [Pa] and gap [m] (n_col, n_row)
+    !> Gap before loading [m], nodes in contact, pressure [Pa] and gap [m] (n_col, own rows)
     real(wp), intent(in) :: initial_gap(:, :), pressure(:, :), gap(:, :)
     logical, intent(in) :: contact(:, :)
     !> Approach [m]
     real(wp), intent(in) :: approach
+    real(wp) :: energy(size(contact, 2))
     integer :: col, row
 
     energy = 0.0_wp
     do row = 1, size(contact, 2)
       do col = 1, size(contact, 1)
-        if (contact(col, row)) energy = energy + pressure(col, row)*(gap(col, row) - initial_gap(col, row) + approach)
+        if (contact(col, row)) then
+          energy(row) = energy(row) + pressure(col, row)*(gap(col, row) - initial_gap(col, row) + approach)
+        end if
       end do
     end do
     energy = 0.5_wp*lattice%cell_area()*energy
@@ -199,27 +205,25 @@ contains
   end subroutine zone_extent
 
   !> Find the centroid of a pressure; NaN if there is none [m].
-  pure function center_of(lattice, pressure) result(center)
+  function center_of(lattice, pressure, space) result(center)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Pressure (n_col, n_row) [Pa]
+    !> Pressure (n_col, own rows) [Pa]
     real(wp), intent(in) :: pressure(:, :)
-    real(wp) :: center(2), total
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: center(2), total, part(size(pressure, 2), 3)
     real(wp), dimension(size(pressure, 1)) :: x, y
-    integer :: col, row
+    integer :: row, below
 
-    center = 0.0_wp
-    total = 0.0_wp
+    below = space%ranks%first_row(lattice%extent(2)) - 1
     do row = 1, size(pressure, 2)
-      call lattice%row_coordinates(row, x, y)
-      do col = 1, size(x)
-        total = total + pressure(col, row)
-        center(1) = center(1) + pressure(col, row)*x(col)
-        center(2) = center(2) + pressure(col, row)*y(col)
-      end do
+      call lattice%row_coordinates(below + row, x, y)
+      part(row, :) = [sum(pressure(:, row)), dot_product(pressure(:, row), x), dot_product(pressure(:, row), y)]
     end do
+    total = space%total(part(:, 1))
     if (total > 0.0_wp) then
-      center = center/total
+      center = [space%total(part(:, 2)), space%total(part(:, 3))]/total
     else
       center = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
@@ -234,7 +238,7 @@ contains
     !> Gap before loading (n_col, n_row) [m]
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that can touch (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
+    logical, intent(in), contiguous :: candidate(:, :)
     !> State
     type(contact_state_t), intent(in) :: state
     !> Space of the fields
@@ -274,42 +278,118 @@ contains
   subroutine measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Gap before loading (n_col, n_row) [m]
+    !> Gap before loading (n_col, own rows) [m]
     real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that can touch (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
+    !> Nodes that can touch (n_col, own rows)
+    logical, intent(in), contiguous :: candidate(:, :)
     !> State, of which pressure, gap, zones and approach matter
     type(contact_state_t), intent(in) :: state
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> What is found; nothing about shear
     type(state_measures_t), intent(out) :: found
-    !> Edges of the contact
+    !> Edges of the contact; on several ranks those near own rows
     type(contact_edges_t), intent(out) :: edges
+    type(zone_edge_t) :: edge
 
     found%max_pressure = space%max(state%pressure)
     associate (contact => state%zone /= separated)
-      found%elastic_energy = normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, state%motion(normal))
+      found%elastic_energy = space%total(normal_energy(lattice, initial_gap, contact, state%pressure, state%gap, &
+                                                       state%motion(normal)))
       if (lattice%is_periodic()) then
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(contact))
-        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact)
+        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact, lattice%extent(2), space)
+        found%mean_gap = space%sum(state%gap)/lattice%size()
         return
       end if
-      found%pressure_center = center_of(lattice, state%pressure)
-      call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
-      found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
+      found%pressure_center = center_of(lattice, state%pressure, space)
+      if (space%ranks%size > 1) then
+        call find_shared_edge(lattice, contact, candidate, state, space, edges, edge)
+      else
+        call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
+        edge = edges%contact_edge()
+      end if
+      found%contact = size_of(lattice, space%count(contact), edge)
     end associate
   end subroutine measure_contact
+
+  !> Find the edge of a contact whose rows several ranks share: each sums the cells of its rows, about which it takes those that
+  !> they depend on.
+  subroutine find_shared_edge(lattice, contact, candidate, state, space, edges, edge)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes in contact and those that can touch (n_col, own rows)
+    logical, intent(in), contiguous :: contact(:, :), candidate(:, :)
+    !> State, of which pressure and gap matter
+    type(contact_state_t), intent(in) :: state
+    type(field_space_t), intent(in) :: space
+    !> Edges near own rows
+    type(contact_edges_t), intent(out) :: edges
+    !> Area and ellipse of the contact
+    type(zone_edge_t), intent(out) :: edge
+    type(edge_options_t) :: options
+    real(wp), allocatable :: pressure(:, :), gap(:, :), sums(:, :)
+    logical, allocatable :: touching(:, :), possible(:, :)
+    real(wp) :: totals(n_cell_sum)
+    integer :: own(2), wanted(2), k
+
+    own = space%own_rows(lattice%extent(2))
+    ! The first and last of these rows look like the rim of the window: their band has reach + 1 rows, and a value depends on
+    ! nodes that are reach + 2 rows away.
+    wanted = own + [-2, 2]*(options%reach + 2)
+    wanted = [max(wanted(1), 1), min(wanted(2), lattice%extent(2))]
+    associate (n => [size(contact, 1), wanted(2) - wanted(1) + 1])
+      allocate (pressure(n(1), n(2)), gap(n(1), n(2)), touching(n(1), n(2)), possible(n(1), n(2)))
+    end associate
+    call space%fetch(lattice%extent(2), state%pressure, wanted(1), pressure)
+    call space%fetch(lattice%extent(2), state%gap, wanted(1), gap)
+    call space%fetch(lattice%extent(2), contact, wanted(1), touching)
+    call space%fetch(lattice%extent(2), candidate, wanted(1), possible)
+    call new_contact_edges(edges, lattice%subwindow([1, wanted(1)], [lattice%extent(1), wanted(2)]), pressure, gap, touching, &
+                           possible)
+    if (own(1) == 1) own(1) = 0                                               ! the cells below the first row
+    sums = edges%contact_sums(own - wanted(1) + 1, wanted(1) - 1)
+    do k = 1, n_cell_sum
+      totals(k) = space%total(sums(k, :))
+    end do
+    edge = edge_of_sums(lattice, totals)
+  end subroutine find_shared_edge
 
   !> Test whether the pressure rises to an end of the surface, where it has no bound.
   !>
   !> A node beside one that cannot touch has more pressure than its neighbor on the other side.
-  pure logical function rises_to_end(candidate, pressure) result(rises)
-    !> Nodes that can touch (n_col, n_row)
+  logical function rises_to_end(candidate, pressure, space, n_row) result(rises)
+    !> Nodes that can touch (n_col, own rows)
+    logical, intent(in), contiguous :: candidate(:, :)
+    !> Pressure (n_col, own rows) [Pa]
+    real(wp), intent(in), contiguous :: pressure(:, :)
+    !> Space of the fields, and rows of the window
+    type(field_space_t), intent(in) :: space
+    integer, intent(in) :: n_row
+    real(wp), allocatable :: near(:, :)
+    logical, allocatable :: touching(:, :)
+    real(wp) :: found(1)
+    integer :: own(2)
+
+    if (space%ranks%size == 1) then
+      rises = rises_in(candidate, pressure)
+      return
+    end if
+    own = space%own_rows(n_row)
+    own = [max(own(1) - 1, 1), min(own(2) + 1, n_row)]
+    allocate (near(size(pressure, 1), own(2) - own(1) + 1), touching(size(pressure, 1), own(2) - own(1) + 1))
+    call space%fetch(n_row, pressure, own(1), near)
+    call space%fetch(n_row, candidate, own(1), touching)
+    found = merge(1.0_wp, 0.0_wp, rises_in(touching, near))
+    call space%most(found)
+    rises = found(1) > 0.5_wp
+  end function rises_to_end
+
+  !> Test whether the pressure rises to an end of the surface in some rows.
+  pure logical function rises_in(candidate, pressure) result(rises)
     logical, intent(in) :: candidate(:, :)
-    !> Pressure (n_col, n_row) [Pa]
     real(wp), intent(in) :: pressure(:, :)
     integer :: n, m
 
@@ -321,7 +401,7 @@ contains
       rises = any(rises_beside(touch(3:, :), touch(:n - 2, :), p(3:, :), p(2:n - 1, :), p(:n - 2, :)))
       if (.not. rises) rises = any(rises_beside(touch(:, 3:), touch(:, :m - 2), p(:, 3:), p(:, 2:m - 1), p(:, :m - 2)))
     end associate
-  end function rises_to_end
+  end function rises_in
 
   !> Test whether the pressure rises from one neighbor of a node to it, and the other neighbor cannot touch.
   elemental logical function rises_beside(after_touches, before_touches, after, here, before) result(rises)
@@ -335,19 +415,29 @@ contains
   end function rises_beside
 
   !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
-  pure integer function edge_nodes(zone) result(n)
-    !> Nodes of the zone
-    logical, intent(in) :: zone(:, :)
-    integer :: row
+  integer function edge_nodes(zone, n_row, space) result(n)
+    !> Nodes of the zone (n_col, own rows)
+    logical, intent(in), contiguous :: zone(:, :)
+    !> Rows of the window
+    integer, intent(in) :: n_row
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    logical :: around(size(zone, 1), 0:size(zone, 2) + 1)
+    integer :: own(2), row, counts(1)
 
-    n = 0
-    associate (n_row => size(zone, 2))
-      do row = 1, n_row
-        associate (here => zone(:, row), below => zone(:, modulo(row - 2, n_row) + 1), above => zone(:, modulo(row, n_row) + 1))
-          n = n + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
-        end associate
-      end do
-    end associate
+    own = space%own_rows(n_row)
+    around(:, 1:size(zone, 2)) = zone
+    call space%fetch(n_row, zone, modulo(own(1) - 2, n_row) + 1, around(:, 0:0))
+    call space%fetch(n_row, zone, modulo(own(2), n_row) + 1, around(:, size(zone, 2) + 1:))
+    counts = 0
+    do row = 1, size(zone, 2)
+      associate (here => around(:, row))
+        counts = counts + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. around(:, row - 1) &
+                                                  .and. around(:, row + 1)))
+      end associate
+    end do
+    call space%ranks%add_counts(counts)
+    n = counts(1)
   end function edge_nodes
 
   !> Measure the cells of a zone alone; its edge stays unknown.

@@ -15,10 +15,13 @@ module hc_zone_edge
   implicit none
   private
 
-  public :: zone_edge_t, zone_mesh_t, edge_of_zone, mesh_of_zone, distance_field, cut_triangles
+  public :: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, edge_of_sums, n_cell_sum, mesh_of_zone, distance_field, cut_triangles
 
   !> Corners of the lower and of the upper triangle of a cell, counterclockwise: column and row.
   integer, parameter :: corner(2, 3, 2) = reshape([0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 1, 0], [2, 3, 2])
+
+  !> Sums over the cells of a row: covered triangles, and six moments.
+  integer, parameter :: n_cell_sum = 7
 
   !> An area of the plane whose edge runs between the nodes.
   type :: zone_edge_t
@@ -117,69 +120,96 @@ contains
     type(edge_band_t), intent(in) :: band
     real(wp), intent(in) :: distance(:)
     type(zone_edge_t) :: edge
+    real(wp), allocatable :: segments(:, :, :), sums(:, :)
+    integer :: n, k
+
+    call sum_cells(candidate, zone, band, distance, [0, size(zone, 2)], 0, sums, segments)
+    edge = edge_of_sums(lattice, [(sum(sums(k, :)), k=1, n_cell_sum)])
+    allocate (edge%segments, mold=segments)
+    do n = 1, size(segments, 3)
+      do k = 1, 2
+        edge%segments(:, k, n) = position(lattice, segments(:, k, n))
+      end do
+    end do
+  end function edge_of_zone
+
+  !> Sum the cells of a zone by row: covered triangles, and moments of the area (1, x, y, xx, xy, yy) in columns and rows.
+  pure subroutine sum_cells(candidate, zone, band, distance, rows, below, sums, segments)
+    !> Nodes that can touch, nodes of the zone
+    logical, intent(in) :: candidate(:, :), zone(:, :)
+    !> Nodes about its edge, and their distances from it
+    type(edge_band_t), intent(in) :: band
+    real(wp), intent(in) :: distance(:)
+    !> First and last row of cells, each named by the row of nodes below it
+    integer, intent(in) :: rows(2)
+    !> Rows of the window before those of the zone
+    integer, intent(in) :: below
+    !> Sums of each row of cells
+    real(wp), allocatable, intent(out) :: sums(:, :)
+    !> Pieces of the edge, in columns and rows (2, 2, n)
+    real(wp), allocatable, intent(out) :: segments(:, :, :)
     integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
-    real(wp), allocatable :: segments(:, :, :)
     logical, allocatable :: can_touch(:)
-    real(wp) :: covered, moments(6), sign
-    integer(int64) :: whole(6, 2)  ! whole triangles, and sums of columns, rows and their products over them
-    integer(int64) :: in_row(3, 2)  ! those of a row, sums of columns and of their squares over them
-    integer :: n_with(0:3), inside(2), corners(2, 3), at(3), lone, col, row, half, n
+    real(wp) :: moments(6), sign
+    integer(int64) :: whole(3, 2)  ! whole triangles of a row, sums of columns and of their squares over them
+    integer :: n_with(0:3), inside(2), local(2, 3), corners(2, 3), at(3), lone, col, row, half, n
 
     padded = with_rim(zone)
     n_with = triangles(padded)
     can_touch = band%part_of(candidate)
-    allocate (segments(2, 2, n_with(1) + n_with(2)))
+    allocate (segments(2, 2, n_with(1) + n_with(2)), sums(n_cell_sum, rows(1):rows(2)))
     n = 0
-    covered = n_with(3)
-    moments = 0.0_wp
-    whole = 0_int64
-    do row = 0, size(zone, 2)
-      in_row = 0_int64
+    do row = rows(1), rows(2)
+      whole = 0_int64
+      moments = 0.0_wp
+      sums(1, row) = 0.0_wp
       do col = 0, size(zone, 1)
         inside = nodes_inside(padded(col:col + 1, row:row + 1))
         do half = 1, 2
           if (inside(half) == 0) cycle
           if (inside(half) == 3) then
-            in_row(:, half) = in_row(:, half) + [1, col, col*col]
+            whole(:, half) = whole(:, half) + [1, col, col*col]
             cycle
           end if
-          corners = corners_of(half) + spread([col, row], 2, 3)
-          at = [band%place(corners(1, 1), corners(2, 1)), band%place(corners(1, 2), corners(2, 2)), &
-                band%place(corners(1, 3), corners(2, 3))]
+          local = corners_of(half) + spread([col, row], 2, 3)
+          corners = local + spread([0, below], 2, 3)
+          at = [band%place(local(1, 1), local(2, 1)), band%place(local(1, 2), local(2, 2)), band%place(local(1, 3), local(2, 3))]
           if (all(can_touch(at))) then
             n = n + 1
-            call cut(real(corners, wp), distance(at), lone, segments(:, :, n), covered)
+            call cut(real(corners, wp), distance(at), lone, segments(:, :, n), sums(1, row))
             sign = merge(1.0_wp, -1.0_wp, inside(half) == 1)
             if (inside(half) == 2) moments = moments + moments_of(real(corners, wp))
             moments = moments + sign*moments_of(reshape([real(corners(:, lone), wp), segments(:, :, n)], [2, 3]))
           else
-            covered = covered + inside(half)/3.0_wp
+            sums(1, row) = sums(1, row) + inside(half)/3.0_wp
             do lone = 1, 3  ! a third of the triangle for each node inside, in the moments at the node
-              if (padded(corners(1, lone), corners(2, lone)) /= 0) then
+              if (padded(local(1, lone), local(2, lone)) /= 0) then
                 moments = moments + moments_of(spread(real(corners(:, lone), wp), 2, 3), 1.0_wp/6.0_wp)
               end if
             end do
           end if
         end do
       end do
-      whole(1:2, :) = whole(1:2, :) + in_row(1:2, :)
-      whole(3, :) = whole(3, :) + row*in_row(1, :)
-      whole(4, :) = whole(4, :) + in_row(3, :)
-      whole(5, :) = whole(5, :) + row*in_row(2, :)
-      whole(6, :) = whole(6, :) + row*row*in_row(1, :)
-    end do
-    do half = 1, 2
-      moments = moments + moments_of_whole(half, real(whole(:, half), wp))
-    end do
-    edge%area = 0.5_wp*lattice%cell_area()*covered
-    if (moments(1) > 0.0_wp) edge%ellipse = ellipse_of(lattice, moments)
-    allocate (edge%segments(2, 2, n))
-    do half = 1, n
-      do col = 1, 2
-        edge%segments(:, col, half) = position(lattice, segments(:, col, half))
+      sums(1, row) = sums(1, row) + sum(whole(1, :))
+      do half = 1, 2
+        moments = moments + moments_of_whole(half, row + below, real(whole(:, half), wp))
       end do
+      sums(2:, row) = moments
     end do
-  end function edge_of_zone
+    segments = segments(:, :, :n)
+  end subroutine sum_cells
+
+  !> Find area and ellipse of a zone from the sums over its cells.
+  pure function edge_of_sums(lattice, sums) result(edge)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Sums of all rows, see `sum_cells`
+    real(wp), intent(in) :: sums(n_cell_sum)
+    type(zone_edge_t) :: edge
+
+    edge%area = 0.5_wp*lattice%cell_area()*sums(1)
+    if (sums(2) > 0.0_wp) edge%ellipse = ellipse_of(lattice, sums(2:))
+  end function edge_of_sums
 
   !> Return the corners of the lower or upper triangle of the cell at column and row 0.
   pure function corners_of(half) result(corners)
@@ -190,20 +220,23 @@ contains
     corners = reshape([half - 1, half - 1, 1, 0, 0, 1], [2, 3])
   end function corners_of
 
-  !> Add up the moments of lower or upper triangles, as `moments_of`: those of one, shifted to each cell.
-  pure function moments_of_whole(half, sums) result(moments)
+  !> Add up the moments of lower or upper triangles in a row, as `moments_of`: those of one, shifted to each cell.
+  pure function moments_of_whole(half, row, sums) result(moments)
     !> 1: lower triangles, 2: upper ones
     integer, intent(in) :: half
-    !> Their number, and sums of column, row, and products (column**2, column*row, row**2) of their cells
-    real(wp), intent(in) :: sums(6)
+    !> Their row
+    integer, intent(in) :: row
+    !> Their number, and sums of the columns of their cells and of the squares
+    real(wp), intent(in) :: sums(3)
     real(wp) :: moments(6)
 
-    associate (one => moments_of(real(corners_of(half), wp)))
+    associate (one => moments_of(real(corners_of(half), wp)), y => real(row, wp))
       moments = one*sums(1)
-      moments(2:3) = moments(2:3) + one(1)*sums(2:3)
-      moments(4) = moments(4) + 2.0_wp*one(2)*sums(2) + one(1)*sums(4)
-      moments(5) = moments(5) + one(2)*sums(3) + one(3)*sums(2) + one(1)*sums(5)
-      moments(6) = moments(6) + 2.0_wp*one(3)*sums(3) + one(1)*sums(6)
+      moments(2) = moments(2) + one(1)*sums(2)
+      moments(3) = moments(3) + one(1)*y*sums(1)
+      moments(4) = moments(4) + 2.0_wp*one(2)*sums(2) + one(1)*sums(3)
+      moments(5) = moments(5) + one(2)*y*sums(1) + one(3)*sums(2) + one(1)*y*sums(2)
+      moments(6) = moments(6) + 2.0_wp*one(3)*y*sums(1) + one(1)*y*y*sums(1)
     end associate
   end function moments_of_whole
 

@@ -19,6 +19,8 @@ module hc_preconditioner
   type, abstract :: preconditioner_t
     !> Displacement per traction that numbers in single precision are scaled with [m/Pa]
     real(wp) :: unit = 1.0_wp
+    !> The active nodes are many patches, as on rough surfaces
+    logical :: patches = .false.
   contains
     !> Set the active nodes
     procedure(set_active), deferred :: set_active

@@ -115,9 +115,15 @@ contains
     integer, intent(in) :: extent(2)
     !> The nodes
     logical, intent(in) :: active(extent(1), extent(2))
+    type(preconditioner_options_t) :: options
 
+    options = self%options
+    if (self%patches) then
+      options%ring_factor = options%patch_ring_factor
+      options%ring_power = options%patch_ring_power
+    end if
     if (.not. allocated(self%edge)) allocate (self%edge)
-    call new_edge_extension(self%edge, active, self%space, self%options, near=self%beside)
+    call new_edge_extension(self%edge, active, self%space, options, near=self%beside)
   end subroutine continue_beyond
 
   !> Take memory for displacements, zero, and what else is needed beside them.

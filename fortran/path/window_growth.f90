@@ -6,12 +6,13 @@ module hc_window_growth
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, add_fields, add_history, normal
   use hc_contact_solver, only: friction_solver_t
   implicit none
   private
 
-  public :: grown_window, embed, extend_state
+  public :: grown_window, shared_grown_window, embed, extend_state
 
   !> Share of its columns or rows by which a window grows on a side, and the fewest that it grows by.
   real(wp), parameter :: growth = 0.25_wp
@@ -25,15 +26,42 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(:, :)
+
+    larger = grown_on(lattice, [any(contact(1, :)), any(contact(:, 1)), any(contact(size(contact, 1), :)), &
+                                any(contact(:, size(contact, 2)))])
+  end function grown_window
+
+  !> Return a window as `grown_window` for a contact whose rows several ranks share.
+  type(lattice_t) function shared_grown_window(lattice, contact, space) result(larger)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes in contact (n_col, own rows)
+    logical, intent(in) :: contact(:, :)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: reached(4)
+
+    associate (own => space%own_rows(lattice%extent(2)))
+      reached = merge(1, 0, [any(contact(1, :)), any(contact(:, 1)) .and. own(1) == 1, any(contact(size(contact, 1), :)), &
+                             any(contact(:, size(contact, 2))) .and. own(2) == lattice%extent(2)])
+    end associate
+    call space%ranks%add_counts(reached)
+    larger = grown_on(lattice, reached > 0)
+  end function shared_grown_window
+
+  !> Return a window with more nodes at the left, lower, right and upper side.
+  pure type(lattice_t) function grown_on(lattice, sides) result(larger)
+    type(lattice_t), intent(in) :: lattice
+    logical, intent(in) :: sides(4)
     integer :: more(2), low(2), high(2)
 
     more = max(fewest, ceiling(growth*lattice%extent))
-    low = merge(more, 0, [any(contact(1, :)), any(contact(:, 1))])
-    high = merge(more, 0, [any(contact(size(contact, 1), :)), any(contact(:, size(contact, 2)))])
+    low = merge(more, 0, sides(:2))
+    high = merge(more, 0, sides(3:))
     larger = lattice
     larger%first = lattice%first - low
     larger%extent = lattice%extent + low + high
-  end function grown_window
+  end function grown_on
 
   !> Put a field of a smaller window on a larger one; its new nodes have 0.
   pure subroutine embed(lattice, larger, field)

@@ -18,7 +18,6 @@ module hc_f2py_problems
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
-  use hc_shared_contact, only: shared_contact_t, new_shared_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_shared_friction, only: shared_friction_t, new_shared_friction
@@ -26,7 +25,7 @@ module hc_f2py_problems
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_sheared, follow_sheared, secure_fields, entry_fields, wear_fields
+  public :: new_operator, new_pressed, new_pressed_part, new_sheared, follow_sheared, secure_fields, entry_fields, wear_fields
   public :: new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
@@ -61,13 +60,15 @@ contains
   end subroutine take_window
 
   !> Create a flexibility operator over a window.
-  subroutine new_operator(method, lattice, bodies, threads, handle, error)
+  subroutine new_operator(method, lattice, bodies, threads, handle, error, shared)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
     !> Handle of the operator
     integer(c_int64_t), intent(out) :: handle
     type(error_t), allocatable, intent(out) :: error
+    !> By FFT, on rows that all ranks share; all call this
+    logical, intent(in), optional :: shared
     type(slot_t), pointer :: slot
     type(field_space_t) :: space
     type(dense_flexibility_t), pointer :: dense
@@ -79,9 +80,12 @@ contains
     if (method == fft_based) bytes = fft_setup_memory(lattice%extent, spectra_of(bodies)) &
                                      + fft_memory(lattice%extent, .false., space%threads, spectra_of(bodies), &
                                                   periodic=lattice%is_periodic())
-    call take_window(lattice, bytes, threads, slot, handle, error)
+    if (present(shared)) space%ranks = ranks
+    call take_window(lattice, bytes/space%ranks%size*space%ranks%on_node, threads, slot, handle, error)
     if (.not. allocated(error)) call check_operator(lattice, bodies, error, threads)
+    call space%ranks%agree(error)
     if (.not. allocated(error)) then
+      slot%space%ranks = space%ranks
       if (method == fft_based) then
         allocate (fft)
         slot%operator => fft
@@ -95,7 +99,7 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_operator
 
-  !> Create a frictionless contact problem: by FFT on all ranks, of which the first one has gap and candidates.
+  !> Create a frictionless contact problem.
   subroutine new_pressed(method, lattice, bodies, gap, candidate, law, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
@@ -112,23 +116,14 @@ contains
     type(field_space_t) :: space
     type(direct_contact_t), pointer :: dense
     type(normal_contact_t), pointer :: fft
-    type(shared_contact_t), pointer :: shared
     integer(c_int64_t) :: bytes
-    logical :: is_shared
 
-    is_shared = method == fft_based .and. ranks%size > 1
     space = space_over(lattice%extent, threads)
     bytes = dense_fields*lattice%size()
     if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
-    if (is_shared) bytes = bytes/ranks%size*ranks%on_node
     call take_window(lattice, bytes, threads, slot, handle, error)
-    if (is_shared) call ranks%agree(error)
     if (.not. allocated(error)) then
-      if (is_shared) then
-        allocate (shared)
-        slot%pressed => shared
-        call new_shared_contact(shared, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law, ranks)
-      else if (method == fft_based) then
+      if (method == fft_based) then
         allocate (fft)
         slot%pressed => fft
         call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law)
@@ -140,6 +135,37 @@ contains
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_pressed
+
+  !> Create a frictionless contact problem whose rows all ranks share; all call this.
+  subroutine new_pressed_part(lattice, bodies, gap, candidate, law, threads, handle, error)
+    integer, intent(in) :: threads
+    type(lattice_t), intent(in) :: lattice
+    class(elastic_medium_t), intent(in) :: bodies
+    !> Own rows of the gap before loading [m]
+    real(wp), intent(in) :: gap(:, :)
+    !> Nodes of them that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    class(normal_law_t), intent(in) :: law
+    !> Handle of the problem
+    integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks
+    type(error_t), allocatable, intent(out) :: error
+    type(slot_t), pointer :: slot
+    type(field_space_t) :: space
+    type(normal_contact_t), pointer :: fft
+    integer(c_int64_t) :: bytes
+
+    space = space_over(lattice%extent, threads)
+    bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
+    call take_window(lattice, bytes/ranks%size*ranks%on_node, threads, slot, handle, error)
+    call ranks%agree(error)
+    if (.not. allocated(error)) then
+      allocate (fft)
+      slot%pressed => fft
+      call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law, ranks=ranks)
+    end if
+    if (allocated(error)) call free_object(handle)
+  end subroutine new_pressed_part
 
   !> Create a contact problem with friction: by FFT on all ranks, of which the first one has gap and candidates.
   subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, goodman, threads, wake, handle, error)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,3 +48,32 @@ def has_entries(values: Any) -> bool:
         return np.ndim(values) > 0
     except ValueError:
         return True
+
+
+class Banded(Mapping[str, NDArray[Any]]):
+    """Fields that are not in memory, or not all of their rows."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._names = [*names]
+
+    @abstractmethod
+    def bands(self, name: str) -> Iterator[NDArray[Any]]:
+        """Yield the rows of a field in bands, one after the other."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a whole field; KeyError if there is none."""
+        if name not in self._names:
+            raise KeyError(name)
+        return np.concatenate([*self.bands(name)])
+
+    def __contains__(self, name: object) -> bool:
+        """Test whether there is such a field."""
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of fields."""
+        return len(self._names)

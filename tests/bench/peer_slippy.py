@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import slippy
 import slippy.core
-from square_window import best_of, main, square_window
+from slippy.core import elastic_material
+from square_window import best_of, main, rough_window, square_window
 
 
 def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[str, Any]:
@@ -37,5 +38,37 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[st
     return {"setup": setup, "solve": seconds, **contact.errors(pressure, total - approach, approach)}
 
 
+def rough(side: int, tolerance: float, repeats: int) -> dict[str, Any]:
+    """The same iteration on slippy's periodic symbol."""
+    slippy.CUDA = False
+    contact = rough_window(side)
+    h = 1.0 / side
+    start = np.full((side, side), contact.mean_pressure)
+
+    def set_up() -> Any:
+        waves = elastic_material.get_angular_velocity((side, side), (h, h))
+        squared = waves[0] ** 2 + waves[1] ** 2
+        symbol = elastic_material.elastic_influence_matrix_frequency(
+            waves[1], waves[0], np.sqrt(squared), squared, "zz", 1.0, 0.0
+        )
+        return slippy.core.plan_convolve(start, symbol, circular=True)
+
+    setup, product = best_of(repeats, set_up)
+    seconds, (failed, pressure, _) = best_of(
+        repeats,
+        lambda: slippy.core.polonsky_and_keer(
+            product, start, contact.gap, contact.mean_pressure, [h, h], eps_0=tolerance, max_it=20_000
+        ),
+    )
+    if failed:
+        raise RuntimeError("not converged")
+    total = contact.gap + product(pressure)
+    return {
+        "setup": setup,
+        "solve": seconds,
+        **contact.errors(pressure, total - total[pressure > 0].mean()),
+    }
+
+
 if __name__ == "__main__":
-    main({"hertz": hertz})
+    main({"hertz": hertz, "rough": rough})

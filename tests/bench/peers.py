@@ -28,8 +28,6 @@ ENOUGH = 10.0
 SIZES = (256, 512, 1024, 2048)
 ROUGH_SIZES = (256, 512, 1024)
 ROUGH_TOLERANCE = 1e-6
-ROUGH = ("tamaas", "ContactMechanics")
-"""Other codes that the rough problem is given to."""
 SHEARED_SIZES = (64, 128, 256, 512)
 TURNS = 3
 GROWTH = 6.0
@@ -158,9 +156,18 @@ def measure(
         sheared = (64,) if quick else SHEARED_SIZES
         pair = [code for code in codes if code.label in ("hexcontact", "aspher")]
         tables.append(cattaneo_mindlin(pair, sheared))
-    tables.append(rough(codes, [n for n in sizes or ROUGH_SIZES if n <= largest]))
     tables[0].remarks += absent
     return tables
+
+
+def measure_rough(
+    folder: Path, *, quick: bool, sizes: Sequence[int] | None = None, names: Sequence[str] | None = None
+) -> list[Table]:
+    """Return the table of a rough surface in a window that repeats."""
+    codes, absent = entries(folder, names)
+    table = rough(codes, [n for n in sizes or ROUGH_SIZES if n <= (512 if quick else 1024)])
+    table.remarks += absent
+    return [table]
 
 
 def hertz(codes: list[Entry], sizes: Sequence[int]) -> list[Table]:
@@ -230,11 +237,7 @@ def rough(codes: list[Entry], sizes: Sequence[int]) -> Table:
             "Self-affine, H = 0.8, wavelengths of 16 to a quarter of the nodes, mean pressure 0.05 E* h'."
         ],
     )
-    lines = [
-        Entry(code.label, code.python, code.script, ROUGH_TOLERANCE)
-        for code in codes
-        if code.label in ("hexcontact", *ROUGH)
-    ]
+    lines = [Entry(code.label, code.python, code.script, ROUGH_TOLERANCE) for code in codes]
     for side in sizes:
         answers = side_by_side(table, lines, side, {"problem": "rough", "side": side})
         ours = answers["hexcontact"]

@@ -86,6 +86,7 @@ def sections(options: argparse.Namespace) -> dict[str, Section]:
         "laws": partial(laws.measure, **quick),
         "layers": partial(layers.measure, **quick, **long),
         "peers": partial(peers.measure, options.peers, **quick, **sizes, names=options.codes),
+        "rough_peers": partial(peers.measure_rough, options.peers, **quick, **sizes, names=options.codes),
         "contact": partial(contact.measure, options.contact, **quick, **sizes),
         "lapack_methods": partial(lapack.methods_table, **quick, **long),
         "lapack_steps": partial(lapack.steps_table, **quick),

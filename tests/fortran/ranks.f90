@@ -1,6 +1,7 @@
 !> Tests of what several ranks do together.
 module ranks_tests
   use, intrinsic :: iso_c_binding, only: c_loc
+  use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
@@ -14,6 +15,9 @@ module ranks_tests
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use hc_contact_edges, only: contact_edges_t
+  use hc_state_measures, only: state_measures_t, measure_contact, rises_to_end
+  use hc_window_growth, only: grown_window, shared_grown_window
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
@@ -40,6 +44,7 @@ contains
       new_test('slabs', test_slabs), &
       new_test('reductions', test_reductions), &
       new_test('rows', test_rows), &
+      new_test('words', test_words), &
       new_test('errors', test_errors), &
       new_test('products', test_products), &
       new_test('periodic_products', test_periodic_products), &
@@ -144,6 +149,28 @@ contains
     call ranks%fetch(10, 23, c_loc(field), [first, last], c_loc(some), on_first=.true.)
     call check_true(error, all(nint(some) == reshape([(i, i=5*first - 4, 5*last)], shape(some))), 'rows of the first rank')
   end subroutine test_rows
+
+  !> The first rank tells each other rank some words, which gives them back.
+  subroutine test_words(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer(int32) :: words(3)
+    integer :: r, n
+
+    do r = 1, ranks%size - 1
+      if (ranks%rank == 0) then
+        call ranks%tell([1_int32, 2_int32, int(r, int32)], r)
+        call ranks%take(words, r)
+        call check_true(error, all(words == [2, 4, 2*r]), 'words')
+        if (allocated(error)) return
+      else if (ranks%rank == r) then
+        call ranks%wait_for_words(n)
+        call check_true(error, n == 3, 'number of words')
+        call ranks%hear(words)
+        call ranks%give(2*words)
+        if (allocated(error)) return
+      end if
+    end do
+  end subroutine test_words
 
   !> An error of one rank is one of all, and names it.
   subroutine test_errors(error)
@@ -254,7 +281,46 @@ contains
     if (allocated(error)) return
     call compare_states(expected, found, rows, error)
     call ranks%agree(error)
+    if (allocated(error)) return
+    call compare_measures(lattice, gap, candidate, expected, found, rows, error)
+    call ranks%agree(error)
   end subroutine compare_contacts
+
+  !> Compare measures with those of one rank, to the bit, and larger windows.
+  subroutine compare_measures(lattice, gap, candidate, expected, found, rows, error)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: gap(:, :)
+    logical, intent(in) :: candidate(:, :)
+    type(contact_state_t), intent(in) :: expected, found
+    integer, intent(in) :: rows(2)
+    type(error_t), allocatable, intent(out) :: error
+    type(state_measures_t) :: of_all, of_parts
+    type(contact_edges_t) :: edges
+    type(field_space_t) :: space
+    type(lattice_t) :: grown, grown_from_parts
+    logical :: rises, rise_in_parts
+
+    call measure_contact(lattice, gap, candidate, expected, space, of_all, edges)
+    rises = rises_to_end(candidate, expected%pressure, space, lattice%extent(2))
+    grown = grown_window(lattice, expected%zone > 0)
+    space%ranks = ranks
+    call measure_contact(lattice, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), found, space, of_parts, edges)
+    rise_in_parts = rises_to_end(candidate(:, rows(1):rows(2)), found%pressure, space, lattice%extent(2))
+    grown_from_parts = shared_grown_window(lattice, found%zone > 0, space)
+    call check(error, [of_parts%contact%area_error, of_parts%mean_gap, of_parts%elastic_energy], &
+               [of_all%contact%area_error, of_all%mean_gap, of_all%elastic_energy], 0.0_wp, 'measures of windows that repeat')
+    if (allocated(error) .or. lattice%is_periodic()) return
+    associate (one => of_all%contact, all => of_parts%contact)
+      call check(error, [all%area, all%radius, all%area_fit, all%radius_fit, all%semi_major, all%semi_minor, &
+                         of_parts%pressure_center, of_parts%max_pressure, of_parts%elastic_energy], &
+                 [one%area, one%radius, one%area_fit, one%radius_fit, one%semi_major, one%semi_minor, of_all%pressure_center, &
+                  of_all%max_pressure, of_all%elastic_energy], 0.0_wp, 'measures')
+    end associate
+    if (allocated(error)) return
+    call check_true(error, rises .eqv. rise_in_parts, 'rise to an end')
+    if (allocated(error)) return
+    call check_true(error, all(grown%first == grown_from_parts%first) .and. all(grown%extent == grown_from_parts%extent), 'grown')
+  end subroutine compare_measures
 
   !> Compare own rows.
   subroutine compare_states(expected, found, rows, error)
@@ -361,16 +427,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
-    do k = 0, 3
-      call shear_sphere(merge(40, 83, k < 2), modulo(k, 2) == 1, error)
+    do k = 0, 5
+      call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, error)
       if (allocated(error)) return
     end do
   end subroutine test_friction
 
   !> Compare the ends of two load steps with those of one rank.
-  subroutine shear_sphere(n, unlike, error)
+  subroutine shear_sphere(n, unlike, periodic, error)
     integer, intent(in) :: n
-    logical, intent(in) :: unlike
+    logical, intent(in) :: unlike, periodic
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(elastic_pair_t) :: pair
@@ -384,6 +450,7 @@ contains
     call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
     if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
     if (allocated(error)) return
+    lattice%periodic = periodic
     call sphere(lattice, gap)
     call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)

@@ -4,7 +4,7 @@ module test_steps
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
-    displacement_control, rim_reached, separated, slip, stick
+    displacement_control, force_control, rim_reached, separated, slip, stick
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_coulomb, only: coulomb_t
   use hc_field_space, only: field_space_t
@@ -20,6 +20,8 @@ module test_steps
   use hc_contact_residuals, only: normal_self_compliance
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_contact_search, only: contact_search_t, find_rough_pressure
+  use hc_normal_law, only: unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_wear_ahead, only: energy_ahead, worn_cycle_t
   use hc_wear_path, only: cycle_step_t, wear_path_t
@@ -61,7 +63,9 @@ contains
       new_test('wear_without_slip', test_no_wear), &
       new_test('change_by_halves', test_change_by_halves), &
       new_test('wear_left', test_wear_left), &
-      new_test('turning_limits_a_step', test_turning) &
+      new_test('turning_limits_a_step', test_turning), &
+      new_test('search', test_search), &
+      new_test('search_without_end', test_search_without_end) &
     ]
   end subroutine collect_steps
 
@@ -841,5 +845,72 @@ contains
     end function sheared
 
   end subroutine test_change_by_halves
+
+  !> A sphere off the origin whose contact radius by Hertz is 1: it is found from guesses that are far too small and too large, and
+  !> the contact has eight spacings in its radius at least.
+  subroutine test_search(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: guess(3) = [1.0e-3_wp, 1.0_wp, 40.0_wp], center(2) = [0.3_wp, -0.2_wp]
+    type(contact_search_t) :: search
+    type(lattice_t) :: lattice
+    integer :: k
+
+    do k = 1, size(guess)
+      call search_contact(guess(k), center, [1.0_wp, 1.0_wp], search, lattice, error)
+      if (.not. allocated(error)) call check(error, search%verdict, accepted, 'the contact is found')
+      if (allocated(error)) return
+      call check(error, sqrt(search%n_contact*lattice%cell_area()/pi), 1.0_wp, 0.06_wp, 'contact radius by Hertz')
+      if (allocated(error)) return
+      call check(error, 2.0_wp*sqrt(search%moment(:2)), [1.0_wp, 1.0_wp], 0.06_wp, 'half-axes of the moments')
+      if (allocated(error)) return
+      call check(error, search%max_pressure, 2.0_wp/pi**2, 0.05_wp*2.0_wp/pi**2, 'largest pressure by Hertz')
+      if (allocated(error)) return
+      call check(error, 0.5_wp*search%size, [1.0_wp, 1.0_wp], 0.15_wp, 'extent of the contact')
+      if (allocated(error)) return
+      call check_true(error, 8.0_wp*search%spacing < 1.06_wp, 'eight spacings in the radius')
+      if (allocated(error)) return
+    end do
+  end subroutine test_search
+
+  !> A cylinder touches along a line, so that no lattice holds the contact.
+  subroutine test_search_without_end(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_search_t) :: search
+    type(lattice_t) :: lattice
+
+    call search_contact(1.0_wp, [0.0_wp, 0.0_wp], [1.0_wp, 0.0_wp], search, lattice, error)
+    if (.not. allocated(error)) call check(error, search%verdict, failed, 'the contact has no end')
+  end subroutine test_search_without_end
+
+  !> Search for the contact of a paraboloid under 4/(3 pi), for E* = 1/pi.
+  subroutine search_contact(guess, center, curvature, search, lattice, error)
+    !> Guess of the radius, center, and curvatures along x and y
+    real(wp), intent(in) :: guess, center(2), curvature(2)
+    !> The search, and its last lattice
+    type(contact_search_t), intent(out) :: search
+    type(lattice_t), intent(out) :: lattice
+    type(error_t), allocatable, intent(out) :: error
+    type(load_target_t) :: target
+    real(wp), allocatable :: x(:, :), y(:, :), pressure(:, :)
+    real(wp) :: basis(2, 2)
+
+    target%control(normal) = force_control
+    target%value(normal) = 4.0_wp/(3.0_wp*pi)
+    basis = equilateral_basis(1.0_wp)
+    call search%begin(guess, [center(1) - center(2)*basis(1, 2)/basis(2, 2), center(2)/basis(2, 2)], 1.0_wp)
+    do while (search%verdict == pending)
+      call new_lattice(lattice, equilateral_basis(search%spacing), nint(search%first), nint(search%extent), error)
+      if (allocated(error)) return
+      associate (n => lattice%extent)
+        if (allocated(x)) deallocate (x, y, pressure)
+        allocate (x(n(1), n(2)), y(n(1), n(2)), pressure(n(1), n(2)))
+      end associate
+      call lattice%coordinates(x, y)
+      call find_rough_pressure(lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), unilateral_t(), &
+                               0.5_wp*(curvature(1)*(x - center(1))**2 + curvature(2)*(y - center(2))**2), target, pressure, error)
+      if (allocated(error)) return
+      call search%judge(lattice, pressure)
+    end do
+  end subroutine search_contact
 
 end module test_steps

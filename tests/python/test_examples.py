@@ -13,8 +13,7 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
-from hexcontact import case
-from hexcontact.core import influence
+from hexcontact import case, influence
 from hexcontact.solve import session
 
 ROOT = Path(__file__).parents[2]

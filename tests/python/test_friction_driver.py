@@ -17,12 +17,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
+from hexcontact import influence
 from hexcontact.analytic import hertz_sphere
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.case import Case
 from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
-from hexcontact.core import contact, flat, friction, handles, influence, memory
+from hexcontact.core import contact, flat, friction, handles, memory
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.handles import HeldState

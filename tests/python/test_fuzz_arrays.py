@@ -25,8 +25,9 @@ from hexcontact import (
     Study,
     analytic,
     fatigue,
+    influence,
 )
-from hexcontact.core import contact, influence
+from hexcontact.core import contact
 
 LATTICE = Lattice(spacing=1e-4, row_first=-4, col_first=-4, n_row=9, n_col=9)
 GAP = (LATTICE.x**2 + LATTICE.y**2) / 20e-3

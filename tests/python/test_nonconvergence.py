@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexcontact import Case, ConvergenceError
-from hexcontact.core import influence
+from hexcontact import Case, ConvergenceError, influence
 from hexcontact.solve import nonconvergence
 from hexcontact.solve.steps import steps, window_type
 from hexcontact.solve.window import state_of

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hexcontact.core import flat
-from hexcontact.core.influence import pyramid_functions
+from hexcontact.influence import pyramid_functions
 
 HEIGHT = np.sqrt(0.75)
 INFLUENCE = runpy.run_path(str(Path(__file__).parents[2] / "docs/images/influence.py"))

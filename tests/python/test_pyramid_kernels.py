@@ -9,7 +9,7 @@ import pytest
 
 import hexcontact
 from hexcontact import DeckError
-from hexcontact.core.influence import (
+from hexcontact.influence import (
     PyramidFunctions,
     linear_load_displacement,
     pyramid_functions,

@@ -74,9 +74,13 @@ def test_one_process_of_a_launcher_runs(
 
 
 def launched(
-    folder: Path, ranks: int, *words: str, program: tuple[str, ...] = ("-m", "hexcontact")
+    folder: Path,
+    ranks: int,
+    *words: str,
+    program: tuple[str, ...] = ("-m", "hexcontact"),
+    path: Path | None = None,
 ) -> subprocess.Popen[str]:
-    """Start the command, or another program, in several processes."""
+    """Start the command, or another program, in several processes, which look for modules in a path first."""
     launcher = "mpirun.mpich" if "mpich" in os.environ.get("FC", "") else "mpirun.openmpi"
     environment = ENVIRONMENT | {
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -85,6 +89,8 @@ def launched(
         "OMPI_MCA_hwloc_base_binding_policy": "none",
         "OMPI_MCA_mpi_yield_when_idle": "1",
     }
+    if path is not None:
+        environment["PYTHONPATH"] = os.pathsep.join([str(path), environment.get("PYTHONPATH", "")])
     command = [launcher, "-n", str(ranks), sys.executable, *program, *words]
     return subprocess.Popen(
         command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -113,38 +119,22 @@ def assert_same(first: Path, second: Path) -> None:
             np.testing.assert_array_equal(one[name][:], several[name][:], err_msg=name)
 
 
-# Two steps on a window beside the contact: it grows in the first one.
-GROWING = """
-import dataclasses, sys
-from hexcontact import Case
-from hexcontact.core import ranks
-
-with ranks.together() as first:
-    if first:
-        case = Case.from_file("sphere.toml")
-        case.lattice = dataclasses.replace(case.lattice, row_first=-219, n_row=220, col_first=-150, n_col=300)
-        case.run(sys.argv[1])
-"""
-
-
-@with_mpi
-def test_a_window_grows_as_in_one_process(tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("window = [261, 300]", ""))
-    (tmp_path / "growing.py").write_text(GROWING)
-    alone = subprocess.run(
-        [sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False
-    )
-    assert alone.returncode == 0
-    process = launched(tmp_path, 2, "all.nc", program=("growing.py",))
-    out, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, out + err
-    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
-    with netCDF4.Dataset(tmp_path / "all.nc") as result:
-        assert result["pressure"].shape[1] > 220
-
-
 SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]") + (
     '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n[solver]\ntolerance = 1e-12\n'
+)
+ADAPTIVE = SHEARED.replace("steps = 2\n[[load]]", "[[load]]").replace("steps = 2", 'steps = "auto"') + (
+    "[solver]\nstep_tolerance = 0.3\n"
+)
+SHEARED_WAVES = (
+    WAVES.partition("[[load]]")[0]
+    + """
+[friction]
+coefficient = 0.3
+[[load]]
+mean_pressure = "200 MPa"
+[[load]]
+mean_traction_x = "20 MPa"
+"""
 )
 WORN = """
 [[load]]
@@ -164,8 +154,10 @@ cycles = 1_000
         (2, SHEARED),
         (3, SHEARED.replace('"72 GPa"', '"432 GPa"').replace("in_radius = 20", "in_radius = 95")),
         (2, SHEARED.replace("steps = 2", "") + WORN),
+        (3, ADAPTIVE),
+        (2, SHEARED_WAVES),
     ],
-    ids=["unlike", "alike", "worn"],
+    ids=["unlike", "alike", "worn", "adaptive", "waves"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     (tmp_path / "sphere.toml").write_text(deck)
@@ -185,9 +177,42 @@ def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) ->
             )
 
 
+# On a window beside the contact, which grows in the first step.
+GROWING = """
+import dataclasses, sys
+from hexcontact import Case
+from hexcontact.core import ranks
+
+with ranks.together() as first:
+    if first:
+        case = Case.from_toml("sphere.toml")
+        case.lattice = dataclasses.replace(case.lattice, row_first=-219, n_row=220, col_first=-150, n_col=300)
+        case.run(sys.argv[1])
+"""
+
+
 @with_mpi
-def test_a_killed_process_ends_all_and_leaves_the_finished_steps(tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 400"))
+@pytest.mark.parametrize("deck", [PRESSED, ADAPTIVE], ids=["pressed", "adaptive"])
+def test_a_window_grows_as_in_one_process(deck: str, tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(deck.replace("window = [261, 300]", ""))
+    (tmp_path / "growing.py").write_text(GROWING)
+    alone = subprocess.run(
+        [sys.executable, "growing.py", "one.nc"], cwd=tmp_path, env=ENVIRONMENT, check=False
+    )
+    assert alone.returncode == 0
+    process = launched(tmp_path, 2, "all.nc", program=("growing.py",))
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
+    with netCDF4.Dataset(tmp_path / "all.nc") as result:
+        assert result["pressure"].shape[1] > 220
+
+
+@with_mpi
+@pytest.mark.parametrize("again", [1, 4])
+def test_a_run_whose_process_is_killed_resumes_with_another_number(again: int, tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 12"))
+    assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
     process = launched(tmp_path, 3, "run", "sphere.toml", "--quiet")
     journal = journal_of(tmp_path / "sphere.nc")
     wait_for(lambda: journal.is_dir() and len(list(journal.iterdir())) > 3)
@@ -198,6 +223,91 @@ def test_a_killed_process_ends_all_and_leaves_the_finished_steps(tmp_path: Path)
     wait_for(lambda: not any(map(runs, started)))
     done = inside(tmp_path, "info", str(journal))
     assert done.returncode == 0, done.stderr
+    process = launched(tmp_path, again, "resume", "sphere.nc")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert_same(tmp_path / "one.nc", tmp_path / "sphere.nc")
+
+
+@with_mpi
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
+def test_a_signal_ends_all_and_says_how_to_resume(number: signal.Signals, tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 400"))
+    process = launched(tmp_path, 2, "run", "sphere.toml", "--quiet")
+    journal = journal_of(tmp_path / "sphere.nc")
+    wait_for(lambda: journal.is_dir() and len(list(journal.iterdir())) > 3)
+    started = wait_for(lambda: ranks_of(process.pid, 2))
+    for pid in started:  # as a batch system sends it
+        os.kill(pid, number)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 128 + number
+    assert "hexcontact resume" in err
+    wait_for(lambda: not any(map(runs, started)))
+
+
+@with_mpi
+def test_a_gap_that_fails_on_another_rank_names_it(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED)
+    (tmp_path / "sitecustomize.py").write_text(FAILING)
+    process = launched(tmp_path, 3, "run", "sphere.toml", path=tmp_path)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4, out + err
+    assert "rank 2: no memory for the gap" in err
+
+
+# The last of three ranks has no memory for its rows of the gap.
+FAILING = """
+from hexcontact.core import ranks
+from hexcontact.problem.plane_field import PlaneField
+over = PlaneField.over
+def failing(self, lattice):
+    if ranks.rank == 2:
+        raise MemoryError("no memory for the gap")
+    return over(self, lattice)
+PlaneField.over = failing
+"""
+
+
+@with_mpi
+def test_a_full_disk_between_two_ranks_ends_all(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED)
+    (tmp_path / "sitecustomize.py").write_text(FULL)
+    process = launched(tmp_path, 3, "run", "sphere.toml", path=tmp_path)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 4, out + err
+    assert "cannot write step 1" in err
+
+
+# The disk is full after the rows of the first rank.
+FULL = """
+import errno, os
+import hexcontact.core.shared as shared
+taken = shared.SharedSolution.rows
+def rows(self, rank, *more):
+    if rank == 1:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    return taken(self, rank, *more)
+shared.SharedSolution.rows = rows
+"""
+
+
+@with_mpi
+def test_fields_of_bodies_are_those_of_one_process(tmp_path: Path) -> None:
+    fields = '[output]\nfields = ["pressure", "displacement_1_z", "displacement_2_y"]\n'
+    (tmp_path / "sphere.toml").write_text(PRESSED + fields)
+    assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
+    process = launched(tmp_path, 2, "run", "sphere.toml", "--output", "all.nc")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
+
+
+@with_mpi
+def test_more_ranks_than_rows_leave_the_work_to_the_first(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED.replace("[261, 300]", "[7, 9]").replace("= 20", "= 2"))
+    process = launched(tmp_path, 5, "run", "sphere.toml", "--output", "all.nc")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
 
 
 def ranks_of(launcher: int, count: int) -> list[int]:

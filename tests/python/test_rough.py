@@ -105,6 +105,18 @@ def test_unlike_rough_bodies_with_friction() -> None:
         assert float(coarse[name]) == pytest.approx(float(fine[name]), rel=0.1)
 
 
+@pytest.mark.parametrize(("other", "work"), [(STEEL, 27.0), ({"rigid": True}, 63.0)])
+def test_work_with_friction(other: dict, work: float) -> None:
+    """Alike and unlike bodies, pressed and sheared to 60 % of sliding, each in one load step."""
+    surface = {"shape": "rough", **WAVES, "rms_slope": 0.05}
+    steps = Case(
+        body_1={**STEEL, "surface": surface}, body_2=other, friction_coefficient=0.3,
+        boundary="periodic", extent=(SIDE, SIDE), nodes_across=128,
+        loads=[{"mean_pressure": 5e8}, {"mean_traction_x": 9e7}],
+    ).run().dataset  # fmt: skip
+    assert (steps["operator_applications"].values < work).all()
+
+
 def test_friction_on_512_by_512_nodes() -> None:
     """Superposition with ν = 0, and unlike bodies beside a lattice a quarter as fine."""
     assert repeating.superposed(512, (0.6,)).passed

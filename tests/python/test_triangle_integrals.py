@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexcontact import DeckError
-from hexcontact.core.influence import linear_load_displacement, triangle_displacement, triangle_integral
+from hexcontact.influence import linear_load_displacement, triangle_displacement, triangle_integral
 
 TABLE = Path(__file__).parents[1] / "reference" / "triangle_integrals.csv"
 TRIPLES = [

@@ -233,6 +233,7 @@ SURFACES = {
     "asperity": (repeating.asperity, {"cells": (8, 16)}),
     "rough": (repeating.rough, {"nodes": (64, 128), "pressures": (0.03,), "seeds": (1,)}),
     "superposed": (repeating.superposed, {"nodes": 64, "parts": (0.6,)}),
+    "sheared": (repeating.sheared, {"nodes": (64, 128)}),
 }
 
 

@@ -239,3 +239,36 @@ def superposed(nodes: int = 128, parts: Sequence[float] = (0.3, 0.6, 0.9)) -> Co
         found.add(where, "shift", "um", float(sheared["shift_x"]), analytic=shift, relative=1e-8)
     found.notes.append(f"{nodes} x {nodes} nodes, ν = 0 on both bodies, μ = 0.3: q = μ(p(P) - p(P - Q/μ)).")
     return found
+
+
+def _sheared(nodes: int, share: float) -> Any:
+    """Return the last load step of a rough surface on a rigid flat, pressed to 2 % of E*, then sheared."""
+    surface = Rough(hurst=0.8, shortest=16e-6, longest=128e-6, rms_slope=0.05, seed=2)
+    pressure, mu = 5e8, 0.3
+    case = Case(
+        body_1={**STEEL, "surface": surface},
+        body_2={"rigid": True},
+        friction_coefficient=mu,
+        boundary="periodic",
+        extent=(0.256e-3, 0.256e-3),
+        nodes_across=nodes,
+        loads=[{"mean_pressure": pressure, "steps": 2}, {"mean_traction_x": share * mu * pressure}],
+    )
+    return case.run().dataset.isel(step=-1)
+
+
+def sheared(nodes: Sequence[int] = (128, 256, 512), share: float = 0.6) -> Comparison:
+    """Unlike bodies, pressed and sheared: each lattice beside one twice as fine."""
+    found = Comparison()
+    solved = [_sheared(count, share) for count in nodes]
+    for count, coarse, fine in zip(nodes, solved, solved[1:], strict=False):
+        for name in ("shift_x", "dissipated_energy", "stick_area", "mean_gap"):
+            ratio = float(coarse[name]) / float(fine[name])
+            about = f"{name} over that of {2 * count} nodes"
+            found.add(f"{count} nodes", about, "-", ratio, analytic=1.0, absolute=6.0 / count)
+    found.notes.append(
+        f"A rough steel surface on a rigid flat, μ = 0.3, Q = {share:g} μP, "
+        f"{solved[-1]['operator_applications'].item():.0f} operator applications in the last load step on "
+        f"{nodes[-1]} x {nodes[-1]} nodes."
+    )
+    return found

@@ -52,7 +52,6 @@ def run(
             if plot:  # refuses before the run
                 picture_beside(target)
             if again and _was_begun(target, case):
-                ranks.refuse_copies("run --resume")
                 return _resumed(target, plot, messages, case=case)
             with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
                 extent = solved(case, store, pipe, deck.stem, messages)
@@ -80,10 +79,12 @@ def resume(
     from ..core import ranks
     from .solving import Messages
 
-    ranks.refuse_copies("resume")
     messages = Messages("resume", quiet, as_json, log_file, log_level)
-    with messages.logging(file):
-        return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
+    with ranks.together() as first:
+        if not first:
+            return None
+        with messages.logging(file):
+            return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
 
 
 def _was_begun(target: Path, case: Problem) -> bool:

@@ -31,6 +31,11 @@ def called(procedure: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
     return found[0] if len(found) == 1 else found
 
 
+def status_of(error: HexcontactError) -> int:
+    """Return the status of the core for an error."""
+    return next((status for status, kind in _ERRORS.items() if isinstance(error, kind)), 4)
+
+
 def flattened(*given: tuple[ArrayLike, int]) -> list[Any]:
     """Return the shape of points, and their arrays, each with a number of further axes, over one axis."""
     arrays = [(np.asarray(values), further) for values, further in given]

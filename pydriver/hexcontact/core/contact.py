@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal, TypeVar
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, reals
 from ..errors import DeckError, RimWarning, warn
-from . import flat, kernel_cache, ranks
+from . import flat, kernel_cache
 from .calls import checked
 from .handles import Handle, HeldState, Solved
 from .lattice import Lattice
@@ -27,7 +27,7 @@ UNILATERAL: Interface = (0.0, 0.0, 0.0)  # bodies that do not penetrate
 MOST_IN_CONTACT = 10**8  # largest number of nodes for estimates of memory, whose square does not overflow
 _SHAPE = " (rows, columns)"
 _METHODS = {("direct", "newton"): 0, ("fft", "newton"): 1, ("direct", "dissertation"): 2}
-_STOPPED = (  # in the order of fortran/contact_state.f90
+STOPPED = (  # in the order of fortran/contact_state.f90
     "nothing was solved",
     "",  # converged
     "all iterations that are allowed were made",
@@ -279,7 +279,7 @@ class Contact(Handle):
         """Return the solution behind a handle, with views of its fields."""
         held = HeldState(handle, self.lattice.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
-        found |= {"zone": held.view("zone").astype(np.int8), "stopped": _STOPPED[found["stopped"]]}
+        found |= {"zone": held.view("zone").astype(np.int8), "stopped": STOPPED[found["stopped"]]}
         names = [field.name for field in fields(kind)]
         found |= {name: held.view(name) for name in names if name not in found}
         return kind(**{name: found[name] for name in names}).behind(held)
@@ -332,12 +332,7 @@ class NormalContact(Contact):
         interface: Interface = UNILATERAL,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        self._number: int | None = None  # of a problem of all ranks
         given = *self._surfaces, *checked(interface=interface, threads=threads)
-        if ranks.count > 1 and method == "fft":
-            self._number = ranks.numbered(self)
-            # without arrays that the lattice keeps
-            ranks.order("create", self._number, replace(lattice), *given[1:2], *given[4:])
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -358,12 +353,24 @@ class NormalContact(Contact):
         driven = {"approach": approach} if normal_load is None else {"normal_load": normal_load}
         target, *limits = checked(**driven, tolerance=tolerance, max_sweeps=max_sweeps)
         control = 2 if normal_load is None else 1
-        if self._number is not None:
-            ranks.order("press", self._number, control, target, *limits)
         solution = self._found(NormalSolution, self.called(flat.press, control, target, *limits))
         solution.gap[~self._mask] += self._gap[~self._mask]
         self._warn_of_rim(solution)
         return solution
+
+
+def rough_pressure(
+    lattice: Lattice, pair: ElasticPair, gap: Array, interface: Interface = UNILATERAL, **driven: float
+) -> Array:
+    """Return the pressure of a rough frictionless solution under a normal load (N) or at an approach (m).
+
+    The gap (m) is infinite where nothing can touch.
+    """
+    [value], control = checked(**driven), 1 if "normal_load" in driven else 2
+    kernel_cache.take_settings()
+    pressure = flat.rough_pressure(lattice, pair, interface, gap, control, value)
+    kernel_cache.warn_of_faults()
+    return np.asarray(pressure)
 
 
 def memory_needed(
@@ -380,9 +387,7 @@ def memory_needed(
     """Return the memory (bytes) of a frictionless problem on a window, which may repeat."""
     code = ("problem", "operator", "set-up of the operator").index(part)
     window = window_size(method, n_row, n_col, contact)
-    needed = int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
-    shared = method == "fft" and part == "problem"
-    return needed * ranks.on_node // ranks.count if shared else needed
+    return int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
 
 
 def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:

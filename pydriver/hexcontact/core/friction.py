@@ -30,7 +30,7 @@ from .contact import (
     window_size,
 )
 from .flat import AdaptiveSteps
-from .handles import HeldState
+from .handles import Handle, HeldState
 from .lattice import Lattice
 
 Coupling = Literal["full", "goodman"]
@@ -209,9 +209,9 @@ class FrictionalContact(Contact):
         wake = np.empty(0, np.int32)
         if ranks.count > 1 and method == "fft":
             number = ranks.numbered(self)
-            wake = ranks.wake("follow", number)
+            wake = ranks.wake(_follow, number)
             # without arrays that the lattice keeps
-            ranks.order("create sheared", number, dataclasses.replace(lattice), *given[1:2], *given[4:])
+            ranks.others(_create_part, number, dataclasses.replace(lattice), *given[1:2], *given[4:])
         self._create(flat.create_sheared, method_code(method, iteration), *given, wake)
 
     def virgin(self) -> ContactState:
@@ -392,6 +392,24 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
         return FrictionLaw(mu, limit)
     [found] = checked(friction_coefficient=coefficient)
     return FrictionLaw(found, limit)
+
+
+class _Part(Handle):
+    """The part of a problem with friction on a rank other than the first."""
+
+    def __init__(self, lattice: Lattice, *given: Any) -> None:
+        self.lattice = lattice
+        self._create(flat.create_sheared_part, lattice, *given)
+
+
+def _create_part(number: int, *given: Any) -> None:
+    """Set up the part of this rank of a problem with friction."""
+    ranks.held[number] = _Part(*given)
+
+
+def _follow(number: int) -> None:
+    """Take part in a call of the solver of the first rank."""
+    flat.follow(ranks.held[number])
 
 
 def memory_needed(

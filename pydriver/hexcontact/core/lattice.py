@@ -36,6 +36,21 @@ class Pattern(NamedTuple):
         """Return a window of it."""
         return Lattice(spacing, row_first, col_first, n_row, n_col, *self)
 
+    def centered(self, spacing: float, center: tuple[float, float], shape: tuple[int, int]) -> Lattice:
+        """Return the window of `shape` (n_row, n_col) about the node nearest to `center`.
+
+        An odd count puts that node in the middle; of an even count, one node more lies on the negative side.
+        """
+        along, across = self.coordinates(*center)
+        col, row = round(float(along) / spacing), round(float(across) / spacing)
+        return self.window(spacing, row - shape[0] // 2, col - shape[1] // 2, *shape)
+
+    def enclosing(self, lower: Array, upper: Array, spacing: float, margin: int = 0) -> Lattice:
+        """Return the smallest window about all nodes between two coordinates, and `margin` nodes more."""
+        first = [math.floor(value / spacing) - margin for value in lower]
+        last = [math.ceil(value / spacing) + margin for value in upper]
+        return self.window(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1)
+
     def coordinates(self, x: Array | float, y: Array | float) -> tuple[Array, Array]:
         """Return the coordinates (m) of points along the two basis vectors, from node (0, 0)."""
         inverse = np.linalg.inv(self.window(1.0, 0, 0, 1, 1).basis)
@@ -102,16 +117,11 @@ class Lattice:
     ) -> Lattice:
         """Return the smallest window whose parallelogram covers a rectangle of a center and sides [m]."""
         pattern = Pattern(origin, cell_ratio, cell_angle, direction)
-        unit = pattern.window(spacing, 0, 0, 1, 1)
-        half = 0.5 * np.array([length_x, length_y])
-        signs = np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)])
-        indices = (signs * half + np.asarray(center) - origin) @ np.linalg.inv(unit.basis)
-        # a row or column on the side of the rectangle belongs to it, whatever the rounding
-        first = np.floor(indices.min(axis=0) + 1e-9).astype(int)
-        last = np.ceil(indices.max(axis=0) - 1e-9).astype(int)
-        n_col, n_row = (last - first + 1).tolist()
-        col_first, row_first = first.tolist()
-        return pattern.window(spacing, row_first, col_first, n_row, n_col)
+        half_x, half_y = 0.5 * length_x, 0.5 * length_y
+        x, y = np.array([-half_x, half_x, -half_x, half_x]), np.array([-half_y, -half_y, half_y, half_y])
+        corners = np.stack(pattern.coordinates(x + center[0], y + center[1]))
+        slack = 1e-9 * spacing  # a row or column on the side belongs to the rectangle, whatever the rounding
+        return pattern.enclosing(corners.min(axis=1) + slack, corners.max(axis=1) - slack, spacing)
 
     @property
     def pattern(self) -> Pattern:
@@ -186,6 +196,13 @@ class Lattice:
         low, extent = (each.tolist() for each in flat.grown_window(self, contact))
         row, col = self.row_first + low[1], self.col_first + low[0]
         return replace(self, row_first=row, col_first=col, n_row=extent[1], n_col=extent[0])
+
+    def joined(self, *others: Lattice) -> Lattice:
+        """Return the smallest window about this one and others of the same lattice."""
+        first = np.array([(one.row_first, one.col_first, *one.shape) for one in (self, *others)])
+        row, col = first[:, :2].min(axis=0).tolist()
+        row_end, col_end = (first[:, :2] + first[:, 2:]).max(axis=0).tolist()
+        return replace(self, row_first=row, col_first=col, n_row=row_end - row, n_col=col_end - col)
 
     def embed(self, field: NDArray[np.generic], other: Lattice, fill: float = 0.0) -> NDArray[np.generic]:
         """Return a field of this window on another one of the same lattice, whose other nodes are filled."""

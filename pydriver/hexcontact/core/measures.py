@@ -127,15 +127,20 @@ def measures(
     """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
     given = initial_gap, candidate, solution
     if isinstance(solution, ContactState):
-        found: dict[str, float] = flat.measure_friction(lattice, friction, *given)._asdict()
-    else:
-        found = flat.measure_pressure(lattice, *given)._asdict()
-        found = {name: value for name, value in found.items() if not VARIABLES[name].frictional}
+        return recorded(lattice, flat.measure_friction(lattice, friction, *given), friction=True)
+    return recorded(lattice, flat.measure_pressure(lattice, *given), friction=False)
+
+
+def recorded(lattice: Lattice, found: Any, *, friction: bool) -> dict[str, float]:
+    """Return the measures of the core that the load history of a window has."""
+    known = {
+        name: value for name, value in found._asdict().items() if friction or not VARIABLES[name].frictional
+    }
     if lattice.periodic:  # no edges, and no place of a zone
-        found = {
-            name: value for name, value in found.items() if VARIABLES[name].required or not math.isnan(value)
+        known = {
+            name: value for name, value in known.items() if VARIABLES[name].required or not math.isnan(value)
         }
-    return found
+    return known
 
 
 def turning_points(values: Array) -> list[int]:

@@ -1,7 +1,8 @@
 """Processes (ranks) that a launcher of MPI starts together.
 
-The first rank runs the command: it reads the deck and writes the files. The others wait for its orders and
-hold their rows of the problems that it sets up. An order is a procedure of `_ORDERS` and its arguments.
+The first rank runs the command: it reads the deck and writes the files. The others wait for its orders. An
+order is a procedure with its arguments: all ranks call it together, or one rank alone, whose answer the first
+one takes.
 """
 
 from __future__ import annotations
@@ -13,14 +14,18 @@ import pickle
 import signal
 import sys
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DeckError, HexcontactError
+from ..arrays import Array
+from ..errors import DeckError, HexcontactError, ResourceError
 from . import flat
+from .calls import status_of
+from .lattice import Lattice
 
 # Number of processes, by launcher: Open MPI, MPICH and its relatives, `srun`. Slurm sets SLURM_NTASKS in
 # scripts of a single process, too, SLURM_STEP_NUM_TASKS for processes of `srun` alone.
@@ -30,20 +35,11 @@ _COUNTS = {
     "SLURM_STEP_NUM_TASKS": "srun",
 }
 _WORD = np.dtype(np.int32).itemsize
-_END = "end"
 
-count, on_node = 1, 1  # ranks, and those on this machine
-_numbers = itertools.count()  # of shared problems
-_forgotten: list[int] = []  # problems that the first rank has freed
-_parts: dict[int, Part] = {}  # problems of another rank
-
-
-class Part:
-    """The part of a problem on a rank other than the first."""
-
-    def __init__(self, handle: int, lattice: Any) -> None:
-        self._handle, self.lattice = handle, lattice
-        weakref.finalize(self, flat.free_object, handle)
+rank, count, on_node = 0, 1, 1  # this rank; ranks, and those on this machine
+held: dict[int, Any] = {}  # the part of this rank of each object that all ranks share
+_numbers = itertools.count()
+_forgotten: list[int] = []  # objects that the first rank has freed
 
 
 def _launched() -> tuple[int, str]:
@@ -68,7 +64,7 @@ def refuse_copies(command: str) -> None:
 @contextlib.contextmanager
 def together() -> Iterator[bool]:
     """Join the processes of a launcher: True on the first, the others serve it until its block ends."""
-    global count, on_node
+    global rank, count, on_node
     launched, launcher = _launched()
     if launched == 1:
         yield True
@@ -81,32 +77,50 @@ def together() -> Iterator[bool]:
         )
     try:
         if rank:
-            _serve_to_the_end(rank)
+            _serve_to_the_end()
         yield not rank
     finally:
         if not rank:
-            _tell(_END)
-        count, on_node = 1, 1
+            others(_end)
+        rank, count, on_node = 0, 1, 1
         flat.finish_ranks()
 
 
-def numbered(problem: object) -> int:
-    """Return the number of a new problem of all ranks, which forget it with its object on the first one."""
+def _end() -> None:
+    """End the service of the other ranks."""
+
+
+def numbered(owner: object) -> int:
+    """Return the number of a new object of all ranks, which forget it with its owner on the first one."""
     number = next(_numbers)
-    weakref.finalize(problem, _forgotten.append, number)
+    weakref.finalize(owner, _forget, number).atexit = False
     return number
 
 
-def order(name: str, *arguments: Any) -> None:
-    """Let the other ranks call a procedure of `_ORDERS`, while the first one calls its own."""
+def _forget(number: int) -> None:
+    """Free the own part of an object, and those of the other ranks with the next order."""
+    held.pop(number, None)
+    _forgotten.append(number)
+
+
+def others(procedure: Callable[..., Any], *arguments: Any) -> None:
+    """Let the other ranks call a procedure, of which they report no failures."""
     if count > 1:
-        freed, _forgotten[:] = _forgotten[:], []
-        _tell(name, freed, *arguments)
+        freed = [_forgotten.pop() for _ in range(len(_forgotten))]
+        words = _words(procedure, arguments, freed, False)
+        for other in range(1, count):
+            flat.tell_words(words, other)
 
 
-def wake(name: str, *arguments: Any) -> NDArray[np.int32]:
+def order(procedure: Callable[..., Any], *arguments: Any) -> Any:
+    """Let all ranks call a procedure, which raises an error on all of them or on none; return its result."""
+    others(procedure, *arguments)
+    return procedure(*arguments)
+
+
+def wake(procedure: Callable[..., Any], *arguments: Any) -> NDArray[np.int32]:
     """Return the words of an order, none on one rank, for a solver that sends it by itself."""
-    return _words(name, [], *arguments) if count > 1 else np.empty(0, np.int32)
+    return _words(procedure, arguments, (), False) if count > 1 else np.empty(0, np.int32)
 
 
 def _words(*order: Any) -> NDArray[np.int32]:
@@ -115,12 +129,45 @@ def _words(*order: Any) -> NDArray[np.int32]:
     return np.frombuffer(text + bytes(-len(text) % _WORD), np.int32).copy()
 
 
-def _tell(*order: Any) -> None:
-    """Send an order to the other ranks."""
-    flat.share_words(_words(*order))
+def ask(other: int, procedure: Callable[..., Array], *arguments: Any, shape: tuple[int, int]) -> Array:
+    """Return the array that a procedure returns on a rank."""
+    if other == rank:
+        return procedure(*arguments)
+    flat.tell_words(_words(procedure, arguments, (), True), other)
+    words = flat.take_words(other, 2 * shape[0] * shape[1])
+    return np.asarray(words).view(np.float64).reshape(shape)
 
 
-def _serve_to_the_end(rank: int) -> None:
+@contextlib.contextmanager
+def agreed() -> Iterator[None]:
+    """Raise the error of the first rank that has one on all ranks, which enter this block together."""
+    status, words = 0, ""
+    try:
+        yield
+    except HexcontactError as error:
+        status, words = status_of(error), str(error)
+    except MemoryError as error:
+        status, words = status_of(ResourceError()), str(error) or "not enough memory"
+    flat.agree(status, words)
+
+
+def least(value: float) -> float:
+    """Return the smallest of a value of all ranks."""
+    return float(flat.least_of_ranks(value))
+
+
+def rows(lattice: Lattice, of: int | None = None) -> Lattice:
+    """Return the window of the rows of a rank, by default this one."""
+    first, after = flat.rows_of_rank(rank if of is None else of, lattice.n_row)
+    return replace(lattice, row_first=lattice.row_first + first, n_row=after - first)
+
+
+def share(lattice: Lattice) -> bool:
+    """Test whether all ranks share the rows of a window: one that is not too small."""
+    return count > 1 and bool(flat.shares_window(lattice.extent))
+
+
+def _serve_to_the_end() -> None:
     """Follow the orders of the first rank; end the process, and with it all, if that fails."""
     try:
         _serve()
@@ -134,36 +181,15 @@ def _serve() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
         signal.signal(number, signal.SIG_IGN)  # the first rank keeps its last step, and ends all
     while True:
-        words = np.empty(flat.next_words(), np.int32)
-        flat.share_words(words)
-        name, *arguments = pickle.loads(words.tobytes())
-        if name == _END:
-            _parts.clear()
-            return
-        for freed in arguments.pop(0):
-            _parts.pop(freed, None)
+        procedure, arguments, freed, answers = pickle.loads(flat.hear_words(flat.next_words()).tobytes())
+        if procedure is _end:
+            break
+        for number in freed:
+            held.pop(number, None)
+        if answers:
+            flat.give_words(np.ascontiguousarray(procedure(*arguments)).view(np.int32).ravel())
+            continue
         with contextlib.suppress(HexcontactError):
-            _ORDERS[name](*arguments)
-
-
-def _create(number: int, lattice: Any, pair: Any, interface: Any, threads: int) -> None:
-    """Set up the part of this rank of a problem."""
-    _parts[number] = Part(flat.create_pressed_part(lattice, pair, interface, threads), lattice)
-
-
-def _press(number: int, control: int, value: float, tolerance: float, max_sweeps: int) -> None:
-    """Take part in a solution, of which the first rank keeps the fields."""
-    flat.free_object(flat.press(_parts[number], control, value, tolerance, max_sweeps))
-
-
-def _create_sheared(number: int, lattice: Any, *given: Any) -> None:
-    """Set up the part of this rank of a problem with friction."""
-    _parts[number] = Part(flat.create_sheared_part(lattice, *given), lattice)
-
-
-def _follow(number: int) -> None:
-    """Take part in a call of the solver of the first rank."""
-    flat.follow(_parts[number])
-
-
-_ORDERS = {"create": _create, "press": _press, "create sheared": _create_sheared, "follow": _follow}
+            procedure(*arguments)
+        del procedure, arguments
+    held.clear()

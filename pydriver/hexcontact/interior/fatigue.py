@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import fatigue
 from ..arrays import Array, DataFrame, Dataset
-from ..core import fatigue, memory
+from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError, NotInResult

@@ -389,15 +389,6 @@ def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, NDArray[Any
 
     A window that repeats has all nodes.
     """
-    whole = lattice
-    if not lattice.periodic:
-        low = [min(getattr(lattice, name), getattr(target, name)) for name in ("row_first", "col_first")]
-        high = [
-            max(one.row_first + one.n_row for one in (lattice, target)),
-            max(one.col_first + one.n_col for one in (lattice, target)),
-        ]
-        whole = dataclasses.replace(
-            lattice, row_first=low[0], col_first=low[1], n_row=high[0] - low[0], n_col=high[1] - low[1]
-        )
+    whole = lattice if lattice.periodic else lattice.joined(target)
     rows, cols = target.rows - whole.row_first, target.cols - whole.col_first
     return whole, rows[:, None] % whole.n_row, cols[None, :] % whole.n_col

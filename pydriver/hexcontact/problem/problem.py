@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Mask
 from ..core import contact, friction, memory
@@ -248,6 +249,11 @@ class Problem:
         gap = self._gap_in(step).over(lattice)
         return gap, np.isfinite(gap)
 
+    @property
+    def plane_gap(self) -> PlaneField:
+        """The gap before loading at any point."""
+        return self._gap
+
     def _gap_in(self, step: LoadStep | None) -> PlaneField:
         """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:
@@ -261,12 +267,13 @@ class Problem:
         """
         return self._friction.over(lattice)
 
-    def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
+    def check_contact(self, number: int, zones: Callable[[], Iterable[tuple[Lattice, NDArray[Any]]]]) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
         gap = self._gap_in(self.load_steps[number - 1] if self.moves else None)
-        name, fault = gap.fault_near(lattice, contact) if self.period is None else ("", "")
-        if fault:
-            raise DeckError(f"{name}: the contact of load step {number} {fault}")
+        for rows, zone in zones() if gap.maps and self.period is None else ():
+            name, fault = gap.fault_near(rows, zone > 0)
+            if fault:
+                raise DeckError(f"{name}: the contact of load step {number} {fault}")
 
     def holes_near(self, contact: Estimate) -> int:
         """Return the number of holes of height maps within the bounds of an estimated contact."""
@@ -291,7 +298,7 @@ class Problem:
         moved = np.array(pattern.coordinates(*self.lattice.origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]
-            other.lattice = window.enclosing(bounds[:, 0], bounds[:, 1], spacing, window.MARGIN, pattern)
+            other.lattice = pattern.enclosing(*bounds.T, spacing, window.MARGIN)
         else:
             other.lattice = window.covering(self.lattice, spacing, pattern)
         return other
@@ -394,7 +401,7 @@ class Problem:
         if self.full_contact:
             assert grid.length is not None  # checked, as the window is
             assert grid.window is not None
-            lattice = window.centered(grid.length, center, grid.window, window.pattern_of(grid))
+            lattice = window.pattern_of(grid).centered(grid.length, center, grid.window)
             self._check_interface(source, lattice)
             return lattice
         try:

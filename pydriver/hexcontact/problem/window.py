@@ -1,8 +1,7 @@
 """The window of lattice nodes of a case: that of the deck, else from an estimate of the contact.
 
-The estimate solves the frictionless problem, for the largest load of the history, on a coarse lattice that is
-first enlarged until the contact lies inside and then refined until the contact is some sixteen nodes across
-where it is narrowest, for any shape. All bounds are in lattice coordinates (lengths along the two basis
+The core searches for the contact under the largest load of the history on coarse lattices without friction
+(fortran/path/contact_search.f90). All bounds are in lattice coordinates (lengths along the two basis
 vectors), since the window is a parallelogram.
 """
 
@@ -11,14 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Mask, reals
-from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
+from ..arrays import Array, Mask
+from ..core import flat
+from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
+from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import MISSING, Mistake
 from ..deck.height_map import Placed
 from ..deck.keys import Grid
@@ -28,11 +29,6 @@ from ..deck.units import readable
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
 
-START_NODES = 32
-NARROW_NODES = 8  # coarse spacings in the smaller half-width of the contact: good to a few per cent
-MOST_COARSE_NODES = 40_000
-MOST_TRIALS = 24  # coarse solutions; a contact along a line has no end
-MOST_ENLARGEMENTS = 12
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 _RIGHT = 1e-6  # rounding of a right angle
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
@@ -107,25 +103,6 @@ class Estimate(NamedTuple):
 # --- lattice coordinates ------------------------------------------------------------------------------------
 
 
-def centered(
-    spacing: float, center: tuple[float, float], shape: tuple[int, int], pattern: Pattern
-) -> Lattice:
-    """Return the window of `shape` (n_row, n_col) about the node nearest to `center`.
-
-    An odd count puts that node in the middle; of an even count, one node more lies on the negative side.
-    """
-    along, across = pattern.coordinates(*center)
-    col, row = round(float(along) / spacing), round(float(across) / spacing)
-    return pattern.window(spacing, row - shape[0] // 2, col - shape[1] // 2, *shape)
-
-
-def enclosing(lower: Array, upper: Array, spacing: float, margin: int, pattern: Pattern) -> Lattice:
-    """Return the smallest window about all nodes between two lattice coordinates, and `margin` nodes more."""
-    first = [math.floor(value / spacing) - margin for value in lower]
-    last = [math.ceil(value / spacing) + margin for value in upper]
-    return pattern.window(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1)
-
-
 def covering(window: Lattice, spacing: float, pattern: Pattern) -> Lattice:
     """Return the smallest window of another lattice about all nodes of a window."""
     moved = np.array(pattern.coordinates(*window.origin))
@@ -133,12 +110,7 @@ def covering(window: Lattice, spacing: float, pattern: Pattern) -> Lattice:
     last = first + np.array([window.n_col, window.n_row]) - 1
     slack = 1e-9 * spacing  # nodes that both have in common stay the rim, whatever the rounding
     lower, upper = (window.spacing * index + moved for index in (first, last))
-    return enclosing(lower + slack, upper - slack, spacing, 0, pattern)
-
-
-def reaches_rim(contact: Mask) -> bool:
-    """Test whether a contact reaches the rim of its window."""
-    return bool(contact[[0, -1]].any() or contact[:, [0, -1]].any())
+    return pattern.enclosing(lower + slack, upper - slack, spacing)
 
 
 # --- the estimate -------------------------------------------------------------------------------------------
@@ -155,41 +127,36 @@ def estimate_contact(
 ) -> Estimate:
     """Estimate the contact under a normal load (N) or at an approach (m)."""
     half = starting_half_size(pair, gap, center, **drive)
-    lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), pattern)
-    enclosed, enlargements = False, 0
-    for _ in range(MOST_TRIALS):
+    search = flat.begin_search(half, pattern.coordinates(*center), pattern.cell_ratio)
+    while search.verdict == PENDING:
+        size = map(int, (search.row_first, search.col_first, search.n_row, search.n_col))
+        lattice = pattern.window(search.spacing, *size)
         x, y = lattice.x, lattice.y
         height = np.asarray(gap(x, y), float)
-        pressure = _solve(pair, height, lattice, interface, **drive)
-        contact = pressure > 0
-        if not contact.any():
-            # under load control there is always contact; at an approach it may lie between the nodes
-            lattice = centered(lattice.spacing / 4, center, lattice.shape, pattern)
-            continue
-        if reaches_rim(contact):
-            if enclosed:
-                lattice = lattice.grown(contact)
-            elif (enlargements := enlargements + 1) > MOST_ENLARGEMENTS:
-                break
-            else:
-                lattice = centered(2 * lattice.spacing, center, lattice.shape, pattern)
-            continue
-        enclosed = True
-        estimate = _measure(lattice, pressure, x[contact], y[contact])
-        across = lattice.spacing * min(1.0, pattern.cell_ratio)
-        if estimate.half_width < NARROW_NODES * across:
-            factor = min(max(math.ceil(NARROW_NODES * across / estimate.half_width), 2), 8)
-            cell = lattice.spacing
-            finer = enclosing(estimate.lower - cell, estimate.upper + cell, cell / factor, 1, pattern)
-            if finer.size <= MOST_COARSE_NODES:
-                lattice = finer
-                continue
-        if interface == UNILATERAL and is_unbounded(np.isfinite(height), pressure):
-            estimate = estimate._replace(max_pressure=math.inf)
-        surfaces = [height, *(surface(x, y) for surface in heights)]
-        slope, *body_slopes = (_steepest(each, lattice, contact) for each in surfaces)
-        return estimate._replace(slope=slope, body_slopes=tuple(body_slopes))
-    raise NoContactFound("the contact has no end, or nothing touches")
+        pressure = rough_pressure(lattice, pair, height, interface, **drive)
+        search = flat.judge_pressure(search, lattice, pressure)
+    if search.verdict != ACCEPTED:
+        raise NoContactFound("the contact has no end, or nothing touches")
+    surfaces = [height, *(surface(x, y) for surface in heights)]
+    slope, *body_slopes = (_steepest(each, lattice, pressure > 0) for each in surfaces)
+    unbounded = interface == UNILATERAL and is_unbounded(np.isfinite(height), pressure)
+    xx, yy, xy = search.moment_xx, search.moment_yy, search.moment_xy
+    # the principal second moments, with the inertia of a cell itself
+    mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12
+    half_width, half_length = (2 * math.sqrt(max(mean + sign * apart + cell, 0.0)) for sign in (-1, 1))
+    return Estimate(
+        radius=math.sqrt(lattice.cell_area * search.n_contact / math.pi),
+        half_width=half_width,
+        lower=np.array([search.lower_1, search.lower_2]),
+        upper=np.array([search.upper_1, search.upper_2]),
+        cell=lattice.spacing,
+        size=np.array([search.size_x, search.size_y]),
+        max_pressure=math.inf if unbounded else search.max_pressure,
+        slope=slope,
+        body_slopes=tuple(body_slopes),
+        half_length=half_length,
+        angle=0.5 * math.atan2(2 * xy, xx - yy),
+    )
 
 
 def starting_half_size(
@@ -205,7 +172,7 @@ def starting_half_size(
     x = center[0] + radii[:, None] * np.cos(angles)
     y = center[1] + radii[:, None] * np.sin(angles)
     with np.errstate(all="ignore"):
-        height = reals(gap(x, y), "gap")
+        height = np.asarray(gap(x, y), float)
         height = np.where(np.isfinite(height), height, np.inf)
         # the median over the directions, some of which may lie outside of a punch or along a groove
         # (not by numpy.median, which imports numpy.ma); at the end of a surface the lowest direction
@@ -226,45 +193,10 @@ def starting_half_size(
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def _solve(pair: ElasticPair, height: Array, lattice: Lattice, interface: Interface, **drive: Any) -> Array:
-    """Return the pressure of a rough frictionless solution; 0 where no node can touch."""
-    candidate = np.isfinite(height)
-    if not candidate.any():
-        return np.zeros(lattice.shape)
-    height = np.where(candidate, height, 0.0)
-    contact = NormalContact(
-        lattice, pair, height, candidate, threads=1, interface=interface, rim_warning=False
-    )
-    return np.asarray(contact.solve(**drive, tolerance=1e-4).pressure)
-
-
 def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: list[dict[str, float]]) -> int:
     """Return the nodes of a window in contact at the largest of some drives, given the gap at all nodes."""
-    pressures = [_solve(pair, gap, lattice, UNILATERAL, **drive) for drive in drives]
+    pressures = [rough_pressure(lattice, pair, gap, **drive) for drive in drives]
     return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
-
-
-def _measure(lattice: Lattice, pressure: Array, x: Array, y: Array) -> Estimate:
-    """Return the estimate by a solution, whose nodes in contact lie at x and y, without slopes."""
-    rows, cols = np.nonzero(pressure > 0)
-    area = lattice.cell_area * len(rows)
-    right, up = x - x.mean(), y - y.mean()
-    xx, yy, xy = (float(product.mean()) for product in (right * right, up * up, right * up))
-    # the smaller principal second moment, with the inertia of a cell itself
-    mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12
-    half_width, half_length = (2 * math.sqrt(max(mean + sign * apart + cell, 0.0)) for sign in (-1, 1))
-    indices = np.array([cols + lattice.col_first, rows + lattice.row_first]) * lattice.spacing
-    return Estimate(
-        radius=math.sqrt(area / math.pi),
-        half_width=half_width,
-        lower=indices.min(axis=1),
-        upper=indices.max(axis=1),
-        cell=lattice.spacing,
-        size=np.array([np.ptp(x), np.ptp(y)]) + lattice.spacing,
-        max_pressure=float(pressure.max()),
-        half_length=half_length,
-        angle=0.5 * math.atan2(2 * xy, xx - yy),
-    )
 
 
 def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
@@ -359,7 +291,7 @@ def repeating(grid: Grid) -> tuple[Lattice, list[Mistake]]:
     if max(n_row, n_col) > MOST_NODES_PER_SIDE:
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(n_row, n_col)}"
         problems.append(Mistake(("grid", key), value, sentence))
-    return replace(centered(spacing, center, (n_row, n_col), pattern), periodic=True), problems
+    return replace(pattern.centered(spacing, center, (n_row, n_col)), periodic=True), problems
 
 
 def sides(lattice: Lattice) -> tuple[float, float] | None:
@@ -403,10 +335,10 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         spacing = estimate.spacings(pattern.window(1.0, 0, 0, 1, 1)) / grid.in_radius
     if spacing is not None:
         if grid.window is not None:
-            return centered(spacing, center, grid.window, pattern)
+            return pattern.centered(spacing, center, grid.window)
         if isinstance(grid.extent, tuple):
             return Lattice.covering(spacing, center, grid.extent[0], grid.extent[1], *pattern)
-        return enclosing(lower, upper, spacing, MARGIN, pattern)
+        return pattern.enclosing(lower, upper, spacing, MARGIN)
 
     nodes = grid.nodes_across or 0  # one of the three is always given
     shape = (nodes, nodes)
@@ -419,7 +351,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         margin = MARGIN if nodes >= 11 else 1
     # half a spacing may be lost if the middle is no node; the first attempt is without
     for intervals in (nodes - 1 - 2 * margin, nodes - 2 - 2 * margin):
-        lattice = centered(float(np.max(upper - lower)) / intervals, center, shape, pattern)
+        lattice = pattern.centered(float(np.max(upper - lower)) / intervals, center, shape)
         if not _outside(lattice, lower, upper):
             break
     return lattice
@@ -504,10 +436,8 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
             needed = f'["{length_x}", "{length_y}"]'
         else:
-            needed_window = enclosing(
-                estimate.lower, estimate.upper, lattice.spacing, MARGIN, lattice.pattern
-            )
-            needed = f"[{needed_window.n_row}, {needed_window.n_col}] nodes"
+            about = lattice.pattern.enclosing(estimate.lower, estimate.upper, lattice.spacing, MARGIN)
+            needed = f"[{about.n_row}, {about.n_col}] nodes"
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -110,10 +110,22 @@ def extent_of(step: Any) -> Extent | None:
 
     None without contact, or if its zones were not kept.
     """
-    if (zone := getattr(step, "zone", None)) is None or not (inside := np.asarray(zone) > 0).any():
+    if hasattr(step, "bands"):
+        zones = step.bands("zone") if "zone" in step.fields else ()
+    else:
+        zones = [] if (zone := getattr(step, "zone", None)) is None else [(step, np.asarray(zone))]
+    if not (bounds := [*_bounds(zones)]):
         return None
-    along, across = (float(np.ptp(np.asarray(getattr(step, axis))[inside])) for axis in "xy")
-    return along, across
+    low, high = np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]
+    return float(high[0] - low[0]), float(high[1] - low[1])
+
+
+def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]:
+    """Yield the smallest and largest x and y of the nodes in contact, by bands of zones that have some."""
+    for nodes, zone in zones:
+        if (inside := zone > 0).any():
+            x, y = np.asarray(nodes.x)[inside], np.asarray(nodes.y)[inside]
+            yield np.array([[x.min(), y.min()], [x.max(), y.max()]])
 
 
 def _moments(history: History, extent: Extent | None) -> str:

@@ -17,6 +17,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import math
 import os
 import re
 import zipfile
@@ -26,14 +27,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from .._version import __version__
+from ..arrays import Banded
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..files import beginning, made, names_a_run, reading, replacing, require_kinds
 from ..variables import VARIABLES
-from .layout import Metadata, assemble
+from .layout import BAND, Metadata, assemble
 from .step import Step
 
 if TYPE_CHECKING:
@@ -288,7 +290,6 @@ def linked_folder(folder: Path) -> Path | None:
 
 def write_record(path: Path, run: str, step: Step) -> None:
     """Write the record of a step of a run."""
-    fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
     about = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,
@@ -296,13 +297,30 @@ def write_record(path: Path, run: str, step: Step) -> None:
         **{"history": dict(step.history), "control": dict(step.control)},
     }
     text = json.dumps(about, default=np.generic.item).encode()
-    arrays = {_ABOUT: np.frombuffer(text, "u1"), **fields}
-    arrays |= {f"{_COMPANION}{name}": values for name, values in step.companion.items()}
     with zipfile.ZipFile(path, "w") as file:
-        for name, values in arrays.items():
-            with file.open(f"{name}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, np.ascontiguousarray(values), allow_pickle=False)
+        _write(file, _ABOUT, [np.frombuffer(text, "u1")], (len(text),), "u1")
+        for name in step.fields:
+            bands = step.fields.bands(name) if isinstance(step.fields, Banded) else [step.fields[name]]
+            _write(file, name, bands, step.lattice.shape, VARIABLES[name].dtype)
+        for name, values in step.companion.items():
+            _write(file, f"{_COMPANION}{name}", [values], values.shape, values.dtype)
         file.comment = _seal_of(file)
+
+
+def _write(
+    archive: zipfile.ZipFile,
+    name: str,
+    bands: Iterable[NDArray[Any]],
+    shape: tuple[int, ...],
+    dtype: DTypeLike,
+) -> None:
+    """Write an array to a record, band by band."""
+    descr = np.lib.format.dtype_to_descr(np.dtype(dtype))
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        about = {"descr": descr, "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(member, about)
+        for band in bands:
+            member.write(np.ascontiguousarray(band, dtype).data.cast("B"))
 
 
 def _seal_of(archive: zipfile.ZipFile) -> bytes:
@@ -312,14 +330,20 @@ def _seal_of(archive: zipfile.ZipFile) -> bytes:
 
 
 def read_record(path: Path, companion: bool = False, lazy: bool = False) -> tuple[dict[str, Any], Step]:
-    """Read the text and the step of a record; restart data on request, fields of a large one `lazy`."""
+    """Read the text and the step of a record; restart data on request.
+
+    Fields of a large one are read at their use; unless `lazy`, they are compared with their checksums now.
+    """
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
         about = _about(file, path)
         names = [name.removesuffix(".npy") for name in file.namelist() if name != f"{_ABOUT}.npy"]
         more = [name for name in names if name.startswith(_COMPANION)]
         names = [name for name in names if name not in more]
-        if lazy and path.stat().st_size >= LARGE:
+        if path.stat().st_size >= LARGE:
             fields: Mapping[str, NDArray[Any]] = Stored(path, names)
+            for name in () if lazy else names:  # damage shows now
+                for _ in _bands(file, name):
+                    pass
         else:
             fields = {name: _array(file, name) for name in names}
         lattice = made(Lattice, about["lattice"] | {"origin": tuple(about["lattice"]["origin"])})
@@ -357,28 +381,36 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
         return values
 
 
-class Stored(Mapping[str, NDArray[Any]]):
-    """Fields of a record, each loaded at every access: an output takes one after the other."""
+def _bands(archive: zipfile.ZipFile, name: str) -> Iterator[NDArray[Any]]:
+    """Read an array of a record in bands of rows; zipfile compares its checksum at the end."""
+    with archive.open(f"{name}.npy") as member:
+        version = np.lib.format.read_magic(member)
+        if version != (1, 0):
+            raise ValueError(f"{name} has an unknown format")
+        (n_row, n_col), by_columns, dtype = np.lib.format.read_array_header_1_0(member)
+        if by_columns:
+            raise ValueError(f"{name} is stored by columns")
+        for first in range(0, n_row, BAND):
+            shape = min(BAND, n_row - first), n_col
+            size = math.prod(shape) * dtype.itemsize
+            if len(text := member.read(size)) != size:
+                raise ValueError(f"{name} is shorter than its shape")
+            yield np.frombuffer(text, dtype).reshape(shape)
+        if member.read(1):
+            raise ValueError(f"{name} is longer than its shape")
+
+
+class Stored(Banded):
+    """Fields of a record, each read at every access: an output takes one after the other."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
-        self._path, self._names = path, names
+        super().__init__(names)
+        self._path = path
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """Read a field; DeckError if the file has been damaged since."""
+    def bands(self, name: str) -> Iterator[NDArray[Any]]:
+        """Read a field in bands; DeckError if the file has been damaged since."""
         with reading(self._path, _KIND), zipfile.ZipFile(self._path) as file:
-            return _array(file, name)
-
-    def __contains__(self, name: object) -> bool:
-        """Test whether there is such a field."""
-        return name in self._names
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        """Return the number of fields."""
-        return len(self._names)
+            yield from _bands(file, name)
 
 
 class Solution(NamedTuple):

@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import datetime
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import Dataset
+from ..arrays import Banded, Dataset
 from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
@@ -31,6 +31,7 @@ COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
 _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
 _STEPS = 64**2  # nodes of a chunk with several steps
+BAND = 512  # rows that are read and written at once, those of a chunk
 
 
 def now() -> str:
@@ -81,7 +82,12 @@ class Layout:
             raise ValueError("a result needs at least one finished step")
         self.metadata = metadata
         self.steps = steps
-        self.window = _union([step.lattice for step in steps])
+        first, *others = [step.lattice for step in steps]
+        if any((one.spacing, one.pattern) != (first.spacing, first.pattern) for one in others):
+            raise ValueError(
+                "the steps of a result share one lattice: spacing, origin and cells must not change"
+            )
+        self.window = first.joined(*others)
         present = {name for step in steps for name in (*step.fields, *step.history)}
         if unknown := present - VARIABLES.keys():
             raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
@@ -153,66 +159,84 @@ class Layout:
             if v.dims == ("step",)
         }
 
-    def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
-        """Return a field in one step, padded to the whole window."""
-        kept = step.number % self.metadata.every == 0 or position == len(self.steps) - 1
-        if kept and name in step.fields:
-            return self.padded(name, step)
-        variable = self.variables[name]
-        return np.full(self.window.shape, MISSING[name], dtype=variable.dtype)
-
-    def padded(self, name: str, step: Step) -> NDArray[Any]:
-        """Return a field of `step` on the window of the whole result."""
-        variable = VARIABLES[name]
-        values = np.asarray(step.fields[name], dtype=variable.dtype)
-        if values.shape != (step.lattice.n_row, step.lattice.n_col):
-            raise ValueError(
-                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
-            )
-        if step.lattice == self.window:
-            return values
-        return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
+    def _rows(self, name: str, step: Step, kept: bool) -> Iterator[NDArray[Any]]:
+        """Yield a field of a step on the window of the whole result, in bands as they come."""
+        variable, window, lattice = VARIABLES[name], self.window, step.lattice
+        if not (kept and name in step.fields):
+            yield np.broadcast_to(np.asarray(MISSING[name], variable.dtype), window.shape)
+            return
+        wide = (lattice.col_first, lattice.n_col) == (window.col_first, window.n_col)
+        below, done = lattice.row_first - window.row_first, 0
+        yield np.full((below, window.n_col), variable.padding, dtype=variable.dtype)
+        fields = step.fields
+        for band in fields.bands(name) if isinstance(fields, Banded) else [np.asarray(fields[name])]:
+            rows, done = done, done + len(band)
+            if band.shape[1:] != lattice.shape[1:] or done > lattice.n_row:
+                raise ValueError(f"{name} of step {step.number} has shape {band.shape}, not {lattice.shape}")
+            values = np.asarray(band, dtype=variable.dtype)
+            if not wide:
+                part = dataclasses.replace(lattice, row_first=lattice.row_first + rows, n_row=len(band))
+                larger = dataclasses.replace(part, col_first=window.col_first, n_col=window.n_col)
+                values = np.asarray(part.embed(values, larger, variable.padding), dtype=variable.dtype)
+            yield values
+        if done != lattice.n_row:
+            raise ValueError(f"{name} of step {step.number} has {done} rows, not {lattice.n_row}")
+        yield np.full((window.n_row - below - done, window.n_col), variable.padding, dtype=variable.dtype)
 
     def fill(self, columns: Mapping[str, Any], steps: Iterable[Step], lock: Any = None) -> None:
         """Fill columns of `fields` from the steps, which are read once; the lock is held to write."""
-        lock = lock or contextlib.nullcontext()
-        fixed: dict[str, NDArray[Any]] = {}  # fields of all steps, as far as they are known
+        lock, last = lock or contextlib.nullcontext(), len(self.steps) - 1
+        fixed: dict[Lattice, Step] = {}  # the first step on each window, for fields of all steps
         block: list[Step] = []
         for position, step in enumerate(steps):
             block.append(step)
-            if len(block) == self.block or position == len(self.steps) - 1:
-                first = position - len(block) + 1
+            if len(block) == self.block or position == last:
+                place = slice(position + 1 - len(block), position + 1)
+                kept = [one.number % self.metadata.every == 0 for one in block]
+                kept[-1] |= position == last
                 with lock:
-                    for name in (name for name in columns if name not in FIXED):
-                        values = [self.field(name, first + place, one) for place, one in enumerate(block)]
-                        whole = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
-                        columns[name][first : position + 1] = whole
+                    for name in columns:
+                        if name not in FIXED:
+                            rows = [self._rows(name, *each) for each in zip(block, kept, strict=True)]
+                            self._write(columns[name], place, rows)
                 block.clear()
-            for name in FIXED:
-                if name in columns and name in step.fields:
-                    if name not in fixed:
-                        fixed[name] = self.padded(name, step)
-                    elif (unknown := np.isnan(fixed[name])).any():
-                        fixed[name] = np.where(unknown, self.padded(name, step), fixed[name])
+            if step.lattice not in fixed and step.fields.keys() & {*FIXED}:
+                fixed[step.lattice] = step
         with lock:
-            for name, field in fixed.items():
-                columns[name][...] = field
+            for name in FIXED:
+                if name in columns:
+                    rows = [self._rows(name, one, True) for one in fixed.values() if name in one.fields]
+                    self._write(columns[name], None, rows)
+
+    @staticmethod
+    def _write(column: Any, steps: slice | None, given: Sequence[Iterator[NDArray[Any]]]) -> None:
+        """Write a field in some steps band by band; None: of all steps, whose windows complete each other."""
+        row = 0
+        for bands in zip(*map(in_bands, given), strict=True):
+            values, *others = bands
+            rows = slice(row, row := row + len(values))
+            if steps is not None:
+                values = np.stack(bands) if others else values[np.newaxis]
+            else:
+                for other in others:
+                    values = np.where(np.isnan(values), other, values)
+            column[rows if steps is None else (steps, rows)] = values
 
 
-def _union(windows: Sequence[Lattice]) -> Lattice:
-    """Return the smallest window about `windows` of one lattice."""
-    first = windows[0]
-    if any((w.spacing, w.pattern) != (first.spacing, first.pattern) for w in windows):
-        raise ValueError("the steps of a result share one lattice: spacing, origin and cells must not change")
-    row_first = min(w.row_first for w in windows)
-    col_first = min(w.col_first for w in windows)
-    return dataclasses.replace(
-        first,
-        row_first=row_first,
-        col_first=col_first,
-        n_row=max(w.row_first + w.n_row for w in windows) - row_first,
-        n_col=max(w.col_first + w.n_col for w in windows) - col_first,
-    )
+def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
+    """Join and cut bands so that each but the last has so many rows."""
+    left: list[NDArray[Any]] = []
+    for part in parts:
+        start = 0
+        while start < len(part):
+            missing = rows - sum(map(len, left))
+            left.append(part[start : start + missing])
+            start += missing
+            if sum(map(len, left)) == rows:
+                yield left[0] if len(left) == 1 else np.concatenate(left)
+                left = []
+    if left:
+        yield left[0] if len(left) == 1 else np.concatenate(left)
 
 
 def lattice_of(dataset: Dataset) -> Lattice:

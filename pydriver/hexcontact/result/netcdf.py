@@ -40,7 +40,7 @@ from ..variables import (
     VARIABLES,
     names_where,
 )
-from .layout import COORDINATES, MISSING, Layout, history_of, lattice_of
+from .layout import BAND, COORDINATES, MISSING, Layout, history_of, lattice_of
 from .step import Step
 
 if TYPE_CHECKING:
@@ -327,7 +327,7 @@ def add_column(
 
 # Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
 _BELOW = ("stress", "fatigue", "\\")
-_CHUNK = 512  # nodes of a chunk along row and col
+_CHUNK = BAND  # nodes of a chunk along row and col
 _MARK = b"hexcontact sha-2"
 _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes

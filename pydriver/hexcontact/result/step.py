@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..analytic.hertz_gap import friction_of, is_compliant
-from ..arrays import Array, Dataset, Mask
+from ..arrays import Array, Banded, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
@@ -71,6 +71,16 @@ class NodalStep:
     def number(self) -> int:
         """Number of the step, from 1."""
         return self.index + 1
+
+    def bands(self, name: str) -> Iterator[tuple[Lattice, NDArray[Any]]]:
+        """Yield a field in bands of rows, each with its window; one band if the field is in memory."""
+        if not isinstance(self.fields, Banded):
+            yield self.lattice, np.asarray(self.fields[name])
+            return
+        row = self.lattice.row_first
+        for band in self.fields.bands(name):
+            yield dataclasses.replace(self.lattice, row_first=row, n_row=len(band)), band
+            row += len(band)
 
     @property
     def law(self) -> FrictionLaw | None:

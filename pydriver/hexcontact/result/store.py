@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from ..arrays import Banded
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import Lock, begun, flush, make_anew, names_a_run, reading, replacing, require_utf8
 from . import journal as records
@@ -336,7 +337,9 @@ class Store:
             if step.companion and "until" in step.control and step.number > 2:
                 self._lighten(self.folder / f"{step.number - 2:06d}{records.SUFFIX}")
             self.heads.append(step.head)
-            self._last = step if sum(v.nbytes for v in step.fields.values()) < records.LARGE else None
+            kept = not isinstance(step.fields, Banded)
+            kept = kept and sum(v.nbytes for v in step.fields.values()) < records.LARGE
+            self._last = step if kept else None
 
     def publish(self) -> None:
         """Write an interim output if one is due; errors as those of `append`, but all steps remain."""

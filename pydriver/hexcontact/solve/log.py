@@ -67,11 +67,12 @@ class Log(Listener):
         shown = worth_showing([history])
         values |= {label_of(name).replace(" ", "_"): float(history[name]) for name in shown}
         values["p_max"] = float(history["max_pressure"])
-        zone = step.fields["zone"]
-        values["contact"] = contact = int((zone > 0).sum())
+        contact = stick = 0
+        for _, zone in step.bands("zone"):
+            contact, stick = contact + int((zone > 0).sum()), stick + int((zone == 1).sum())
+        values["contact"] = contact
         if "stick_area" in history:
-            values["stick"] = stick = int((zone == 1).sum())
-            values["slip"] = contact - stick
+            values |= {"stick": stick, "slip": contact - stick}
         values |= {sign: _rounded(history[name]) for sign, name in RESIDUALS.items() if name in history}
         values["iterations"] = history["sweeps"]
         values["halvings"] = history.get("cuts", 0)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
-from ..core import contact, kernel_cache, memory
+from ..core import contact, kernel_cache, memory, ranks
 from ..core.lattice import Lattice
 from ..deck.below import cycle_of
 from ..deck.units import readable
@@ -20,6 +21,11 @@ _WRITING = 24 * 2**20  # bytes of netCDF and HDF5, which an interim output loads
 _LOADED = 5 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
+
+
+def is_shared(case: Problem, lattice: Lattice) -> bool:
+    """Test whether all ranks share the rows of a window."""
+    return not case.frictional and case.method_for(lattice) == "fft" and ranks.share(lattice)
 
 
 def fields_held(case: Problem) -> int:
@@ -94,25 +100,23 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     dispensable bytes.
     """
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
-    operator, set_up = (
-        contact.memory_needed(
-            "fft",
-            *lattice.shape,
-            part=part,
-            spectra=5 + (case.pair.spectra % 2 == 0),  # a body is unlike a rigid one
-            threads=memory.threads(),
-            periodic=lattice.periodic,
-        )
-        for part in ("operator", "set-up of the operator")
-    )
+    spectra = 5 + (case.pair.spectra % 2 == 0)  # a body is unlike a rigid one
+    given: dict[str, Any] = {"spectra": spectra, "threads": memory.threads(), "periodic": lattice.periodic}
+    operator = contact.memory_needed("fft", *lattice.shape, part="operator", **given)
+    set_up = contact.memory_needed("fft", *lattice.shape, part="set-up of the operator", **given)
     fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
-    needed = case.memory_needed(lattice) + kept
+    needed = case.memory_needed(lattice)
+    if ranks.count > 1 and is_shared(case, lattice):  # the share of this machine
+        needed, fields, operator, set_up = (
+            part * ranks.on_node // ranks.count for part in (needed, fields, operator, set_up)
+        )
+    needed += kept
     if case.frictional or method == "direct":
         needed += fields + _WRITING
     else:  # the output takes the place of transforms and iterations
         needed += max(fields, _WRITING)
     if case.deck.wear:
-        needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
+        needed += contact.memory_needed("fft", *lattice.shape, threads=given["threads"])
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
@@ -139,6 +143,8 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
     """Refuse a window, with the fields of some steps, or a table that does not fit into memory."""
     kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
     needed, there = memory_needed(case, lattice) + kept, memory.available()
+    if ranks.count > 1 and is_shared(case, lattice):  # the least of all machines
+        there = int(ranks.order(share_of_memory) * ranks.on_node)
     fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
     fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""
     advice = ["a smaller window" if case.window_fixed else f"a larger grid.spacing{fits}"]
@@ -156,6 +162,11 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
         if below + kept > needed:
             fewer = "a smaller region, fewer points or steps, or a larger grid.spacing"
             memory.require(below + kept, key, f"choose {fewer}", there)
+
+
+def share_of_memory() -> float:
+    """Return the memory (bytes) that is available to each rank where it is least."""
+    return ranks.least(memory.available() / ranks.on_node)
 
 
 def fields_of(case: Problem) -> tuple[str, ...]:

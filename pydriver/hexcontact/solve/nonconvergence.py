@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.contact import NormalSolution
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import nodal_residuals
+from ..core.shared import SharedSolution
 from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
@@ -43,7 +43,7 @@ class Worst(NamedTuple):
 
 
 def error(
-    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+    case: Problem, lattice: Lattice, solution: Any, target: LoadStep, values: tuple[float, ...]
 ) -> ConvergenceError:
     """Return the error of a step that did not converge, or of gross sliding."""
     residuals = _residuals(case, solution, target)
@@ -82,7 +82,7 @@ def error(
     return ConvergenceError("\n".join(lines), details)
 
 
-def _residuals(case: Problem, solution: NormalSolution, target: LoadStep) -> dict[str, float]:
+def _residuals(case: Problem, solution: Any, target: LoadStep) -> dict[str, float]:
     """Return the residuals with a bound, by the symbol of the theory."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     wanted = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
@@ -96,9 +96,11 @@ def _number(value: float) -> str:
 
 
 def _sliding(
-    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+    case: Problem, lattice: Lattice, solution: Any, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[bool, str, str]:
     """Return whether friction may not carry the load, and if it cannot, a sentence and what was expected."""
+    if not case.frictional:
+        return False, "", ""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
@@ -127,7 +129,7 @@ def _sliding(
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
 
 
-def _center(lattice: Lattice, solution: NormalSolution) -> tuple[float, float]:
+def _center(lattice: Lattice, solution: Any) -> tuple[float, float]:
     """Return the centroid of the pressure; the origin without any."""
     if not solution.pressure.any():
         return 0.0, 0.0
@@ -136,7 +138,7 @@ def _center(lattice: Lattice, solution: NormalSolution) -> tuple[float, float]:
 
 
 def _moments(
-    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+    case: Problem, lattice: Lattice, solution: Any, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[float, float]:
     """Return the moment (N m) of the loads about the contact, and the largest that friction carries."""
     x, y = _center(lattice, solution)
@@ -177,13 +179,17 @@ def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list
 def _worst(
     case: Problem,
     lattice: Lattice,
-    solution: NormalSolution,
+    solution: Any,
     residuals: dict[str, float],
     values: tuple[float, ...],
 ) -> Worst:
     """Return the largest residual and its node."""
     sign = max(residuals, key=lambda name: residuals[name])
     value = residuals[sign]
+    if isinstance(solution, SharedSolution):  # whose nodes are not here
+        if not solution.normal_load > 0.0:
+            return Worst(sign, value, what=_LOST)
+        return Worst(sign, value, what=_missed(sign, solution, values) if sign == "R_P" else "")
     if not (solution.pressure > 0).any():
         return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):
@@ -202,7 +208,7 @@ def _worst(
     return Worst(sign, value, *number, x, y, f"at the node in {place} {fault}")
 
 
-def _missed(sign: str, solution: NormalSolution, values: tuple[float, ...]) -> str:
+def _missed(sign: str, solution: Any, values: tuple[float, ...]) -> str:
     """Return a sentence on the load that is not met."""
     if sign == "R_P":
         return _instead("normal load", solution.normal_load, values[0], "N")
@@ -221,7 +227,7 @@ def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
     )
 
 
-def _normal_fault(law: FrictionLaw, solution: NormalSolution, row: int, col: int) -> str:
+def _normal_fault(law: FrictionLaw, solution: Any, row: int, col: int) -> str:
     pressure, gap = float(solution.pressure[row, col]), float(solution.gap[row, col])
     if pressure < 0:
         return f"there is a tension of {quantity(-pressure, 'Pa')}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,26 +23,22 @@ from ..variables import LOADS, ROLLED
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .log import Log
-from .window import FrictionWindow, Window
+from .window import window_over
 
 _SAME = 1e-9  # relative difference of equal initial gaps
-
-
-def window_type(case: Problem) -> type[Window]:
-    """Return the kind of window that the algorithm of a case needs."""
-    return FrictionWindow if case.frictional else Window
 
 
 def check_step(case: Problem, last: Step, found: str) -> None:
     """Refuse a finished step with another lattice or other surfaces than a case; `found` names it."""
     if (case.lattice.spacing, case.lattice.pattern) != (last.lattice.spacing, last.lattice.pattern):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
-    gap, touching = case.initial_gap(last.lattice)
-    then = last.fields["initial_gap"]
-    if (touching != np.isfinite(then)).any() or not np.allclose(
-        gap[touching], then[touching], rtol=_SAME, atol=_SAME * np.abs(then[touching]).max(initial=0.0)
-    ):
-        raise DeckError(f"the surfaces are no longer those of the {found}")
+    largest = max(np.abs(then[np.isfinite(then)]).max(initial=0.0) for _, then in last.bands("initial_gap"))
+    for rows, then in last.bands("initial_gap"):
+        gap, touching = case.initial_gap(rows)
+        if (touching != np.isfinite(then)).any() or not np.allclose(
+            gap[touching], then[touching], rtol=_SAME, atol=_SAME * largest
+        ):
+            raise DeckError(f"the surfaces are no longer those of the {found}")
 
 
 def steps(
@@ -71,10 +68,10 @@ def steps(
         kind = WearPath
     elif targets is None and case.adaptive:
         kind = AdaptivePath
-    path = kind(case, window_type(case)(case, lattice, held, listener), before)
+    path = kind(case, window_over(case, lattice, held, listener), before)
     targets = case.load_steps[path.position :] if targets is None else targets
     for step in _solved(path, before, targets):
-        case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
+        case.check_contact(step.number, partial(step.bands, "zone"))
         yield step
         done = step.number
         del step

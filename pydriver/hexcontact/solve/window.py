@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution, pair_of
+from ..core import ranks
+from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import is_unbounded, measures
+from ..core.measures import is_unbounded, measures, recorded
+from ..core.shared import Displacement, SharedContact, SharedFields, SharedOperator, SharedSolution
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
 from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
 from .events import Listener
-from .memory_needed import fields_of, require_memory
+from .memory_needed import fields_of, is_shared, require_memory
 
 _STEPPED = names_where(lambda v: v.dims == ("step",))
 # numbers of a state that have the names of the history
@@ -45,10 +47,10 @@ class Window:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
+        self._bodies: dict[int, Any] = {}
         self.gap, self.candidate = case.initial_gap(lattice)
         self.initial_gap: Array = self._where_touching(self.gap)
         self.friction = case.friction_law(lattice)
-        self._bodies: dict[int, FlexibilityOperator] = {}
         self.contact: Any = self._solver(self.gap)
 
     def _solver(self, gap: Array) -> Any:
@@ -73,7 +75,7 @@ class Window:
         """Return the state at the end of a step on this window, if the next one needs it."""
         return None
 
-    def grown(self, solution: NormalSolution, target: LoadStep) -> Self:
+    def grown(self, solution: NormalSolution, target: LoadStep) -> Any:
         """Return a larger window for a contact that reached the rim, unless the deck fixes the window."""
         if self.case.window_fixed:
             raise DeckError(
@@ -81,11 +83,15 @@ class Window:
                 f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
                 'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
             )
+        larger = self._larger(solution)
         del self.contact  # its memory goes before that of the next comes
         self._bodies.clear()
-        larger = self.lattice.grown(solution.zone > 0)
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
-        return type(self)(self.case, larger, self.steps_held, self.listener)
+        return window_over(self.case, larger, self.steps_held, self.listener)
+
+    def _larger(self, solution: Any) -> Lattice:
+        """Return the lattice of a larger window for a contact that reached the rim."""
+        return self.lattice.grown(solution.zone > 0)
 
     def failure(
         self, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
@@ -97,20 +103,6 @@ class Window:
 
     def step(self, target: LoadStep, solution: NormalSolution, before: Any, started: float) -> Step:
         """Return a finished step from the states at its end and beginning; its time counts from `started`."""
-        fields = {"initial_gap": self.initial_gap}
-        fields |= {name: getattr(solution, name) for name in self.state}
-        fields["gap"] = self._where_touching(solution.gap)
-        if self.case.moves:
-            fields[MOVED_GAP] = self._where_touching(self.gap)
-        if self.worn is not None:
-            fields["worn_depth"] = self.worn
-        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
-            fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
-        for body in (1, 2):
-            wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            if wanted:
-                moved = self._displacement(body, fields)
-                fields |= {name: moved[name[-1]] for name in wanted}
         bulk: dict[str, float] = {}
         if self.case.deck.bulk:
             bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
@@ -127,7 +119,7 @@ class Window:
         return Step(
             target.index,
             self.lattice,
-            fields,
+            self._fields(solution),
             history,
             prescribed=self._prescribed(target, history),
             load_fraction=(target.index + 1) / len(self.case.load_steps),
@@ -137,6 +129,24 @@ class Window:
             sharp=self.case.deck.interface is None and self.case.period is None,
             shear_limit=self.friction.shear_limit,
         )
+
+    def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
+        """Return the fields of a finished step."""
+        fields = {"initial_gap": self.initial_gap}
+        fields |= {name: getattr(solution, name) for name in self.state}
+        fields["gap"] = self._where_touching(solution.gap)
+        if self.case.moves:
+            fields[MOVED_GAP] = self._where_touching(self.gap)
+        if self.worn is not None:
+            fields["worn_depth"] = self.worn
+        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
+            fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
+        for body in (1, 2):
+            wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            if wanted:
+                moved = self._displacement(body, fields)
+                fields |= {name: moved[name[-1]] for name in wanted}
+        return fields
 
     def _where_touching(self, values: Array) -> Array:
         """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
@@ -158,27 +168,30 @@ class Window:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
-        gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
-        found = given | measures(self.lattice, self.friction, gap, self.candidate, solution)
-        if not self.case.deck.interface and is_unbounded(self.candidate, solution.pressure):
+        measured, unbounded = self._measures(solution)
+        found = given | measured
+        if not self.case.deck.interface and unbounded:
             found["max_pressure"] = math.inf
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
-            found["mean_gap"] = float(solution.gap.mean())
         else:
-            del found["contact_area_error"]  # refinement has its own
+            del found["contact_area_error"], found["mean_gap"]  # refinement has its own error
         return found
+
+    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
+        """Return the measures of a state, and whether the pressure rises to an end of the surface."""
+        gap = self._where_touching(self.gap) if self.worn is None else self.initial_gap + self.worn
+        found = measures(self.lattice, self.friction, gap, self.candidate, solution)
+        return found, is_unbounded(self.candidate, solution.pressure)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.
 
         Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
         """
-        body = self.case.body_1 if number == 1 else self.case.body_2
-        if body.rigid and not body.coating:
+        if (pair := _pair_of_body(self.case, number)) is None:
             return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
         if number not in self._bodies:
-            pair = pair_of(*((body, None) if number == 1 else (None, body)))
             self._bodies[number] = FlexibilityOperator(self.lattice, pair)
         operator, pressure = self._bodies[number], fields["pressure"]
         z, x, y = operator.apply(pressure, fields.get("traction_x"), fields.get("traction_y"))
@@ -186,6 +199,68 @@ class Window:
             z = operator.apply(pressure)[0]  # in this approximation shear does not move the surfaces along z
         sign = 1.0 if number == 1 else -1.0
         return {"x": sign * x, "y": sign * y, "z": z}
+
+
+class SharedWindow(Window):
+    """A case without friction on a window whose rows all ranks share; each evaluates the gap at its nodes."""
+
+    def __init__(
+        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
+    ) -> None:
+        require_memory(case, lattice, steps_held)
+        self.case, self.lattice, self.steps_held = case, lattice, steps_held
+        self.listener, self._bodies = listener or Listener(), {}
+        self.friction = case.friction_law(lattice)  # none
+        self.contact = SharedContact(lattice, case.solved_pair, case.plane_gap, case.interface)
+
+    def advance(self, state: None, target: LoadStep, values: tuple[float, ...]) -> SharedSolution:
+        """Solve a load step from its load or approach alone."""
+        control = 1 if target.z.control == "force" else 2
+        solution: SharedSolution = self.contact.solve(
+            control, values[0], tolerance=self.case.solver.tolerance
+        )
+        return solution
+
+    def _larger(self, solution: SharedSolution) -> Lattice:
+        return solution.grown()
+
+    def _measures(self, solution: SharedSolution) -> tuple[dict[str, float], bool]:
+        found, unbounded = solution.measures()
+        return recorded(self.lattice, found, friction=False), unbounded
+
+    def _fields(self, solution: SharedSolution) -> Mapping[str, NDArray[Any]]:
+        moved: dict[str, Displacement | None] = {}
+        for body in (1, 2):
+            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            moved |= dict.fromkeys(names, self._moved(body, solution) if names else None)
+        fields = SharedFields(solution, ("initial_gap", *self.state), moved)
+        return dict(fields) if self.steps_held else fields
+
+    def _moved(self, number: int, solution: SharedSolution) -> Displacement | None:
+        """Return the surface displacement of one body; None of a rigid one."""
+        if (pair := _pair_of_body(self.case, number)) is None:
+            return None
+        if number not in self._bodies:
+            self._bodies[number] = SharedOperator(self.lattice, pair, 1.0 if number == 1 else -1.0)
+        return Displacement(solution, self._bodies[number])
+
+
+def window_over(
+    case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
+) -> Window:
+    """Return a case on a window, for the algorithm that it needs; arguments as of `Window`."""
+    kind = FrictionWindow if case.frictional else Window
+    if ranks.count > 1 and is_shared(case, lattice):
+        kind = SharedWindow
+    return kind(case, lattice, steps_held, listener)
+
+
+def _pair_of_body(case: Problem, number: int) -> ElasticPair | None:
+    """Return the compliances of one body against a rigid one; None if it is rigid, too."""
+    body = case.body_1 if number == 1 else case.body_2
+    if body.rigid and not body.coating:
+        return None
+    return pair_of(*((body, None) if number == 1 else (None, body)))
 
 
 class FrictionWindow(Window):
@@ -239,9 +314,9 @@ class FrictionWindow(Window):
         self.worn = depth
         self.contact.wear(depth)
 
-    def grown(self, solution: NormalSolution, target: LoadStep) -> Self:
+    def grown(self, solution: NormalSolution, target: LoadStep) -> FrictionWindow:
         """Return the problem on a larger window, with its worn depth."""
-        larger = super().grown(solution, target)
+        larger: FrictionWindow = super().grown(solution, target)
         if self.worn is not None:
             larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0)))
         return larger

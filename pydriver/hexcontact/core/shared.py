@@ -1,0 +1,204 @@
+"""Frictionless contact whose rows all ranks share: each has those of the gap and of the solution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, Banded, Mask
+from . import flat, kernel_cache, ranks
+from .calls import checked
+from .contact import STOPPED, ElasticPair, Interface, NormalSolution
+from .handles import Handle, HeldState
+from .lattice import Lattice
+
+
+class Field(Protocol):
+    """A quantity over the plane."""
+
+    def over(self, lattice: Lattice) -> Array:
+        """Return the values at the nodes of a window."""
+        ...
+
+
+class Part(Handle):
+    """The rows of this rank of a contact."""
+
+    def __init__(
+        self, gap: Field, lattice: Lattice, pair: ElasticPair, interface: Interface, threads: int
+    ) -> None:
+        self.lattice, self.own = lattice, ranks.rows(lattice)
+        with ranks.agreed():
+            values = gap.over(self.own)
+            self.touching: Mask = np.isfinite(values)
+            self.gap = np.where(self.touching, values, 0.0)
+        self._create(flat.create_pressed_part, lattice, pair, self.gap, self.touching, interface, threads)
+
+    def rows(self, values: NDArray[Any]) -> Array:
+        """Return values of own rows, NaN where the bodies cannot touch."""
+        return np.where(self.touching, values, np.nan)
+
+
+class OperatorPart(Handle):
+    """The rows of this rank of a flexibility operator."""
+
+    def __init__(self, lattice: Lattice, pair: ElasticPair, threads: int) -> None:
+        self.lattice = lattice
+        self._create(flat.create_operator_part, lattice, pair, threads)
+
+
+def _create(number: int, *arguments: Any) -> None:
+    """Set up the part of this rank of a contact."""
+    ranks.held[number] = Part(*arguments)
+
+
+def _press(number: int, solution: int, *arguments: Any) -> Any:
+    """Solve a load step; hold own rows, and return the numbers of the solution."""
+    part = ranks.held[number]
+    try:
+        found = HeldState(flat.press_part(part, *arguments), part.own.shape)
+    finally:
+        kernel_cache.warn_of_faults()
+    ranks.held[solution] = found
+    return flat.numbers_of_state(found)
+
+
+def _measure(number: int, solution: int) -> tuple[Any, bool]:
+    """Return the measures of a solution, and whether its pressure rises to an end of the surface."""
+    part = ranks.held[number]
+    found: tuple[Any, bool] = flat.measure_part(part.lattice, part.gap, part.touching, ranks.held[solution])
+    return found
+
+
+def _grown(number: int, solution: int) -> tuple[list[int], list[int]]:
+    """Return the first node and extent of a window that grows with the contact of a solution."""
+    part = ranks.held[number]
+    low, extent = flat.grown_window_part(part.lattice, ranks.held[solution], part.own.n_row)
+    return low.tolist(), extent.tolist()
+
+
+def _prepare(number: int, *arguments: Any) -> None:
+    """Set up the part of this rank of an operator."""
+    ranks.held[number] = OperatorPart(*arguments)
+
+
+def _displace(number: int, solution: int, displaced: int) -> None:
+    """Hold own rows of the displacements by the pressure of a solution."""
+    pressure = ranks.held[solution].view("pressure")
+    zero = np.zeros(pressure.shape)
+    ranks.held[displaced] = flat.apply_operator_part(ranks.held[number], [pressure, zero, zero])
+
+
+def _rows(number: int, solution: int, name: str) -> Array:
+    """Return own rows of a field as real numbers."""
+    part, found = ranks.held[number], ranks.held[solution]
+    if name == "initial_gap":
+        return part.rows(part.gap)
+    values = found.view(name)
+    return part.rows(values) if name == "gap" else values.astype(float, copy=False)
+
+
+def _displaced_rows(displaced: int, place: int) -> Array:
+    """Return own rows of a displacement: along z, x or y."""
+    return np.asarray(ranks.held[displaced][place])
+
+
+class SharedFields(Banded):
+    """Fields of a solution, whose bands are the rows of each rank."""
+
+    def __init__(
+        self, solution: SharedSolution, names: Iterable[str], more: Mapping[str, Displacement | None]
+    ) -> None:
+        super().__init__([*names, *more])
+        self.solution, self.more = solution, more
+
+    def bands(self, name: str) -> Iterator[NDArray[Any]]:
+        """Take the rows of one rank after the other."""
+        lattice = self.solution.contact.lattice
+        for rank in range(ranks.count):
+            shape = ranks.rows(lattice, rank).shape
+            if name not in self.more:
+                band = self.solution.rows(rank, name, shape)
+                yield band.astype(np.int8) if name == "zone" else band
+            elif (moved := self.more[name]) is None:  # of a rigid body
+                yield np.zeros(shape)
+            else:
+                yield moved.rows(rank, "zxy".index(name[-1]), shape)
+
+
+class Displacement:
+    """Displacements by a pressure, whose fields lie on all ranks."""
+
+    def __init__(self, solution: SharedSolution, operator: SharedOperator) -> None:
+        self.number, self.sign = ranks.numbered(self), operator.sign
+        ranks.order(_displace, operator.number, solution.number, self.number)
+
+    def rows(self, rank: int, place: int, shape: tuple[int, int]) -> Array:
+        """Return the rows of a component on a rank."""
+        found = ranks.ask(rank, _displaced_rows, self.number, place, shape=shape)
+        return self.sign * found if place else found
+
+
+class SharedOperator:
+    """Flexibility operator of one body, whose rows all ranks share; `sign` is that of its displacements."""
+
+    def __init__(self, lattice: Lattice, pair: ElasticPair, sign: float) -> None:
+        self.number, self.sign = ranks.numbered(self), sign
+        ranks.order(_prepare, self.number, replace(lattice), pair, 0)
+
+
+class SharedSolution:
+    """A solution whose fields lie on all ranks; numbers as of `NormalSolution`."""
+
+    touches_rim: bool
+    converged: bool
+    sweeps: int
+    normal_load: float
+
+    def __init__(self, contact: SharedContact) -> None:
+        self.contact, self.number = contact, ranks.numbered(self)
+
+    def rows(self, rank: int, name: str, shape: tuple[int, int]) -> Array:
+        """Return the rows of a field on a rank."""
+        return ranks.ask(rank, _rows, self.contact.number, self.number, name, shape=shape)
+
+    def measures(self) -> tuple[Any, bool]:
+        """Return its measures, and whether the pressure rises to an end of the surface."""
+        found: tuple[Any, bool] = ranks.order(_measure, self.contact.number, self.number)
+        return found
+
+    def grown(self) -> Lattice:
+        """Return a larger window for a contact that reaches the rim."""
+        low, extent = ranks.order(_grown, self.contact.number, self.number)
+        return replace(
+            self.contact.lattice, row_first=low[1], col_first=low[0], n_row=extent[1], n_col=extent[0]
+        )
+
+    def as_start(self) -> None:
+        """Return what the next load step starts from."""
+
+
+class SharedContact:
+    """A frictionless contact whose rows all ranks share; they evaluate the gap at their own nodes."""
+
+    def __init__(
+        self, lattice: Lattice, pair: ElasticPair, gap: Field, interface: Interface, threads: int = 0
+    ) -> None:
+        # without arrays that the lattice keeps
+        self.lattice, self.number = replace(lattice), ranks.numbered(self)
+        given = checked(interface=interface, threads=threads)
+        ranks.order(_create, self.number, gap, self.lattice, pair, *given)
+
+    def solve(self, control: int, value: float, *, tolerance: float, max_sweeps: int = 200) -> SharedSolution:
+        """Solve for a normal load (control 1, N) or an approach (2, m), as `NormalContact.solve`."""
+        solution = SharedSolution(self)
+        given = control, value, *checked(tolerance=tolerance, max_sweeps=max_sweeps)
+        numbers = ranks.order(_press, self.number, solution.number, *given)
+        found = numbers._asdict() | {"stopped": STOPPED[numbers.stopped]}
+        known = {field.name for field in fields(NormalSolution)}
+        vars(solution).update({name: value for name, value in found.items() if name in known})
+        return solution

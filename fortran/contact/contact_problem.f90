@@ -17,7 +17,7 @@ module hc_contact_problem
   use hc_hierarchy, only: level_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, separated, stick, &
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, separated, stick, &
     slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
     sweeps_used_up, loads_not_carried, out_of_range
   use hc_contact_residuals, only: tangential_compliances, largest_compliance, normal_residual, &
@@ -154,7 +154,7 @@ contains
   end subroutine separate
 
   !> Compute the relative displacements (w, u_x, u_y) of given tractions, by any operator.
-  subroutine displacements(self, flexibility, pressure, traction, displacement, error)
+  recursive subroutine displacements(self, flexibility, pressure, traction, displacement, error)
     class(friction_problem_t), intent(in) :: self
     !> Flexibility operator over the window
     class(flexibility_t), intent(inout) :: flexibility
@@ -168,6 +168,10 @@ contains
     real(wp), pointer, contiguous :: alone(:, :, :)
     integer :: row
 
+    if (flexibility%space%ranks%size > self%space%ranks%size) then
+      call displacements_by_rows(self, flexibility, pressure, traction, displacement, error)
+      return
+    end if
     if (.not. self%medium%couples()) then
       ! pressure and shear traction do not move each other: no copy of both
       alone(1:size(pressure, 1), 1:size(pressure, 2), 1:1) => pressure
@@ -187,6 +191,29 @@ contains
     if (allocated(error)) return
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
+
+  !> Compute them with an operator that ranks share by rows, from fields of which each rank has all rows.
+  recursive subroutine displacements_by_rows(self, flexibility, pressure, traction, displacement, error)
+    class(friction_problem_t), intent(in) :: self
+    class(flexibility_t), intent(inout) :: flexibility
+    real(wp), intent(in), contiguous, target :: pressure(:, :), traction(:, :, :)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: part
+    real(wp), allocatable :: own(:, :, :)
+    integer :: rows(2), m
+
+    rows = flexibility%space%own_rows(size(pressure, 2))
+    part%space = flexibility%space
+    allocate (part%medium, source=self%medium)
+    part%goodman = self%goodman
+    allocate (own(size(pressure, 1), rows(2) - rows(1) + 1, 3))
+    call part%displacements(flexibility, pressure(:, rows(1):rows(2)), traction(:, rows(1):rows(2), :), own, error)
+    if (allocated(error)) return
+    do m = 1, 3
+      call flexibility%space%fetch(size(pressure, 2), own(:, :, m), 1, displacement(:, :, m))
+    end do
+  end subroutine displacements_by_rows
 
   !> Compute the displacements by the tractions of a state, with any operator: w in its gap, u in its relative displacement, from
   !> which `complete_state` continues.
@@ -276,7 +303,13 @@ contains
     end do
     !$omp end parallel do
     load = 0.0_wp
-    load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
+    if (self%space%ranks%size == 1) then
+      load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
+    else
+      do row = 1, n_load
+        load(row) = self%lattice%cell_area()*self%space%total(part(row, :))
+      end do
+    end if
     if (self%lattice%is_periodic()) load(about_z) = 0.0_wp                     ! a torque does not repeat
   end function resultants
 
@@ -305,7 +338,7 @@ contains
     type(contact_state_t), intent(inout) :: state
 
     real(wp), allocatable :: over_spacing(:, :, :)
-    real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2)
+    real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2), wrong(1)
     integer :: row, m, n_contact
     logical :: finite
 
@@ -344,6 +377,9 @@ contains
                all(ieee_is_finite(state%relative_displacement(:, row, :)))
     end do
     !$omp end parallel do
+    wrong = merge(0.0_wp, 1.0_wp, finite)
+    call self%space%most(wrong)
+    finite = .not. wrong(1) > 0.0_wp
 
     state%load = self%resultants(state%pressure, state%traction)
     state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
@@ -355,7 +391,7 @@ contains
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
                            state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
-    state%clipped = touches_rim(state) .and. .not. self%lattice%is_periodic()
+    state%clipped = self%reaches_rim(state) .and. .not. self%lattice%is_periodic()
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
   end subroutine complete_state

@@ -193,7 +193,7 @@ contains
         end do
       end do
       !$omp end parallel do
-      missing(k) = driven%load(k, now%problem, now%target) - sum(part)
+      missing(k) = driven%load(k, now%problem, now%target) - now%operators%space%total(part)
     end do
   end subroutine find_constraints
 

@@ -397,7 +397,7 @@ contains
   subroutine find_tangential_residual(self)
     class(friction_iterate_t), intent(inout) :: self
     real(wp), dimension(self%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: unit, largest, worst
+    real(wp) :: unit, largest, worst, most(2)
     integer :: n, n_col, row, from, to, low, high
 
     n = size(self%p)
@@ -418,13 +418,15 @@ contains
                                            self%q(from:to), self%q(n + from:n + to), dsx(low:high), dsy(low:high), largest, worst)
     end do
     !$omp end parallel do
-    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, 1.0_wp/unit, largest)
+    most = [largest, worst]
+    call self%operators%space%most(most)
+    self%residual_tangential = sqrt(most(2))/tangential_scale(self%problem%friction, 1.0_wp/unit, most(1))
   end subroutine find_tangential_residual
 
   !> Return whether all tractions and motions are finite numbers.
   logical function is_finite(self)
     class(friction_iterate_t), intent(in) :: self
-    real(wp) :: rest
+    real(wp) :: rest, wrong(1)
     integer :: n, i
 
     n = size(self%p)
@@ -435,7 +437,9 @@ contains
       rest = rest + (self%p(i) - self%p(i)) + (self%q(i) - self%q(i)) + (self%q(n + i) - self%q(n + i))
     end do
     !$omp end parallel do simd
-    is_finite = all(ieee_is_finite(self%motion)) .and. abs(rest) <= 0.0_wp
+    wrong = merge(0.0_wp, 1.0_wp, abs(rest) <= 0.0_wp)
+    call self%operators%space%most(wrong)
+    is_finite = all(ieee_is_finite(self%motion)) .and. .not. wrong(1) > 0.0_wp
   end function is_finite
 
   !> Compute R_n of a gap under the present pressure.

@@ -46,6 +46,8 @@ contains
 
     options = now%problem%options%newton
     if (now%residual_tangential < options%front_residual) return
+    ! nodes of other ranks move those of this one
+    if (now%operators%space%ranks%size > 1) return
     ! steadily rolling nodes move those behind them, too
     if (now%target%rolling%steady) return
     ! nodes of slender cells are coupled beyond the reach of a relaxation node by node

@@ -154,7 +154,7 @@ contains
   end subroutine separate
 
   !> Compute the relative displacements (w, u_x, u_y) of given tractions, by any operator.
-  recursive subroutine displacements(self, flexibility, pressure, traction, displacement, error)
+  subroutine displacements(self, flexibility, pressure, traction, displacement, error)
     class(friction_problem_t), intent(in) :: self
     !> Flexibility operator over the window
     class(flexibility_t), intent(inout) :: flexibility
@@ -168,10 +168,6 @@ contains
     real(wp), pointer, contiguous :: alone(:, :, :)
     integer :: row
 
-    if (flexibility%space%ranks%size > self%space%ranks%size) then
-      call displacements_by_rows(self, flexibility, pressure, traction, displacement, error)
-      return
-    end if
     if (.not. self%medium%couples()) then
       ! pressure and shear traction do not move each other: no copy of both
       alone(1:size(pressure, 1), 1:size(pressure, 2), 1:1) => pressure
@@ -191,29 +187,6 @@ contains
     if (allocated(error)) return
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
-
-  !> Compute them with an operator that ranks share by rows, from fields of which each rank has all rows.
-  recursive subroutine displacements_by_rows(self, flexibility, pressure, traction, displacement, error)
-    class(friction_problem_t), intent(in) :: self
-    class(flexibility_t), intent(inout) :: flexibility
-    real(wp), intent(in), contiguous, target :: pressure(:, :), traction(:, :, :)
-    real(wp), intent(out), contiguous :: displacement(:, :, :)
-    type(error_t), allocatable, intent(out) :: error
-    type(friction_problem_t) :: part
-    real(wp), allocatable :: own(:, :, :)
-    integer :: rows(2), m
-
-    rows = flexibility%space%own_rows(size(pressure, 2))
-    part%space = flexibility%space
-    allocate (part%medium, source=self%medium)
-    part%goodman = self%goodman
-    allocate (own(size(pressure, 1), rows(2) - rows(1) + 1, 3))
-    call part%displacements(flexibility, pressure(:, rows(1):rows(2)), traction(:, rows(1):rows(2), :), own, error)
-    if (allocated(error)) return
-    do m = 1, 3
-      call flexibility%space%fetch(size(pressure, 2), own(:, :, m), 1, displacement(:, :, m))
-    end do
-  end subroutine displacements_by_rows
 
   !> Compute the displacements by the tractions of a state, with any operator: w in its gap, u in its relative displacement, from
   !> which `complete_state` continues.
@@ -244,7 +217,7 @@ contains
     end if
   end subroutine displace
 
-  !> Compute the displacement by the motions of the remote parts at every node (n_col, n_row, 2) [m].
+  !> Compute the displacement by the motions of the remote parts at every node (n_col, own rows, 2) [m].
   pure function rigid_displacement(self, motion) result(displacement)
     class(friction_problem_t), intent(in) :: self
     !> Motions
@@ -252,7 +225,7 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
     integer :: row
 
-    allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 2))
+    allocate (displacement(self%lattice%extent(1), self%own_rows(), 2))
     do row = 1, size(displacement, 2)
       call self%rigid_displacement_row(motion, row, displacement(:, row, 1), displacement(:, row, 2))
     end do
@@ -263,7 +236,7 @@ contains
     class(friction_problem_t), intent(in) :: self
     !> Motions
     real(wp), intent(in) :: motion(n_motion)
-    !> Row of the window, from 1 on
+    !> Own row of the window, from 1 on
     integer, intent(in) :: row
     !> Components along x and y (number of nodes) [m]
     real(wp), intent(out), contiguous :: along(:), across(:)
@@ -272,7 +245,7 @@ contains
     real(wp) :: first(2), step(2), x(1), y(1), no_shift(n_motion)
     integer :: i, col
 
-    call self%lattice%row_coordinates(row, x, y)
+    call self%lattice%row_coordinates(row + self%rows_before(), x, y)
     first = remote_displacement(motion, x(1), y(1))
     no_shift = motion
     no_shift([along_x, along_y]) = 0.0_wp
@@ -298,7 +271,7 @@ contains
       part(normal, row) = sum(pressure(:, row))
       part(along_x, row) = sum(traction(:, row, 1))
       part(along_y, row) = sum(traction(:, row, 2))
-      call self%lattice%row_coordinates(row, x, y)
+      call self%lattice%row_coordinates(row + self%rows_before(), x, y)
       part(about_z, row) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
     end do
     !$omp end parallel do

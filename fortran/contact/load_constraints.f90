@@ -45,8 +45,8 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> Nodes in contact (n_col, n_row)
-    logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
+    !> Nodes in contact (n_col, own rows)
+    logical, intent(in) :: contact(size(problem%initial_gap, 1), size(problem%initial_gap, 2))
     !> Nodes of each row, and the sum of their columns
     real(wp), dimension(size(contact, 2)) :: nodes, columns
     real(wp) :: middle(2), n_row, in_row, touching
@@ -77,7 +77,8 @@ contains
           middle = [sum(columns), dot_product(nodes, [(real(row, wp), row=1, size(nodes))])]/n_contact + lattice%first - 1
         else
           middle(1) = space%total(columns)/n_contact + lattice%first(1) - 1
-          middle(2) = space%total(nodes*[(real(row + lattice%first(2) - 1, wp), row=1, size(nodes))])/n_contact
+          middle(2) = space%total(nodes*[(real(row + problem%rows_before(), wp), row=1, size(nodes))])/n_contact &
+                      + lattice%first(2) - 1
         end if
         middle = lattice%origin + matmul(lattice%basis, middle)
         if (control(along_y) == force_control) self%center(1) = middle(1)
@@ -87,7 +88,7 @@ contains
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
 
-  !> Compute the tangential displacement of a unit motion (n_col, n_row, 2).
+  !> Compute the tangential displacement of a unit motion (n_col, own rows, 2).
   function direction(self, k, problem)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
@@ -97,7 +98,7 @@ contains
     real(wp), allocatable :: direction(:, :, :)
     integer :: row
 
-    allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
+    allocate (direction(problem%lattice%extent(1), problem%own_rows(), 2))
     !$omp parallel do schedule(static) num_threads(problem%space%threads)
     do row = 1, size(direction, 2)
       call self%direction_row(k, problem, (row - 1)*size(direction, 1) + 1, direction(:, row, 1), direction(:, row, 2))
@@ -112,7 +113,7 @@ contains
     integer, intent(in) :: k
     !> The problem
     type(friction_problem_t), intent(in) :: problem
-    !> Number of the first node
+    !> Number of the first node, from the first own row on
     integer, intent(in) :: first
     !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: ux(:), uy(:)
@@ -128,7 +129,7 @@ contains
       uy = 1.0_wp
     case default
       associate (lattice => problem%lattice)
-        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1)]
+        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1) + problem%rows_before()]
         start = lattice%origin + matmul(lattice%basis, real(lattice%first + index, wp)) - self%center
         do i = 1, size(ux)
           ux(i) = -(start(2) + (i - 1)*lattice%basis(2, 1))/self%arm
@@ -201,8 +202,8 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> Pressure (n_col, n_row) [Pa], and its residual R_n
-    real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
+    !> Pressure (n_col, own rows) [Pa], and its residual R_n
+    real(wp), intent(in) :: pressure(size(problem%initial_gap, 1), size(problem%initial_gap, 2)), residual_normal
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
     real(wp) :: carried, error, factor, before, bounds(size(pressure))

@@ -154,11 +154,11 @@ contains
     !> Nodes in contact so far
     integer, intent(in) :: n_contact
     !> Pressure [Pa] and gap [m], row by row
-    real(wp), intent(in), dimension(self%lattice%extent(1), self%lattice%extent(2)) :: p, gap
+    real(wp), intent(in), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: p, gap
     !> Nodes that may come into contact
-    logical, intent(in) :: candidate(self%lattice%extent(1), self%lattice%extent(2))
+    logical, intent(in) :: candidate(size(self%initial_gap, 1), size(self%initial_gap, 2))
     !> The nodes; those of the smallest gap where the law calls for none
-    logical, intent(out) :: contact(self%lattice%extent(1), self%lattice%extent(2))
+    logical, intent(out) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
     real(wp) :: r, least
     integer :: row
 

@@ -129,7 +129,7 @@ contains
     call set_problem(self, problem, operators, step)
     n = size(self%p)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
-    do row = 1, problem%lattice%extent(2)
+    do row = 1, size(start%pressure, 2)
       to = row*problem%lattice%extent(1)
       from = to - problem%lattice%extent(1) + 1
       self%p(from:to) = start%pressure(:, row)
@@ -176,7 +176,7 @@ contains
     type(load_step_t), intent(in) :: step
     integer :: n
 
-    n = problem%lattice%size()
+    n = problem%own_size()
     self%problem => problem
     self%operators => operators
     self%target = step%target
@@ -449,7 +449,7 @@ contains
     real(wp), intent(in), contiguous, target :: gap(:)
     real(wp), pointer, contiguous :: p(:, :), g(:, :)
 
-    associate (n => self%problem%lattice%extent)
+    associate (n => self%problem%own_extent())
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate

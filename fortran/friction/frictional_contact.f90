@@ -15,15 +15,13 @@ module hc_frictional_contact
   use hc_hierarchy, only: level_count
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
-  use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_operator_set, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: prolong_state, prolong_displacement
+  use hc_coarse_change, only: prolong_state, prolong_displacement, restricted
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_transfer, only: restrict_vector
   implicit none
   private
 
@@ -36,10 +34,6 @@ module hc_frictional_contact
     type(friction_problem_t), allocatable :: coarse(:)
     !> Operators on all lattices, from the finest on
     type(operators_t), allocatable :: operators(:)
-    !> Threads to use, cache of spectra, and ranks that solve the problem together
-    integer :: n_threads = 0
-    type(kernel_cache_t), pointer :: spectra => null()
-    type(communicator_t) :: sharing
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -62,78 +56,47 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Memory of the transforms of a solver that is never used at the same time, and freed later
     type(scratch_t), pointer, intent(in), optional :: shared
-    !> Ranks that share the products, each with all fields; absent: one
+    !> Ranks that share the products of a problem of which each has all rows; absent: one
     type(communicator_t), intent(in), optional :: ranks
+    type(scratch_t), pointer :: scratch
     integer :: l, n_level
 
     call check_operator(problem%lattice, problem%medium, error, n_threads)
     if (allocated(error)) return
     self%problem = problem
     n_level = level_count(problem%lattice, problem%options%multilevel%smallest_side)
-    allocate (self%coarse(2:n_level))
+    allocate (self%operators(n_level), self%coarse(2:n_level))
     if (n_level > 1) call self%problem%coarsen(self%coarse(2))
     do l = 3, n_level
       call self%coarse(l - 1)%coarsen(self%coarse(l))
     end do
-    if (present(n_threads)) self%n_threads = n_threads
-    if (present(cache)) self%spectra => cache
-    if (present(ranks)) self%sharing = ranks
-    call prepare(self, .true., error, shared)
-  end subroutine new_frictional_contact
-
-  !> Set up threads and operators on all lattices.
-  subroutine prepare(self, by_rows, error, shared)
-    class(frictional_contact_t), intent(inout) :: self
-    !> Ranks share the rows of the fields, if the problem allows; else the transforms alone
-    logical, intent(in) :: by_rows
-    !> Allocated on failure: not enough memory
-    type(error_t), allocatable, intent(out) :: error
-    !> Memory of the transforms of a solver that is never used at the same time, and freed later
-    type(scratch_t), pointer, intent(in), optional :: shared
-    type(scratch_t), pointer :: scratch
-    integer :: l
-
     ! transforms of all lattices take turns
     scratch => null()
     if (present(shared)) scratch => shared
     if (.not. associated(scratch)) allocate (scratch)
-    if (allocated(self%operators)) deallocate (self%operators)
-    allocate (self%operators(1 + size(self%coarse)))
-    call prepare_lattice(self, by_rows, scratch, self%problem, self%operators(1), error)
-    do l = 2, size(self%operators)
+    call prepare(self%problem, self%operators(1))
+    do l = 2, n_level
       if (allocated(error)) return
-      call prepare_lattice(self, by_rows, scratch, self%coarse(l), self%operators(l), error)
+      call prepare(self%coarse(l), self%operators(l))
     end do
-  end subroutine prepare
 
-  !> Set up threads and operators on one lattice.
-  subroutine prepare_lattice(self, by_rows, scratch, level, operators, error)
-    class(frictional_contact_t), intent(in) :: self
-    logical, intent(in) :: by_rows
-    !> Memory of the transforms
-    type(scratch_t), pointer, intent(in) :: scratch
-    !> The problem there, and its operators
-    type(friction_problem_t), intent(inout) :: level
-    type(operators_t), intent(out) :: operators
-    type(error_t), allocatable, intent(out) :: error
-    type(field_space_t) :: space
-    logical :: uniform
+  contains
 
-    level%space = space_over(level%lattice%extent, self%n_threads)
-    level%space%scratch => scratch
-    space = level%space
-    uniform = .false.
-    select type (law => level%friction)
-    type is (coulomb_t)
-      uniform = .true.
-    end select
-    if (by_rows .and. uniform .and. .not. level%lattice%is_periodic()) then
-      space%ranks = self%sharing%over(level%lattice%extent)
-    else
-      space%helpers = self%sharing%over(level%lattice%extent)
-    end if
-    call new_operators(operators, level%lattice, level%medium, space, error, self%spectra, level%options%preconditioner)
-  end subroutine prepare_lattice
+    !> Set up threads and operators of one lattice, whose rows are shared as the problem says.
+    subroutine prepare(level, operators)
+      type(friction_problem_t), intent(inout) :: level
+      type(operators_t), intent(out) :: operators
+      type(field_space_t) :: space
+
+      space = space_over(level%lattice%extent, n_threads)
+      space%scratch => scratch
+      space%ranks = level%space%ranks
+      level%space = space
+      if (present(ranks) .and. space%ranks%size == 1) space%helpers = ranks%over(level%lattice%extent)
+      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner)
+    end subroutine prepare
+
+  end subroutine new_frictional_contact
 
   !> Set the gap before loading on all lattices.
   subroutine set_gap(self, gap)
@@ -236,11 +199,6 @@ contains
     integer :: sweeps
     logical :: guessed, touching
 
-    if (target%rolling%steady .and. self%operators(1)%space%ranks%size > 1) then
-      ! a node feels all nodes ahead of it
-      call prepare(self, .false., error)
-      if (allocated(error)) return
-    end if
     call self%problem%friction%begin_step(start%zone)
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
@@ -330,9 +288,9 @@ contains
 
     work = 0.0_wp
     target = step%target
-    origin(2)%value = restrict_vector(self%problem%lattice, step%reference, self%coarse(2)%lattice)
+    origin(2)%value = restricted(self%problem, step%reference, self%coarse(2))
     do l = 3, size(self%operators)
-      origin(l)%value = restrict_vector(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
+      origin(l)%value = restricted(self%coarse(l - 1), origin(l - 1)%value, self%coarse(l))
     end do
     do l = size(self%operators), 2, -1
       associate (problem => self%coarse(l))
@@ -369,8 +327,8 @@ contains
       call prolong_state(coarse_problem, coarse, problem, state)
       call move_alloc(known, moved)
       if (.not. allocated(moved)) return
-      if (any(shape(moved(:, :, 1)) /= coarse_problem%lattice%extent)) return
-      allocate (known(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+      if (any(shape(moved(:, :, 1)) /= coarse_problem%own_extent())) return
+      allocate (known(problem%lattice%extent(1), problem%own_rows(), 3))
       call prolong_displacement(coarse_problem, moved, problem, known)
     end subroutine continue_from
 

@@ -11,7 +11,6 @@ module hc_lattice_solver
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, add_fields, add_history, load_step_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
-  use hc_field_space, only: field_space_t
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
   use hc_operator_set, only: operators_t
@@ -27,136 +26,8 @@ module hc_lattice_solver
 
 contains
 
-  !> Solve a load step on one lattice: each rank its rows, where several share them.
+  !> Sweep on one lattice, on the rows of this rank, until the residuals are small.
   subroutine solve_on_lattice(problem, operators, start, step, state, error, estimate, as_start)
-    !> The problem
-    type(friction_problem_t), intent(in), target :: problem
-    !> Operator and preconditioners
-    type(operators_t), intent(inout), target :: operators
-    !> State to start from, whose tractions are freed once they are taken over
-    type(contact_state_t), intent(inout) :: start
-    !> The load step
-    type(load_step_t), intent(in) :: step
-    !> Solution, converged or not
-    type(contact_state_t), intent(out) :: state
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    !> w, u_x, u_y of the start but for an error of interpolation (n_col, n_row, 3), if known; those of the solution, if that is a
-    !> start itself, else freed [m]
-    real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
-    !> The solution is only a start of another one
-    logical, intent(in), optional :: as_start
-    type(friction_problem_t), target :: part
-    type(contact_state_t) :: own_start, own_state
-    type(load_step_t) :: own_step
-    real(wp), allocatable, target :: reference(:, :, :)
-    real(wp), allocatable :: own_estimate(:, :, :)
-    integer :: rows(2)
-
-    if (operators%space%ranks%size == problem%space%ranks%size) then
-      call sweep_on_lattice(problem, operators, start, step, state, error, estimate, as_start)
-      return
-    end if
-    rows = operators%space%own_rows(problem%lattice%extent(2))
-    call problem%extract_part([1, rows(1)], [problem%lattice%extent(1), rows(2)], part)
-    part%space = operators%space
-    own_start%pressure = start%pressure(:, rows(1):rows(2))
-    own_start%traction = start%traction(:, rows(1):rows(2), :)
-    own_start%motion = start%motion
-    own_start%load = start%load
-    deallocate (start%pressure, start%traction)
-    allocate (reference, source=step%reference(:, rows(1):rows(2), :))
-    own_step = step
-    own_step%reference => reference
-    if (present(estimate)) then
-      if (allocated(estimate)) then
-        own_estimate = estimate(:, rows(1):rows(2), :)
-        deallocate (estimate)
-      end if
-      call sweep_on_lattice(part, operators, own_start, own_step, own_state, error, own_estimate, as_start)
-      if (allocated(error)) return
-      if (allocated(own_estimate)) then
-        allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-        call gather(operators%space, own_estimate, estimate)
-      end if
-    else
-      call sweep_on_lattice(part, operators, own_start, own_step, own_state, error, as_start=as_start)
-      if (allocated(error)) return
-    end if
-    call gather_state(problem, operators%space, own_state, state)
-  end subroutine solve_on_lattice
-
-  !> Take all rows of a state from the ranks that have them.
-  subroutine gather_state(problem, space, own, state)
-    type(friction_problem_t), intent(in) :: problem
-    type(field_space_t), intent(in) :: space
-    !> State on own rows, which is freed field by field
-    type(contact_state_t), intent(inout) :: own
-    type(contact_state_t), intent(out) :: state
-    real(wp), allocatable :: zone(:, :)
-
-    state = own
-    deallocate (own%accumulated_slip, own%dissipation_density, state%accumulated_slip, state%dissipation_density)
-    associate (n => problem%lattice%extent)
-      call gather_field(n, own%pressure, state%pressure)
-      call gather_field(n, own%gap, state%gap)
-      call gather_vector(n, own%traction, state%traction)
-      call gather_vector(n, own%relative_displacement, state%relative_displacement)
-      call gather_vector(n, own%slip_increment, state%slip_increment)
-      allocate (zone(n(1), n(2)))
-      call space%fetch(n(2), real(own%zone, wp), 1, zone)
-      state%zone = nint(zone)
-    end associate
-    deallocate (zone)
-    call add_history(state)
-
-  contains
-
-    !> Take all rows of a field.
-    subroutine gather_field(n, rows, field)
-      integer, intent(in) :: n(2)
-      !> Own rows, freed
-      real(wp), allocatable, intent(inout) :: rows(:, :)
-      !> All rows
-      real(wp), allocatable, intent(inout) :: field(:, :)
-
-      deallocate (field)
-      allocate (field(n(1), n(2)))
-      call space%fetch(n(2), rows, 1, field)
-      deallocate (rows)
-    end subroutine gather_field
-
-    !> Take all rows of a field with two components.
-    subroutine gather_vector(n, rows, field)
-      integer, intent(in) :: n(2)
-      !> Own rows, freed
-      real(wp), allocatable, intent(inout) :: rows(:, :, :)
-      !> All rows
-      real(wp), allocatable, intent(inout) :: field(:, :, :)
-
-      deallocate (field)
-      allocate (field(n(1), n(2), 2))
-      call gather(space, rows, field)
-      deallocate (rows)
-    end subroutine gather_vector
-
-  end subroutine gather_state
-
-  !> Take all rows of a field with several components.
-  subroutine gather(space, own, field)
-    type(field_space_t), intent(in) :: space
-    !> Own rows, and all of them (n_col, rows, component)
-    real(wp), intent(in), contiguous :: own(:, :, :)
-    real(wp), intent(out), contiguous :: field(:, :, :)
-    integer :: m
-
-    do m = 1, size(own, 3)
-      call space%fetch(size(field, 2), own(:, :, m), 1, field(:, :, m))
-    end do
-  end subroutine gather
-
-  !> Sweep on the rows of this rank until the residuals are small.
-  subroutine sweep_on_lattice(problem, operators, start, step, state, error, estimate, as_start)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
@@ -196,7 +67,7 @@ contains
         if (allocated(error)) return
         if (now%fixed) then
           fixed = fixed + 1
-          state%sliding = overloads(problem, step%target, reshape(now%p, problem%lattice%extent), now%residual_normal)
+          state%sliding = overloads(problem, step%target, reshape(now%p, problem%own_extent()), now%residual_normal)
           if (state%sliding) fixed = options%max_fixed_sweeps
         end if
         state%sweeps = sweep
@@ -210,7 +81,7 @@ contains
       end do
     end associate
     call finish(now, step, state)
-  end subroutine sweep_on_lattice
+  end subroutine solve_on_lattice
 
   !> Make one sweep: for the pressure, then for the shear traction, or for both at once where that is not enough.
   subroutine make_sweep(now, sweep, max_sweeps, error)
@@ -269,7 +140,7 @@ contains
       if (known) then
         call collect(now, state)
         if (present(estimate) .and. .not. judged) then
-          if (.not. allocated(estimate)) allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+          if (.not. allocated(estimate)) allocate (estimate(problem%lattice%extent(1), problem%own_rows(), 3))
           estimate(:, :, 1) = state%gap
           estimate(:, :, 2:) = state%relative_displacement
         end if

@@ -21,6 +21,8 @@ module ranks_tests
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
+  use hc_shared_friction, only: shared_friction_t, new_shared_friction
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_load_path, only: advance, step_settings_t
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   use testing, only: test_t, new_test, check, check_true
@@ -31,6 +33,8 @@ module ranks_tests
 
   real(wp), parameter :: two_pi = 2.0_wp*pi
 
+  !> Words of the first rank: to take part in a call, or that there is none any more
+  integer(int32), parameter :: to_follow = 1, to_end = 2
   !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
 
@@ -427,6 +431,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
+    if (ranks%size == 1) return
     do k = 0, 5
       call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, error)
       if (allocated(error)) return
@@ -441,7 +446,10 @@ contains
     type(lattice_t) :: lattice
     type(elastic_pair_t) :: pair
     type(friction_problem_t) :: problem
-    type(windowed_friction_t) :: alone, shared
+    type(windowed_friction_t) :: alone
+    type(shared_friction_t) :: shared
+    type(kernel_cache_t), target :: spectra
+    type(kernel_cache_t), pointer :: cache
     type(contact_state_t) :: start, expected, found
     type(load_target_t) :: target
     real(wp) :: gap(n, n - 3), p_max
@@ -454,13 +462,19 @@ contains
     call sphere(lattice, gap)
     call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
-    if (.not. allocated(error)) call new_windowed_friction(shared, problem, error, 1, ranks=ranks)
+    cache => spectra
+    if (.not. allocated(error)) call new_shared_friction(shared, problem, error, 1, cache, ranks, [to_follow])
     if (allocated(error)) return
+    if (ranks%rank > 0) then
+      call follow_first(shared, error)
+      return
+    end if
     call new_friction_state(start, lattice)
     do step = 1, 2
       target%value(:2) = [30.0_wp, merge(0.0_wp, 4.0_wp, step == 1)]
       call advance(alone, start, target, step_settings_t(1.0e-12_wp), expected, error)
       if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-12_wp), found, error)
+      if (step == 2 .or. allocated(error)) call ranks%tell([to_end])
       if (allocated(error)) return
       call check_true(error, expected%converged .and. found%converged, 'converged')
       if (allocated(error)) return
@@ -478,6 +492,24 @@ contains
       start = expected
     end do
   end subroutine shear_sphere
+
+  !> Take part in the calls of the first rank.
+  subroutine follow_first(shared, error)
+    type(shared_friction_t), intent(inout) :: shared
+    type(error_t), allocatable, intent(out) :: error
+    integer(int32), allocatable :: words(:)
+    integer :: n
+
+    do
+      call ranks%wait_for_words(n)
+      if (allocated(words)) deallocate (words)
+      allocate (words(n))
+      call ranks%hear(words)
+      if (words(1) == to_end) return
+      call shared%follow(error)
+      if (allocated(error)) return
+    end do
+  end subroutine follow_first
 
   !> Waves that repeat, on even and odd numbers of rows; even ones have a coarser lattice, too.
   subroutine test_waves(error)

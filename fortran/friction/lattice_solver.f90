@@ -67,7 +67,8 @@ contains
         if (allocated(error)) return
         if (now%fixed) then
           fixed = fixed + 1
-          state%sliding = overloads(problem, step%target, reshape(now%p, problem%own_extent()), now%residual_normal)
+          state%sliding = overloads(problem, step%target, reshape(now%p, [problem%lattice%extent(1), problem%own_rows()]), &
+                                    now%residual_normal)
           if (state%sliding) fixed = options%max_fixed_sweeps
         end if
         state%sweeps = sweep

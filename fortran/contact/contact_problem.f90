@@ -109,6 +109,7 @@ contains
     type is (friction_problem_t)
       call from%friction%on_lattice(from%lattice, self%lattice, self%friction)
       self%goodman = from%goodman
+      call self%friction%begin_rows(self%rows_before()*self%lattice%extent(1))
     end select
     call set_geometry(self)
   end subroutine inherit

@@ -3,8 +3,8 @@
 !> Paths of loads, wear and growing windows call the procedures of the solver on the first rank alone. Each call wakes the other
 !> ranks, which take part in it by `follow`.
 !>
-!> Each rank solves on its rows of the window, which the first one deals out and gathers. Each has all rows where the window
-!> repeats, in steady rolling, and where friction varies; then they share the transforms.
+!> Each rank solves on its rows of the window, which the first one deals out and gathers. In steady rolling from row to row each has
+!> all rows; then they share the transforms.
 module hc_shared_friction
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
@@ -15,6 +15,7 @@ module hc_shared_friction
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields, add_history
   use hc_coulomb, only: coulomb_t
+  use hc_nodal_coulomb, only: nodal_coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
@@ -88,7 +89,7 @@ contains
     self%problem%space = space_over(self%problem%lattice%extent, n_threads)
   end subroutine new_shared_friction
 
-  !> Return whether ranks can solve the problem by rows: if friction is the same everywhere, and the window ends.
+  !> Return whether ranks can solve the problem by rows: if friction does not depend on the zones of all nodes.
   logical function can_be_shared(self)
     type(shared_friction_t), intent(in) :: self
     type(communicator_t) :: sharing
@@ -97,7 +98,9 @@ contains
     can_be_shared = .false.
     select type (law => self%problem%friction)
     type is (coulomb_t)
-      can_be_shared = sharing%size > 1 .and. .not. self%problem%lattice%is_periodic()
+      can_be_shared = sharing%size > 1
+    class is (nodal_coulomb_t)
+      can_be_shared = sharing%size > 1
     end select
   end function can_be_shared
 
@@ -313,8 +316,8 @@ contains
     type(contact_state_t) :: own
     real(wp), allocatable, target :: origin(:, :, :)
 
-    if (self%by_rows .and. order%target%rolling%steady) then
-      ! a node feels all nodes ahead of it
+    if (self%by_rows .and. order%target%rolling%steady .and. order%target%rolling%ahead(2) /= 0) then
+      ! a node feels all nodes ahead of it, in rows of other ranks
       call prepare(self, .false., error)
       if (allocated(error)) return
     end if

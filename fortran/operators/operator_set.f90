@@ -134,7 +134,7 @@ contains
     integer :: m, n
 
     if (.not. self%rolling%steady) return
-    n = self%flexibility%lattice%size()
+    n = product(self%space%own_extent(self%flexibility%lattice%extent))
     do m = 1, size(components)
       if (components(m) == normal) cycle
       call self%rolling%subtract_ahead(self%flexibility%lattice%extent(1), displacement((m - 1)*n + 1:m*n))

@@ -148,6 +148,8 @@ contains
     allocate (around(size(mark, 1), before + size(mark, 2) + min(n, problem%lattice%extent(2) - own(2))))
     call problem%space%fetch(problem%lattice%extent(2), real(mark, sp), own(1) - before, around)
     mark = nint(around, int8)
+    ! rings end there: the nodes of own rows are further off
+    mark(:, [1, size(mark, 2)]) = is_off
   end subroutine add_rows
 
   !> Find out which nodes in contact stick, and which slip, as their classification will.

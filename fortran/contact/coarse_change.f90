@@ -14,13 +14,14 @@
 module hc_coarse_change
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t, floor_half
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, slip, normal, force_control
+  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_transfer, only: prolong, prolong_edge, prolong_shear
   implicit none
   private
 
-  public :: restrict_state, restricted, balance, add_change, find_displacements, prolong_state, prolong_displacement
+  public :: restrict_state, restricted, balance, add_change, add_displacement, find_displacements, &
+            prolong_state, prolong_displacement
 
   !> Rows of a coarse lattice that the nodes of finer ones between them take their values from.
   type :: coarse_rows_t
@@ -43,7 +44,6 @@ contains
 
     real(wp), allocatable :: zone(:, :)
 
-    call new_friction_state(coarse, coarse_problem%lattice, coarse_problem%space)
     call problem%restrict(fine%pressure, coarse_problem, coarse%pressure)
     call problem%restrict(fine%gap, coarse_problem, coarse%gap)
     call problem%restrict(real(fine%zone, wp), coarse_problem, zone)
@@ -153,16 +153,13 @@ contains
   end subroutine balance
 
   !> Add the change of a coarse state to a fine one.
-  subroutine add_change(coarse_problem, before, after, problem, state, moved, displacement)
+  subroutine add_change(coarse_problem, before, after, problem, state)
     type(friction_problem_t), intent(in) :: coarse_problem
     !> Coarse states
     type(contact_state_t), intent(in) :: before, after
     type(friction_problem_t), intent(in) :: problem
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
-    !> Change of w, u_x, u_y at the coarse nodes; the fine ones, to which it is added by interpolation (n_col, n_row, 3) [m]
-    real(wp), intent(in), optional, contiguous :: moved(:, :, :)
-    real(wp), intent(inout), optional, contiguous :: displacement(:, :, :)
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
     real(wp), dimension(size(state%pressure, 1)) :: bound, length
     integer :: col, row, m
@@ -199,14 +196,26 @@ contains
       end do
     end do
     !$omp end parallel do
-    deallocate (slipping)
     state%motion = state%motion + (after%motion - before%motion)
-    if (.not. present(displacement)) return
-    deallocate (change, change_of_traction)
-    allocate (change_of_traction, mold=displacement)
-    call prolong_displacement(coarse_problem, moved, problem, change_of_traction)
-    displacement = displacement + change_of_traction
   end subroutine add_change
+
+  !> Add the change of coarse displacements to fine ones, by interpolation.
+  subroutine add_displacement(coarse_problem, moved, problem, displacement)
+    type(friction_problem_t), intent(in) :: coarse_problem, problem
+    !> Change of w, u_x, u_y at the coarse nodes (n_col, n_row, 3) [m]
+    real(wp), intent(in), contiguous :: moved(:, :, :)
+    !> Fine ones
+    real(wp), intent(inout) :: displacement(:, :, :)
+    real(wp), allocatable :: change(:, :, :)
+    integer :: m
+
+    ! one by one: a window is too large for copies
+    allocate (change(size(displacement, 1), size(displacement, 2), 1))
+    do m = 1, size(displacement, 3)
+      call prolong_displacement(coarse_problem, moved(:, :, m:m), problem, change)
+      displacement(:, :, m) = displacement(:, :, m) + change(:, :, 1)
+    end do
+  end subroutine add_displacement
 
   !> Prolong displacements: smooth ones, that do not end with the window.
   subroutine prolong_displacement(coarse_problem, coarse, problem, fine)

@@ -16,6 +16,8 @@ module hc_contact_solver
   contains
     !> One load step
     procedure(solve_step), deferred :: solve_step
+    !> Gap before loading
+    procedure(solver_gap), deferred :: copy_gap
   end type contact_solver_t
 
   !> A method of solving one with friction.
@@ -30,6 +32,8 @@ module hc_contact_solver
     procedure :: wear
     !> Another gap before loading
     procedure :: set_gap
+    !> Gap before loading, without the wear
+    procedure :: copy_gap => copy_unworn_gap
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure(solver_displacements), deferred :: displacements
   end type friction_solver_t
@@ -57,6 +61,14 @@ module hc_contact_solver
       !> Allocated on failure: memory, an operator that is not positive definite
       type(error_t), allocatable, intent(out) :: error
     end subroutine solve_step
+
+    !> Copy the gap before loading.
+    pure subroutine solver_gap(self, gap)
+      import :: contact_solver_t, wp
+      class(contact_solver_t), intent(in) :: self
+      !> The gap (n_col, n_row) [m]
+      real(wp), intent(out), contiguous :: gap(:, :)
+    end subroutine solver_gap
 
     !> Compute the relative displacements (w, u_x, u_y) of given tractions.
     subroutine solver_displacements(self, pressure, traction, displacement, error)
@@ -91,5 +103,17 @@ contains
 
     self%problem%initial_gap = gap
   end subroutine set_gap
+
+  !> Copy the gap before loading, without the wear.
+  pure subroutine copy_unworn_gap(self, gap)
+    class(friction_solver_t), intent(in) :: self
+    real(wp), intent(out), contiguous :: gap(:, :)
+
+    if (allocated(self%unworn_gap)) then
+      gap = self%unworn_gap
+    else
+      gap = self%problem%initial_gap
+    end if
+  end subroutine copy_unworn_gap
 
 end module hc_contact_solver

@@ -90,7 +90,7 @@ module hc_contact_state
     !> Approach, shifts [m] and twist [rad] of the remote parts; bulk strain of body 1 less that of body 2
     real(wp) :: motion(n_motion) = 0.0_wp
     !> Rolling bodies: creepages along x and y, and spin [1/m]; creep forces times creepages, with the sign of a loss, and energy
-    !> that friction takes, by distance; what the lattice adds to the first, of bodies whose pressure and shear do not couple [J/m]
+    !> that friction takes, by distance; error of the first by the lattice, of bodies whose pressure and shear do not couple [J/m]
     real(wp) :: creepage(3) = 0.0_wp, creep_power = 0.0_wp, slip_power = 0.0_wp, creep_power_error = 0.0_wp
     !> Energy dissipated by friction so far, and bound on its error by the size of the load steps, (W4) [J]
     real(wp) :: dissipated_energy = 0.0_wp, path_error = 0.0_wp

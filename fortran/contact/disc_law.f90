@@ -296,7 +296,7 @@ contains
     real(wp), intent(in) :: unit, slope
     !> Pressure and traction
     real(wp), intent(in) :: p(n), qx(n), qy(n)
-    !> What is left of the traction
+    !> Traction within the disc
     real(wp), intent(out) :: cut_x(n), cut_y(n)
     real(wp) :: length, share
     integer :: i

@@ -1,9 +1,9 @@
 !> Tangential motions that are driven by their loads.
 !>
-!> Each is an unknown, and its load a constraint on the shear traction: what
-!> the unit motion does along x and y, summed over the traction, is the load. A torque is
-!> taken about the middle of the contact, as far as the tangential loads are
-!> known too: in a contact far from the origin a twist about the origin is nearly a shift.
+!> Each is an unknown, and its load a constraint on the shear traction: the sum of the
+!> traction times the unit motion is the load. A torque is taken about the middle of the
+!> contact where the tangential loads are given, too: in a contact far from the origin a twist
+!> about the origin is nearly a shift.
 !>
 !> Equations: docs/theory/friction.md, (F4), (F14).
 module hc_load_constraints

@@ -1,8 +1,8 @@
 !> Cholesky factors of a contact area, kept from one area to the next.
 !>
 !> One scalar matrix stands for all components: K1 between the nodes of the contact, in units of the self-compliance. The
-!> pressure has it exactly; the shear traction, times c = 1 + gamma/2, but for what depends on the direction (the part
-!> lambda_5 (K_xx - K_1/2), lambda_5 K_xy). Its factor L is made in single precision; nodes that are sure to stick, the core,
+!> pressure has it exactly; the shear traction, times c = 1 + gamma/2, without the part that depends on the direction
+!> (lambda_5 (K_xx - K_1/2), lambda_5 K_xy). Its factor L is made in single precision; nodes that are sure to stick, the core,
 !> come first. With S = A_22 - L_21 L_21^T an unknown of another node, of direction t_i and magnitude tau_i, is left with
 !>
 !>     T_ij = (t_i . t_j) S_ij + D_i/c delta_ij,
@@ -86,7 +86,7 @@ contains
     type(dense_flexibility_t), intent(in) :: flexibility
     !> Self-compliance of a node [m/Pa], and c
     real(wp), intent(in) :: unit, shear
-    !> What may have changed since L and T were made
+    !> Largest changes since L and T were made
     type(direct_options_t), intent(in) :: options
     !> The area
     type(factored_area_t), intent(in) :: area
@@ -125,11 +125,11 @@ contains
     end if
     if (info == 0) call factorize_across(self, area%side, area%compliance, options%largest_turn, info, error)
     done = info == 0
-    ! nothing can be kept of what fails
+    ! a failed factor cannot be kept
     if (.not. done) call self%clear()
   end subroutine factorize
 
-  !> Tell whether the rows of L serve another area.
+  !> Return whether the rows of L serve another area.
   pure logical function is_kept(self, most_exchanged, contact, stuck, is_here)
     type(area_factors_t), intent(in) :: self
     !> Largest share of rows that were added or deleted
@@ -147,7 +147,7 @@ contains
               count(self%row(contact) == 0) + count(.not. is_here(self%order)) <= most_exchanged*n
   end function is_kept
 
-  !> Forget all rows.
+  !> Delete all rows.
   subroutine clear_rows(self, n_window)
     type(area_factors_t), intent(inout) :: self
     !> Nodes of the window
@@ -261,7 +261,7 @@ contains
     end associate
   end subroutine extend
 
-  !> Find what holds the pressure of nodes that have left the contact at 0: W, and the factor of W^T W.
+  !> Compute the constraints of zero pressure at nodes that have left the contact: W, and the factor of W^T W.
   subroutine hold_gone(self, info, error)
     type(area_factors_t), intent(inout) :: self
     !> Not zero: not positive definite
@@ -344,7 +344,7 @@ contains
     self%spring = d
   end subroutine factorize_across
 
-  !> Tell whether T is nearly that of some unknowns.
+  !> Return whether T is nearly that of some unknowns.
   pure logical function is_like(self, row, side, spring, largest_turn)
     type(area_factors_t), intent(in) :: self
     !> Row of each unknown, its direction (:, 2) and spring

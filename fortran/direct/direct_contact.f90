@@ -37,6 +37,7 @@ module hc_direct_contact
     type(direct_contact_t), allocatable :: coarser
   contains
     procedure :: solve_step
+    procedure :: copy_gap
     !> Solve for a normal load or an approach
     procedure :: solve
   end type direct_contact_t
@@ -100,6 +101,14 @@ contains
       call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
     end if
   end subroutine solve_step
+
+  !> Copy the gap before loading.
+  pure subroutine copy_gap(self, gap)
+    class(direct_contact_t), intent(in) :: self
+    real(wp), intent(out), contiguous :: gap(:, :)
+
+    gap = self%problem%initial_gap
+  end subroutine copy_gap
 
   !> Solve for a normal load or an approach.
   recursive subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)

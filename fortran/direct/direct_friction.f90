@@ -197,7 +197,7 @@ contains
     if (guessed) guessed = any(guess%pressure > 0.0_wp)
   end subroutine find_start
 
-  !> Tell whether the contact has nodes enough for a coarser lattice to help.
+  !> Return whether the contact has enough nodes for a coarser lattice to help.
   logical function is_worth_coarsening(self, touching, start, target) result(worth)
     type(direct_friction_t), intent(in) :: self
     !> There is a contact already

@@ -335,7 +335,7 @@ contains
     call move_motions(problem, area%driven, change(:n, 1), it)
   end subroutine satisfy_loads
 
-  !> Tell whether the unknowns carry the loads, but for rounding errors.
+  !> Return whether the unknowns carry the loads, but for rounding errors.
   pure logical function are_carried(problem, area)
     !> The contact problem
     type(friction_problem_t), intent(in) :: problem

@@ -1,7 +1,7 @@
 !> Displacement and stress at a depth of a body by a pyramid of traction, as a sum over depths of its potentials.
 !>
-!> In a half-space there is one depth, that of the point. A coated body has beside it a sum of images (hc_image_fit): what the
-!> responses at the depth differ by from those of a half-space of the material there,
+!> In a half-space there is one depth, that of the point. A coated body also has a sum of images (hc_image_fit),
+!> the difference of the responses at the depth and those of a half-space of the material there:
 !>
 !>     f(k, z) = f_half-space(k, z) + sum_j c_j exp(-k z_j),
 !>

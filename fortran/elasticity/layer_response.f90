@@ -157,7 +157,7 @@ contains
   !> Compute the amplitudes of rising solutions by those of falling ones.
   pure function reflection(layer, x, c) result(r)
     type(layer_t), intent(in) :: layer
-    !> Wave number times thickness, k times the compliance of what lies below [1/Pa]
+    !> Wave number times thickness, k times the compliance of the part below [1/Pa]
     real(wp), intent(in) :: x, c(2, 2)
     real(wp), dimension(2, 2) :: up, up_force, down, down_force, r
 
@@ -243,7 +243,7 @@ contains
     type(layer_t), intent(in) :: layer
     !> Wave number times thickness, and times depth below the top
     real(wp), intent(in) :: x, depth
-    !> k times the compliance of what lies below, in the plane of k and z, and across [1/Pa]
+    !> k times the compliance of the part below, in the plane of k and z, and across [1/Pa]
     real(wp), intent(in) :: c(2, 2), s
     !> Forces (L, z) by both loads, and displacements [1/Pa]
     real(wp), intent(inout) :: force(2, 2)

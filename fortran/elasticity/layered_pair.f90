@@ -212,8 +212,8 @@ contains
     end do
     if (self%fit_error <= largest_error) return
     write (number, '(es8.1)') self%fit_error
-    call raise(error, status%invalid_input, 'the coatings: their kernels as sums of images have an error of '// &
-               trim(adjustl(number))//' of the largest one; at most 1e-6 expected, so ratios of moduli nearer to 1')
+    call raise(error, status%invalid_input, 'the moduli of layers and bodies lie too far apart: the error of the kernels is '// &
+               trim(adjustl(number))//' of the largest one; at most 1E-06 expected')
   end subroutine find_images
 
   !> Return the smallest thickness of all layers.
@@ -443,7 +443,7 @@ contains
     end do
   end subroutine find_symbols
 
-  !> Compute what responses add to the transform of the blocks at a wave vector, (J7); that of odd blocks over i.
+  !> Compute the part of the responses in the transform of the blocks at a wave vector, (J7); that of odd blocks over i.
   pure function change_at(self, basis, half) result(change)
     type(layered_pair_t), intent(in) :: self
     real(wp), intent(in) :: basis(2, 2)

@@ -12,7 +12,7 @@ module hc_fas_predictor
   use hc_contact_problem, only: friction_problem_t
   use hc_operator_set, only: operators_t
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: restrict_state, balance, add_change, find_displacements
+  use hc_coarse_change, only: restrict_state, balance, add_change, add_displacement, find_displacements
   implicit none
   private
 
@@ -72,8 +72,13 @@ contains
       work = work + after%operator_applications
       guess%converged = after%converged
       if (guess%converged) then
+        moved = moved - displacement
+        ! fields of the coarse lattice take as much memory as one of the window
+        deallocate (displacement, origin, before%gap, before%relative_displacement, after%gap, after%relative_displacement, &
+                    after%slip_increment, after%accumulated_slip, after%dissipation_density)
+        call add_change(model, before, after, problem, guess)
         if (.not. allocated(estimate)) call find_displacements(problem, start, estimate)
-        call add_change(model, before, after, problem, guess, moved - displacement, estimate)
+        call add_displacement(model, moved, problem, estimate)
       end if
     end if
     guess%operator_applications = work*model%lattice%size()/problem%lattice%size()

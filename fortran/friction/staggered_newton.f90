@@ -51,6 +51,8 @@ module hc_staggered_newton
     real(wp) :: scale = 0.0_wp
     !> Some node sticks; the loads determine the motions
     logical :: sticks = .false., independent = .false.
+    !> It is taken however large it is: no further attempt follows
+    logical :: is_last = .false.
   end type shear_solution_t
 
 contains
@@ -278,13 +280,12 @@ contains
     found%scale = now%problem%tangential_compliance*highest
     fixing = .false.
     do
-      call solve_on_zones(now, fixing, found, error)
+      call solve_on_zones(now, fixing, found, before, error)
       if (allocated(error)) return
       now%unsupported = .not. found%independent
-      if (size(found%missing) == 0 .or. fixing) exit
+      if (found%is_last .or. size(found%missing) == 0 .or. fixing) exit
       ! where all nodes slip, only their directions resist a load: limit the step along them
       if (found%independent) then
-        if (found%sticks) exit
         if (now%shear%space%max_abs(found%x(:n)) <= options%most_across*highest) exit
         deallocate (found%ax)
       end if
@@ -333,13 +334,15 @@ contains
   end subroutine restore_traction
 
   !> Classify the nodes, and solve (F10) for their traction in the frames; the traction of the iterate moves there.
-  subroutine solve_on_zones(now, fixing, found, error)
+  subroutine solve_on_zones(now, fixing, found, before, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Fix some nodes in stick where none sticks
     logical, intent(in) :: fixing
     !> The solution
     type(shear_solution_t), intent(inout) :: found
+    !> The traction before, freed where the solution is taken however large it is
+    real(wp), allocatable, intent(inout) :: before(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: nodes
@@ -365,17 +368,18 @@ contains
         if (found%independent) exit
       end do
     end associate
-    if (found%independent) call solve_in_frames(now, nodes, fixing, found, error)
+    if (.not. found%independent) return
+    found%is_last = size(found%missing) == 0 .or. fixing .or. found%sticks
+    if (found%is_last) deallocate (before)
+    call solve_in_frames(now, nodes, found, error)
   end subroutine solve_on_zones
 
   !> Solve (F10) by conjugate gradients from a traction that carries the prescribed loads.
-  subroutine solve_in_frames(now, nodes, fixing, found, error)
+  subroutine solve_in_frames(now, nodes, found, error)
     !> Tractions and motions; its displacements may move to the solution
     type(friction_iterate_t), intent(inout) :: now
     !> Unknowns (of 2 n)
     type(active_set_t), intent(in) :: nodes
-    !> Some nodes are fixed in stick: there is no further attempt
-    logical, intent(in) :: fixing
     !> The solution, on entry its start
     type(shear_solution_t), intent(inout) :: found
     !> Allocated on failure
@@ -390,7 +394,7 @@ contains
     allocate (rhs(size(found%x)))
     call find_prescribed_displacement(now, rhs)
     call now%shear%add_rest(rhs)
-    if (size(found%missing) == 0 .or. fixing .or. found%sticks) then
+    if (found%is_last) then
       call move_alloc(now%u, found%ax)
     else
       ! the old displacements may be needed again

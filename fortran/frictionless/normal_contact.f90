@@ -11,6 +11,7 @@ module hc_normal_contact
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t, floor_half
   use hc_field_space, only: field_space_t, space_over
+  use hc_memory, only: give_back
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
   use hc_elastic_medium, only: elastic_medium_t
@@ -58,6 +59,7 @@ module hc_normal_contact
     type(communicator_t) :: ranks
   contains
     procedure :: solve_step
+    procedure :: copy_gap
     !> Solve for a normal load or an approach
     procedure :: solve
   end type normal_contact_t
@@ -139,6 +141,14 @@ contains
     ! pressure, closing; direction, punch, zones now and next, marks about the edge of the contact
     normal_contact_memory = normal_contact_memory + n*(2*field + 6*half)
   end function normal_contact_memory
+
+  !> Copy the gap before loading.
+  pure subroutine copy_gap(self, gap)
+    class(normal_contact_t), intent(in) :: self
+    real(wp), intent(out), contiguous :: gap(:, :)
+
+    gap = self%level(1)%initial_gap
+  end subroutine copy_gap
 
   !> Solve a load step, of which the normal load or the approach matters.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
@@ -225,6 +235,7 @@ contains
     ! files are written before the next load
     self%iterate = normal_iterate_t()
     call self%scratch%free()
+    call give_back(self%level(1)%own_size())
   end subroutine solve
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.

@@ -113,13 +113,13 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Number of the body, 1 or 2
     integer, intent(in) :: body
-    !> Its layers and what lies below them
+    !> Its layers and the body below them
     type(layered_body_t), intent(in) :: inside
     !> Allocated on failure: a lattice of no use, no such body or material, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Who shares the work; absent: as many threads as OpenMP would take
     type(field_space_t), intent(in), optional :: space
-    !> The displacement is wanted, not the stress
+    !> Compute the displacement, not the stress
     logical, intent(in), optional :: displaced
 
     type(field_space_t) :: shared

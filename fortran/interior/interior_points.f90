@@ -25,7 +25,7 @@ module hc_interior_points
 
   !> Nodes that carry traction in any step.
   type :: loaded_nodes_t
-    !> What one of them carries
+    !> Pyramid of one of them
     type(interior_pyramid_t) :: pyramid
     !> Positions (node, direction) [m]
     real(wp), allocatable :: position(:, :)
@@ -48,7 +48,7 @@ contains
     real(wp), intent(in), contiguous :: traction(:, :, :, :)
     !> Number of the body, 1 or 2
     integer, intent(in) :: body
-    !> Its layers and what lies below them
+    !> Its layers and the body below them
     type(layered_body_t), intent(in) :: inside
     !> Points, x, y and depth below the surface of the body (3, n) [m]
     real(wp), intent(in) :: points(:, :)

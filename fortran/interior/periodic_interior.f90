@@ -83,7 +83,7 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Number of the body
     integer, intent(in) :: body
-    !> Its layers and what lies below them
+    !> Its layers and the body below them
     type(layered_body_t), intent(in) :: inside
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
     real(wp), intent(in) :: traction(:, :, :, :)
@@ -357,7 +357,7 @@ contains
     end do
   end subroutine add_row
 
-  !> Add what pyramids near a point add to the waves, (I25).
+  !> Add the correction of the waves by pyramids near a point, (I25).
   subroutine add_near(self, at, points, total)
     type(periodic_interior_t), intent(in) :: self
     type(depth_t), intent(in) :: at
@@ -495,7 +495,7 @@ contains
   subroutine add_aliases(self, at, first, response)
     type(periodic_interior_t), intent(in) :: self
     type(depth_t), intent(in) :: at
-    !> Components before those wanted
+    !> Components before the computed ones
     integer, intent(in) :: first
     !> Field over traction (row, column, component, load)
     complex(wp), intent(inout) :: response(:, :, :, :)
@@ -533,7 +533,7 @@ contains
   subroutine transform_near(self, at, first, response, error)
     type(periodic_interior_t), intent(in) :: self
     type(depth_t), intent(in) :: at
-    !> Components before those wanted
+    !> Components before the computed ones
     integer, intent(in) :: first
     !> Field over traction (row, column, component, load)
     complex(wp), intent(out) :: response(:, :, :, :)

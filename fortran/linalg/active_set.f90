@@ -152,7 +152,7 @@ contains
   !> List the runs of active nodes.
   pure subroutine list_runs(active, shift, first, last)
     logical, intent(in), contiguous :: active(:)
-    !> What the nodes are shifted by
+    !> Shift of the nodes
     integer, intent(in) :: shift
     !> First and last node of each run
     integer, intent(inout), contiguous :: first(:), last(:)

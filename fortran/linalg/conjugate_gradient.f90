@@ -16,7 +16,7 @@ module hc_conjugate_gradient
     !> r^T z of the last direction; not positive: there is none, the next direction is z
     real(wp), private :: rz = 0.0_wp
   contains
-    !> Forget the last direction
+    !> Discard the last direction
     procedure :: restart
     !> Share of the last direction in the next
     procedure :: last_share
@@ -26,7 +26,7 @@ module hc_conjugate_gradient
 
 contains
 
-  !> Forget the last direction.
+  !> Discard the last direction.
   pure subroutine restart(self)
     class(conjugate_gradient_t), intent(inout) :: self
     self%rz = 0.0_wp

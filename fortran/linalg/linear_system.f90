@@ -32,7 +32,7 @@ module hc_linear_system
     !> The operator is symmetric and positive definite; else hc_step_equation chooses GMRES
     logical :: symmetric = .true.
   contains
-    !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
+    !> y = A x for an x that vanishes off the active nodes; y at all nodes
     procedure(linear_map), deferred :: product
     !> The same for the values at the active nodes alone, x
     procedure :: product_packed
@@ -191,7 +191,7 @@ contains
     class(constraints_t), intent(in) :: self
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    !> What C^T x lacks
+    !> Defect of C^T x
     real(wp), intent(in) :: missing(:)
     !> Unknowns, over all nodes if `nodes` are given
     real(wp), intent(inout), contiguous :: x(:)

@@ -146,7 +146,7 @@ contains
       do k = 1, most
         stat = 0
         if (.not. allocated(basis(k)%mr)) then
-          if (k == many) call give_back(size(x))
+          if (k >= many) call give_back(size(x))
           allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
         end if
         if (stat == 0) call system%take_image(size(x), own, image, stat)

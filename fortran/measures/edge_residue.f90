@@ -1,4 +1,4 @@
-!> What a traction has between the nodes beyond its hats, near the edges of a contact: how hats best stand for it, and the
+!> Difference of a traction from its hats between the nodes, near the edges of a contact: its best approximation by hats, and the
 !> displacement of the rest.
 !>
 !> It is sampled at the points of a lattice `samples` times as fine, in the cells of the lattice next to the edges. Hats
@@ -270,9 +270,9 @@ contains
     class(edge_residue_t), intent(in) :: self
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
-    !> Nodes whose displacement is wanted (n_col, n_row)
+    !> Nodes whose displacement is computed (n_col, n_row)
     logical, intent(in) :: wanted(:, :)
-    !> Components that are wanted; those of the values are 1 and the next ones
+    !> Components that are computed; those of the values are 1 and the next ones
     integer, intent(in) :: onto(:)
     !> Displacements (n_col, n_row, component) [m]
     real(wp) :: moved(size(wanted, 1), size(wanted, 2), size(onto))

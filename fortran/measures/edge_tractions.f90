@@ -32,7 +32,7 @@ module hc_edge_tractions
 
   public :: correct_at_edges, edge_tractions_memory
 
-  !> The elastic operator of some components, without a preconditioner: what changes is local.
+  !> The elastic operator of some components, without a preconditioner: changes are local.
   type, extends(linear_system_t) :: elastic_part_t
     type(fft_flexibility_t), pointer :: flexibility => null()
     integer, allocatable :: component(:)
@@ -148,7 +148,7 @@ contains
     type(traction_field_t), intent(in) :: shape_of
     !> Points along a spacing, and number of components
     integer, intent(in) :: samples, n
-    !> What it has between the nodes
+    !> Its part between the nodes
     type(edge_residue_t), intent(out) :: residue
     !> The same at the nodes (n_col, n_row, component) [Pa]
     real(wp), allocatable, intent(out) :: at_nodes(:, :, :)
@@ -180,7 +180,7 @@ contains
     type(elastic_part_t), intent(inout) :: system
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
-    !> What is between the nodes, less the hats
+    !> Traction between the nodes, less the hats
     type(edge_residue_t), intent(in) :: residue
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(:, :)

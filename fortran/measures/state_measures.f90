@@ -286,7 +286,7 @@ contains
     type(contact_state_t), intent(in) :: state
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    !> What is found; nothing about shear
+    !> Measures; those of shear are not set
     type(state_measures_t), intent(out) :: found
     !> Edges of the contact; on several ranks those near own rows
     type(contact_edges_t), intent(out) :: edges

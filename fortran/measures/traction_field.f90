@@ -35,8 +35,8 @@ module hc_traction_field
     real(wp), allocatable :: direction(:, :, :)
     !> Nodes that stick (n_col, n_row)
     logical, allocatable :: stick(:, :)
-    !> Their reserve as solved, its squares near the edge of the stick area, NaN elsewhere, and what corrections of the limit
-    !> and of the reserve leave of the shear traction (n_col, n_row) [Pa], [Pa^2], [Pa]
+    !> Their reserve as solved, its squares near the edge of the stick area, NaN elsewhere, and the shear traction
+    !> after the corrections of the limit and of the reserve (n_col, n_row) [Pa], [Pa^2], [Pa]
     real(wp), allocatable :: reserve(:, :), stick_squares(:, :), taken(:, :)
   contains
     !> Tractions at a point

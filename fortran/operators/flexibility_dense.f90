@@ -52,6 +52,10 @@ contains
 
     call check_operator(lattice, medium, error)
     if (allocated(error)) return
+    if (lattice%is_periodic()) then
+      call raise(error, status%invalid_input, 'the influence of nodes that repeat has no end: use method "fft"')
+      return
+    end if
     if (product(2*int(lattice%extent, long) - 1) > huge(1)) then
       call raise(error, status%resources, 'the window is too large for a matrix: use method "fft"')
       return

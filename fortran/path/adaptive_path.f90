@@ -53,7 +53,7 @@ module hc_adaptive_path
 
   !> Choice of the load steps.
   type :: adaptive_steps_t
-    !> What a load step may change, over the largest contact area
+    !> Largest change by a load step, over the largest contact area
     real(wp) :: tolerance = 0.02_wp
     !> The window grows: an attempt that reaches its rim is made again on a larger one
     logical :: grows = .false.
@@ -63,17 +63,17 @@ module hc_adaptive_path
     real(wp) :: area = 0.0_wp
     !> Size of the steps
     type(step_control_t) :: control
-    !> Present attempt, and what becomes of it: accepted, rejected (the next one follows), limited, failed or outgrown
+    !> Present attempt, and its verdict: accepted, rejected (the next one follows), limited, failed or outgrown
     type(step_attempt_t) :: attempt
     integer :: verdict = rejected
     !> Part of the segment where the last solution ends
     real(wp) :: reached = 0.0_wp
     !> Window that an outgrown attempt needs
     type(lattice_t) :: larger
-    !> What the halves of the last load step changed
+    !> Change by the halves of the last load step
     type(step_change_t) :: change
-    !> Bounds on the errors by the size of all load steps: of the stick area [m^2], of the shear tractions over what friction
-    !> can carry
+    !> Bounds on the errors by the size of all load steps: of the stick area [m^2], of the shear tractions over the
+    !> friction limit
     real(wp) :: stick_area_error = 0.0_wp, traction_error = 0.0_wp
     !> Work of all attempts at the load step
     integer :: sweeps = 0
@@ -163,7 +163,7 @@ contains
     self%control = control
   end subroutine forget
 
-  !> Make the present attempt at a load step, and decide what becomes of it.
+  !> Make the present attempt at a load step, and judge it.
   subroutine attempt_step(self, solver, targets, settings, before, after, error)
     class(adaptive_steps_t), intent(inout) :: self
     !> Method

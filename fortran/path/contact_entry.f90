@@ -9,8 +9,8 @@
 !> with D = s^{n+1} - s^n of the nodes that are still outside, carried inwards. Near the old edge
 !> s_e - s^n is a sum of a part that is linear in the distance d from it, as the edge slips, and one with
 !> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
-!> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
-!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory/load_path.md, (L1), (L2)).
+!> 2/3, m_2 the gap itself; M_1, M_2 are their decrease during the step outside. C follows from the change of D
+!> outwards. D belongs to the solution, so that both are iterated (see docs/theory/load_path.md, (L1), (L2)).
 module hc_contact_entry
   use hc_precision, only: wp
   use hc_lattice, only: opposite_pairs
@@ -25,7 +25,7 @@ module hc_contact_entry
 
   public :: solve_with_entry, entry_displacement
 
-  !> What is carried inwards from the nodes outside.
+  !> Values that are carried inwards from the nodes outside.
   type :: carried_t
     !> Motion D of the step, and the part of it that grows with d^(3/2)
     real(wp) :: moved(2) = 0.0_wp
@@ -141,7 +141,7 @@ contains
     call problem%complete_state(target, tolerance, reference, state)
   end subroutine find_residuals
 
-  !> Compute what Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where
+  !> Compute Anderson's extrapolation from a corrected entry state: (changes + corrections) y, where
   !> y makes |corrections y - correction| least. Combinations that depend on newer ones are left out.
   pure function extrapolated(changes, corrections, correction, dependent) result(less)
     !> Changes of the entry state and of its correction, the newest first
@@ -338,7 +338,7 @@ contains
 
   end function entry_displacement
 
-  !> Return what a gap measures of the distance from an edge that slips, and from one that sticks.
+  !> Return measures of the distance by the gap, from an edge that slips and from one that sticks.
   pure function measures(gap, lattice_gap)
     real(wp), intent(in) :: gap, lattice_gap
     real(wp) :: measures(2)

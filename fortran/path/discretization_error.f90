@@ -5,8 +5,8 @@
 !> a least-squares fit of q + c h^p, each value weighted by 1/h, since the scatter is in proportion to h (L. Eca
 !> and M. Hoekstra, Journal of Computational Physics 262 (2014) 104-130); factors and numbers are those of `accuracy_options_t`.
 !>
-!> A slip zone narrower than the lattice resolves has a maximum of the shear traction at its inner edge that no lattice has
-!> seen. The trend of what depends on it is slower there, (A3).
+!> A slip zone narrower than the lattice resolves has a maximum of the shear traction at its inner edge that no lattice
+!> resolves. Quantities that depend on it have a slower trend, (A3).
 !>
 !> Equations: docs/theory/error_bars.md, (A1) to (A3).
 module hc_discretization_error
@@ -30,7 +30,7 @@ contains
     real(wp), intent(in) :: spacings(:)
     !> Quantities on each of the lattices (lattice, quantity)
     real(wp), intent(in) :: values(:, :)
-    !> What hardly any error exceeds; NaN where a value is not finite
+    !> Bound that hardly any error exceeds; NaN where a value is not finite
     real(wp), intent(out) :: errors(:)
     !> Allocated if there are fewer than four lattices
     type(error_t), allocatable, intent(out) :: error

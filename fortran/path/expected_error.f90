@@ -1,8 +1,8 @@
 !> Expected error of a run with few load steps, or few spacings in the contact, before it is solved.
 !>
 !> The rules were fitted to spheres: pressed with materials that differ, pressed and sheared at once, sheared to and fro, each
-!> against a solution with many more steps or spacings. They are right to a factor of about 1.5, which decides whether a run is
-!> worth its time; error bars and adaptive load steps measure what a run has reached.
+!> against a solution with many more steps or spacings. They are right to a factor of about 1.5, which is enough to choose
+!> lattice and steps; error bars and adaptive load steps measure the errors of a run.
 !>
 !> Equations and measurements: docs/theory/expected_errors.md, (X1)-(X5).
 module hc_expected_error
@@ -13,7 +13,7 @@ module hc_expected_error
   public :: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, entry_steps, &
             oblique_error, oblique_steps, turning_error
 
-  !> Relative errors that a lattice leaves at most; the largest one says no more than that the quantity may be wrong altogether.
+  !> Relative errors that a lattice leaves at most; the largest one stands for no value.
   type :: lattice_errors_t
     !> Largest pressure, contact area to the edge between the nodes
     real(wp) :: max_pressure = 0.0_wp, contact_area = 0.0_wp
@@ -31,9 +31,9 @@ module hc_expected_error
   real(wp), parameter :: of_ring = 0.11_wp, ring_order = 3.5_wp, narrow = 0.8_wp
   !> Error that stands for no value at all
   real(wp), parameter :: no_value = 0.65_wp
-  !> -ln of the error of a contact pressed in one step without slip, what slip adds, its exponent, and what a step adds
+  !> -ln of the error of a contact pressed in one step without slip, its increase by slip, the exponent, and that by a step
   real(wp), parameter :: no_slip = 0.2_wp, slip_share = 1.2_wp, slip_order = 1.2_wp, per_step = 0.13_wp
-  !> Error of an oblique load in one step, exponent of what friction has left, and what a step divides it by
+  !> Error of an oblique load in one step, exponent of the reserve of friction, and divisor for a step
   real(wp), parameter :: oblique = 0.8_wp, oblique_order = 0.65_wp, per_oblique_step = 0.28_wp
 
 contains

@@ -69,7 +69,7 @@ contains
     !> How the step is solved
     type(step_settings_t), intent(in) :: settings
     !> The new state; not converged: the attempt that failed, or a part of the step that reached the rim of the window,
-    !> where nothing was gone on with (stopped is rim_reached, and the residuals of the loads are those of the whole step)
+    !> where the run cannot continue (stopped is rim_reached, and the residuals of the loads are those of the whole step)
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error

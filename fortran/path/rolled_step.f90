@@ -69,8 +69,8 @@ contains
     end do
   end subroutine begin_rolling
 
-  !> Add slip path and dissipated energy of the way over a spacing, which move on with the surfaces; in the steady state those of a
-  !> point are what it gathers on its way through the contact.
+  !> Add slip path and dissipated energy of the way over a spacing, which move on with the surfaces; in the steady state they
+  !> are summed along the way of a point through the contact.
   subroutine add_rolled_slip(problem, before, rolling, state)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step

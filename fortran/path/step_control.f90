@@ -1,6 +1,6 @@
 !> Size of the load steps of a segment: the change by one step is bounded.
 !>
-!> Each load step is solved as a whole and in two halves. What they change (hc_step_error) decides whether the step is
+!> Each load step is solved as a whole and in two halves. Their difference (hc_step_error) decides whether the step is
 !> accepted, and how large the next one is. Sizes are parts of a segment of the load history. With a `control`, the
 !> change `change` of an attempt and the tolerance `tolerance`, a step is
 !>
@@ -22,7 +22,7 @@ module hc_step_control
 
   public :: step_control_t, step_attempt_t, rejected, accepted, limited, failed, outgrown, pending
 
-  !> What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones are of no
+  !> Verdict on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones are of no
   !> use; it did not converge, and is the smallest there is; it reached the rim of a window that grows; it is not solved to its end.
   integer, parameter :: rejected = 0, accepted = 1, limited = 2, failed = 3, outgrown = 4, pending = 5
 
@@ -57,7 +57,7 @@ module hc_step_control
     procedure :: start_segment
     !> The first attempt at a load step
     procedure :: first_attempt
-    !> What becomes of an attempt; the next one, if it is rejected
+    !> Verdict on an attempt; the next one, if it is rejected
     procedure :: decide
     !> Take over an attempt, and choose the size of the next load step
     procedure :: accept
@@ -114,16 +114,16 @@ contains
     end associate
   end function end_of_step
 
-  !> Decide what becomes of an attempt.
+  !> Judge an attempt.
   elemental subroutine decide(self, attempt, converged, change, tolerance, verdict)
     class(step_control_t), intent(in) :: self
     !> The attempt; if it is rejected, the next one
     type(step_attempt_t), intent(inout) :: attempt
     !> It was solved, as a whole and in halves
     logical, intent(in) :: converged
-    !> What the halves change; of no use if it was not solved
+    !> Change by the halves; of no use if it was not solved
     type(step_change_t), intent(in) :: change
-    !> What a step may change, over the largest contact area
+    !> Largest change by a step, over the largest contact area
     real(wp), intent(in) :: tolerance
     !> rejected, accepted, limited or failed
     integer, intent(out) :: verdict
@@ -161,9 +161,9 @@ contains
     class(step_control_t), intent(inout) :: self
     !> The attempt
     type(step_attempt_t), intent(in) :: attempt
-    !> What its halves change
+    !> Change by its halves
     type(step_change_t), intent(in) :: change
-    !> What a step may change, over the largest contact area
+    !> Largest change by a step, over the largest contact area
     real(wp), intent(in) :: tolerance
     !> accepted or limited
     integer, intent(in) :: verdict
@@ -193,15 +193,15 @@ contains
   !> Bound on the error of the stick area after a load step, over the largest contact area.
   elemental real(wp) function bound(self, change)
     class(step_control_t), intent(in) :: self
-    !> What its halves changed
+    !> Change by its halves
     type(step_change_t), intent(in) :: change
     bound = self%options%stick_safety*self%past_stick + self%options%traction_safety*change%gain*self%past_traction + change%lattice
   end function bound
 
-  !> Bound on the error of the shear tractions after a load step, over what friction can carry; (S4).
+  !> Bound on the error of the shear tractions after a load step, over the friction limit; (S4).
   elemental real(wp) function traction_bound(self, tolerance)
     class(step_control_t), intent(in) :: self
-    !> What a step may change
+    !> Largest change by a step
     real(wp), intent(in) :: tolerance
     traction_bound = 0.0_wp  ! without a history
     if (self%past_traction > 0.0_wp) traction_bound = tolerance + self%options%own_safety*self%past_traction
@@ -212,9 +212,9 @@ contains
   !> Smaller steps cannot help against the rings of the lattice, nor against tractions that differ from before.
   pure function excess(self, change, tolerance)
     class(step_control_t), intent(in) :: self
-    !> What its halves change
+    !> Change by its halves
     type(step_change_t), intent(in) :: change
-    !> What a step may change, over the largest contact area
+    !> Largest change by a step, over the largest contact area
     real(wp), intent(in) :: tolerance
     real(wp) :: excess(3)
 
@@ -225,13 +225,13 @@ contains
                                                 (self%turned + change%turned)/(self%spent + change%spent))/tolerance
   end function excess
 
-  !> Estimate by what factor a larger step would have changed the stick area and the direction of tractions, with the size, and
+  !> Estimate the factor by which a larger step would have changed the stick area and the direction of tractions, with the size, and
   !> the tractions, with its square.
   pure real(wp) function growth(self, change, tolerance)
     class(step_control_t), intent(in) :: self
-    !> What its halves change
+    !> Change by its halves
     type(step_change_t), intent(in) :: change
-    !> What a step may change, over the largest contact area
+    !> Largest change by a step, over the largest contact area
     real(wp), intent(in) :: tolerance
 
     associate (over => max(self%excess(change, tolerance), self%options%least_excess))

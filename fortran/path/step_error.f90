@@ -1,7 +1,7 @@
-!> Dependence of a solution on the size of the load steps, measured on two that differ in it.
+!> Dependence of a solution on the size of the load steps, measured on two paths.
 !>
-!> One path goes through a load history in load steps, another beside it in steps of half the size; they never meet. Both
-!> are wrong by something of the first order in the size, so that what the halves change is what is still wrong with them.
+!> One path goes through a load history in load steps, another one in steps of half the size, from its own states. Errors of both
+!> are of first order in the size, so that the change by the halves is their remaining error.
 !>
 !> Equations: docs/theory/step_control.md, (S1).
 module hc_step_error
@@ -20,11 +20,11 @@ module hc_step_error
 
   public :: step_change_t, compare_halves, edges_of, shear_free, turned_part
 
-  !> What the halves of a load step change.
+  !> Change by the halves of a load step.
   type :: step_change_t
     !> Change of the stick area, over the largest contact area
     real(wp) :: stick = 0.0_wp
-    !> Change of the shear tractions, over what friction can carry
+    !> Change of the shear tractions, over the friction limit
     real(wp) :: traction = 0.0_wp
     !> The part of it that this load step added
     real(wp) :: added = 0.0_wp
@@ -48,7 +48,7 @@ contains
     type(contact_state_t), intent(in) :: whole_before, halves_before
     !> Largest contact area of the history [m^2]
     real(wp), intent(in) :: area
-    !> What the halves change
+    !> Change by the halves
     type(step_change_t), intent(out) :: change
     type(contact_edges_t) :: edges
     type(zone_edge_t) :: contact, sticking

@@ -1,8 +1,8 @@
 !> Wear of the surfaces by fretting cycles, of which one stands for many.
 !>
-!> A cycle of the loads is solved with the gap as it is worn, and wears the surfaces as often as the jump says, (V3), with
-!> its pressure as it will be then (hc_wear_ahead). Two jumps of n cycles are compared with one of 2 n, (V6); what they change
-!> decides, through hc_step_control, how large the next jump is, and corrects the second one, (V5), which makes the two of the
+!> A cycle of the loads is solved on the worn gap. Its wear is multiplied by the number of cycles in the jump, (V3), with
+!> the pressure at the end of the jump (hc_wear_ahead). Two jumps of n cycles are compared with one of 2 n, (V6); the difference
+!> gives the size of the next jump (hc_step_control) and corrects the second one, (V5), which makes the two of
 !> second order:
 !>
 !>     call energy_ahead(cycle, ..., cycles, ..., energy)
@@ -104,8 +104,8 @@ contains
     end associate
   end function wear_left
 
-  !> Compute what two jumps change in comparison with one of both, (V6): the depth, and its root mean square over what the
-  !> largest pressure indents one node, as tractions that the step adds.
+  !> Compare two jumps with one of both, (V6): difference of the depth, and its root mean square over the indentation of one node
+  !> by the largest pressure, in place of the tractions that a step adds.
   subroutine jump_change(lattice, medium, law, jumps, p_max, slower, change)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
@@ -117,9 +117,9 @@ contains
     type(two_jumps_t), intent(in) :: jumps
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
-    !> By how much the two wear more (n_col, n_row) [m]
+    !> Depth by the two jumps less that by one (n_col, n_row) [m]
     real(wp), intent(out) :: slower(:, :)
-    !> What it changes, for hc_step_control
+    !> The change for hc_step_control
     type(step_change_t), intent(out) :: change
     type(step_options_t) :: options
 
@@ -134,7 +134,7 @@ contains
 
   !> Correct the energy by which the second of two equal jumps wears, (V5).
   !>
-  !> Never more than what the pressure that is left indents a node, and never less than nothing.
+  !> The correction is at most the indentation of a node by the remaining pressure; the energy is not negative.
   subroutine energy_of_second_jump(lattice, medium, law, jumps, path, corrected)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -167,8 +167,8 @@ contains
   end subroutine energy_of_second_jump
 
   !> Expect the end of a load step of the next cycle, to start it from: the end in the cycle before, extrapolated linearly in the
-  !> cycles. Given the load step before it, whose end is known by now, the pressure is the one there and what should
-  !> change between the two, since an error of the extrapolation is about the same for both. The shear traction, which
+  !> cycles. Given the solved load step before it, the pressure is the one there plus the expected change between the two, so that
+  !> an error common to both extrapolations cancels. The shear traction, which
   !> turns round in a cycle, is the extrapolated one.
   pure subroutine expect_end(last, ahead, expected, traction, pressure, expected_before)
     !> Pressure and tractions along x and y at the end of the load step (n, 3) [Pa], and their rates by cycle (n, 3)

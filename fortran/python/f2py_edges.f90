@@ -139,7 +139,7 @@ contains
                           space, error, kernel_cache)
   end subroutine correct_tractions
 
-  !> Correct the stress at points near the edges of contact and stick for what hats miss of the tractions there.
+  !> Correct the stress at points near the edges of contact and stick by the difference of the tractions there from hats.
   subroutine correct_stress(lattice, fields, zones, friction, traction, corrected, body, poisson_ratio, points, correction, &
                             refused)
     type(lattice_t), intent(in) :: lattice

@@ -46,7 +46,7 @@ contains
 
   !> Return a body of its layers.
   pure type(layered_body_t) function stack_of(layers) result(body)
-    !> Thickness [m], shear modulus [Pa] and Poisson's ratio, outermost first; last what lies below, rigid if its modulus is 0
+    !> Thickness [m], shear modulus [Pa] and Poisson's ratio, outermost first; last the body below, rigid if its modulus is 0
     real(wp), intent(in) :: layers(:, :)
     integer :: i
 
@@ -66,7 +66,7 @@ contains
     real(wp), intent(in) :: traction(:, :, :, :)
     !> Number of the body
     integer, intent(in) :: body
-    !> Its layers and what lies below them
+    !> Its layers and the body below them
     type(layered_body_t), intent(in) :: inside
     !> Depths below the surface of the body [m]
     real(wp), intent(in) :: depth(:)

@@ -1,4 +1,4 @@
-"""Names of arrays, data sets and tables; arrays of real numbers from what users pass."""
+"""Names of arrays, data sets and tables; arrays of real numbers from arguments of users."""
 
 from __future__ import annotations
 

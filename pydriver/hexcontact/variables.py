@@ -55,7 +55,7 @@ class Variable(NamedTuple):
     # whether it depends on the width of the slip zone, so that its error decreases slowly while that is
     # narrower than the lattice resolves
     slip_zone: bool = False
-    # what holds it in the core, by its name: ``"fields"`` and ``"zone"`` of a state, ``"numbers"`` from which
+    # part of a state in the core that holds it: ``"fields"`` and ``"zone"``, ``"numbers"`` from which
     # the next step starts, ``"residuals"``, ``"measures"``. ``"wear"``: a field of cycles that wear
     core: str = ""
 
@@ -428,7 +428,7 @@ RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.co
 """Residuals by the symbol of the theory."""
 
 CORE = grouped(lambda name, v: v.core)
-"""Names of what each part of a state in the core holds."""
+"""Names of the quantities of each part of a state in the core."""
 
 VECTORS = grouped(lambda name, v: name[:-2] if v.is_field and name[-2:] in ("_x", "_y", "_z") else "")
 """Components of each vector field, by their name without the axis."""

@@ -10,52 +10,39 @@ from square_window import best_of, main, rough_window, shear_errors, square_wind
 
 
 def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[str, Any]:
-    """Nested grids with exact convolutions ("nested-fft"), set-up and solution in one call.
-
-    The preconditioner on the whole grid is asked for: the one taken by default below 40 % of contact
-    needs up to twenty times as many iterations on fine grids.
-    """
+    """Nested grids with exact convolutions, set-up and solution in one call."""
     contact = square_window(side, fraction)
-    gap = contact.gap.ravel()
-
-    def solve() -> Any:
-        return aspher.solve_nested(
-            grid_size=side,
-            gap=gap,
-            p_nominal=contact.load,
-            E_star=1.0,
-            coarsest=min(64, side // 2),
-            backend="fft",
-            precond_engine="fft",
-            tol=tolerance,
-        )
-
-    seconds, result = best_of(repeats, solve)
-    if str(result.status) != "converged":
-        raise RuntimeError(f"status {result.status} after {result.iterations} iterations")
-    setup = seconds * result.timings["build"] / result.timings["total"]
-    return {
-        "setup": setup,
-        "solve": seconds - setup,
-        "iterations": int(result.iterations),
-        "products": int(result.matvec_count),
-        **contact.errors(np.asarray(result.pressure), np.asarray(result.gap), result.approach),
-    }
+    found, result = _nested(contact.gap, contact.load, "fft", tolerance, repeats)
+    errors = contact.errors(np.asarray(result.pressure), np.asarray(result.gap), result.approach)
+    return {**found, **errors}
 
 
 def rough(side: int, tolerance: float, repeats: int) -> dict[str, Any]:
     """Nested grids on the periodic operator, set-up and solution in one call."""
     contact = rough_window(side)
-    gap = contact.gap.ravel()
+    found, result = _nested(contact.gap, contact.mean_pressure, "periodic", tolerance, repeats)
+    pressure, gap = (np.asarray(field).reshape(side, side) for field in (result.pressure, result.gap))
+    return {**found, **contact.errors(pressure, gap)}
+
+
+def _nested(
+    gap: Any, pressure: float, backend: str, tolerance: float, repeats: int
+) -> tuple[dict[str, Any], Any]:
+    """Return times and counts of a frictionless contact on nested grids, and the result.
+
+    The preconditioner on the whole grid is asked for: the one taken by default below 40 % of contact
+    needs up to twenty times as many iterations on fine grids.
+    """
+    side = len(gap)
 
     def solve() -> Any:
         return aspher.solve_nested(
             grid_size=side,
-            gap=gap,
-            p_nominal=contact.mean_pressure,
+            gap=gap.ravel(),
+            p_nominal=pressure,
             E_star=1.0,
             coarsest=min(64, side // 2),
-            backend="periodic",
+            backend=backend,
             precond_engine="fft",
             tol=tolerance,
         )
@@ -64,15 +51,13 @@ def rough(side: int, tolerance: float, repeats: int) -> dict[str, Any]:
     if str(result.status) != "converged":
         raise RuntimeError(f"status {result.status} after {result.iterations} iterations")
     setup = seconds * result.timings["build"] / result.timings["total"]
-    return {
+    found = {
         "setup": setup,
         "solve": seconds - setup,
         "iterations": int(result.iterations),
         "products": int(result.matvec_count),
-        **contact.errors(
-            np.asarray(result.pressure).reshape(side, side), np.asarray(result.gap).reshape(side, side)
-        ),
     }
+    return found, result
 
 
 def cattaneo_mindlin(

@@ -112,6 +112,10 @@ contains
     call new_dense_flexibility(dense, lattice_t(extent=[3, 3]), pair, caught)
     call check_raised(error, caught, status%invalid_input, 'a matrix without a basis')
     if (allocated(error)) return
+    lattice = lattice_t(equilateral_basis(1.0_wp), extent=[4, 3], periodic=[.true., .true.])
+    call new_dense_flexibility(dense, lattice, pair, caught)
+    call check_raised(error, caught, status%invalid_input, 'a matrix of a window that repeats')
+    if (allocated(error)) return
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [40000, 12000], caught)
     call check_true(error, .not. allocated(caught), 'as many nodes as integers')
     if (allocated(error)) return

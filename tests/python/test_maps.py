@@ -17,6 +17,7 @@ from hexcontact import Case, DeckError, open_result
 from hexcontact.deck import map_file
 from hexcontact.deck.map_file import read_map
 from hexcontact.plotting import surface
+from hexcontact.problem import plausibility
 from hexcontact.problem.preview import case_rows
 from hexcontact.surfaces import Map, Profile
 
@@ -156,6 +157,13 @@ def test_a_ball_from_a_file_has_the_pressure_of_hertz_and_its_own_orientation(fi
             'expected one column "z", "h", "height" or "heights" among its headers "x"',
         ),
         ("a.csv", "1,2,3,4\n", MATRIX, "expected at least two points along each axis"),
+        (
+            "a.csv",  # with x above and y beside the heights
+            rows_of(np.vstack([np.column_stack([Y, BALL]), [np.nan, *X]])),
+            MATRIX,
+            "the first row and the first column rise evenly, as coordinates and numbers of columns do",
+        ),
+        ("a.csv", rows_of(np.vstack([BALL, np.arange(81.0)])), MATRIX, "the first row rises evenly"),
         ("a.csv", "# nothing\n", MATRIX, "is empty; expected heights as text"),
         (
             "a.csv",
@@ -221,6 +229,10 @@ def test_a_large_map_is_refused_before_it_is_read(file: Any, monkeypatch: pytest
     [
         ({}, 'units: missing; expected the unit, such as "um": PATH does not say it'),
         ({"units": "um"}, 'height_units: missing; expected the unit, such as "um": PATH does not say it'),
+        (
+            {"units": "px"},
+            'units = "px": expected a unit of length such as "um"; "px" is a size of print and screens',
+        ),
         ({"units": "kg"}, 'units = "kg": expected a unit of length such as "um"; "kg" is a mass'),
         (
             {"units": "um", "height_units": "um"},
@@ -488,6 +500,9 @@ def test_a_map_that_does_not_repeat_is_refused_levelled_or_tapered(file: Any) ->
         "the window repeats every 0.64 mm in x; expected 0.715 mm, as the 65 points of the map, or 0.704 mm"
         in (complaint(wide, load=load, **CELL))
     )
+    grooves = waves(WAVE + 1)[:1] + 0.1 * np.arange(WAVE + 1) / WAVE + np.zeros((WAVE + 1, 1))
+    surface = of_file(file("grooves.csv", rows_of(grooves)), **keys)  # alike along y, but for rounding
+    assert largest({**surface, "level": "plane"}, load=load, **CELL) > 0.0
     rhombus = {**CELL, "cell_angle": "60 deg"}
     assert "repeats along x and y only" in complaint(surface, load=load, **rhombus)
 
@@ -606,6 +621,29 @@ def test_check_prints_how_the_map_is_read(deck: Path) -> None:
     done = inside(deck.parent, "check", deck.name, "--set", "body.1.surface.units=kg")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
+
+
+def test_points_are_counted_beside_the_nodes_of_both_axes(file: Any) -> None:
+    """Points 10 um apart; cells 5 um along x and 60 um along y, or turned by 90 degrees."""
+    keys = of_file(file("ball.csv", rows_of(BALL)), **MATRIX)
+    grid = {"lattice": "rectangular", "extent": ["0.6 mm", "0.4 mm"], "center": [0.0, 0.0]}
+    for spacing, turned, ratios in (
+        (["5 um", "60 um"], "0 deg", "2 by 0.167"),
+        (["60 um", "5 um"], "90 deg", "2 by 0.167"),
+        (["5 um", "60 um"], "90 deg", "0.167 by 2"),
+    ):
+        case = Case(
+            body_1={**STEEL, "surface": keys},
+            body_2=STEEL,
+            normal_load=20.0,
+            spacing=spacing,
+            direction=turned,
+            **grid,
+        )
+        assert any(f"points 10.0 µm apart, {ratios} spacings of" in words for _, words in case_rows(case))
+        assert any(
+            "the nodes are 6 points of the height map apart" in each for each in plausibility.warnings(case)
+        )
 
 
 def test_a_friction_map_and_a_height_map_are_read_by_one_reader(file: Any) -> None:

@@ -37,7 +37,7 @@ def test_page_prints_and_draws_what_it_shows(
     commands = [block for language, block in played.BLOCK.findall(page) if language == "console"]
     assert sum(block.count("\n$ ") + block.startswith("$ ") for block in commands) >= len(commands) > 0
     pictures = played.PICTURE.findall(page)
-    assert len(pictures) == {"tutorial": 6, "surfaces": 2, "maps": 1, "fatigue": 1}.get(name, 0)
+    assert len(pictures) == {"tutorial": 6, "maps": 1, "fatigue": 1}.get(name, 0)
     for target, picture in pictures:
         played.keep_picture(tmp_path / picture, tmp_path / f"kept_{picture}")
         found = drawn.pixels(tmp_path / f"kept_{picture}")

@@ -9,6 +9,7 @@ import xarray
 
 from hexcontact import Case, DeckError, Lattice, open_result, plotting
 from hexcontact.plotting.report_data import charts_of
+from hexcontact.problem.preview import case_rows
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 E_STAR = 210e9 / (2 * (1 - 0.3**2))
@@ -34,6 +35,20 @@ def test_waves_between_their_limits(share: float, mean_gap: float) -> None:
     assert float(pressed["operator_applications"]) < 7
     by_gap = waves(loads={"mean_gap": float(pressed["mean_gap"])}).run().dataset.isel(step=-1)
     assert float(by_gap["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-6)
+
+
+@pytest.mark.parametrize("rows", [1, 4, 8])
+def test_few_rows_are_as_good_as_many(rows: int) -> None:
+    """Westergaard's wave: the largest pressure at half of the load of complete contact."""
+    full = math.pi * E_STAR * HEIGHT / WAVE
+    pressed = waves(
+        expression=f"{HEIGHT}*(1 - cos(2*pi*x/{WAVE}))",
+        nodes=None,
+        extent=[WAVE, WAVE / 32 * rows],
+        spacing=WAVE / 32,
+        loads={"mean_pressure": 0.5 * full},
+    ).run()
+    assert float(pressed.max_pressure[-1]) == pytest.approx(math.sqrt(2) * full, rel=3e-3)
 
 
 def test_an_asperity_far_from_the_next_is_alone() -> None:
@@ -238,6 +253,32 @@ def test_wear_of_an_asperity_far_from_the_next() -> None:
         )
 
 
+def test_means_in_a_cycle_that_wears() -> None:
+    """The same as the loads that they are."""
+    area, pressure, shear = WAVE**2, 50e6, 10e6
+    found = []
+    for normal, along, share in (
+        ("mean_pressure", "mean_traction_x", 1.0),
+        ("normal_load", "tangential_load_x", area),
+    ):
+        path = [{along: -shear * share, "steps": 2}, {along: shear * share, "steps": 2}]
+        case = waves(
+            nodes=32,
+            friction_coefficient=0.3,
+            loads=[{normal: pressure * share}, {along: shear * share}, {"label": "back", "path": path}],
+            wear={"coefficient_1": 1e-13, "cycle": "back", "cycles": 2, "jump": 1},
+        )
+        found.append(case.run().dataset.isel(step=-1)["worn_depth"].values)
+    assert found[0].max() > 1e-12
+    assert found[0] == pytest.approx(found[1], rel=1e-9, abs=1e-15)
+
+
+def test_check_prints_the_period() -> None:
+    printed = dict(case_rows(waves(loads={"mean_pressure": 1e6})))
+    assert printed["window"] == "64 x 64 nodes (4,096), 1.000 mm x 1.000 mm, repeats"
+    assert printed["largest load"] == "1.000 N (mean pressure 1.000 MPa)"
+
+
 def test_steps_one_by_one() -> None:
     case = waves(friction_coefficient=0.3, loads=[{"mean_pressure": 0.1 * FULL}, {"mean_traction_x": 1e6}])
     with case.start() as session:
@@ -327,10 +368,34 @@ BAD = {
         {"body_1": {**STEEL, "surface": {"shape": "punch", "radius": 1e-4}}},
         "nodes that cannot touch",
     ),
-    "torque": ({"loads": [{"mean_pressure": 1e6}, {"torque": 1.0}]}, "a rotation does not repeat"),
+    "torque": (
+        {"loads": [{"mean_pressure": 1e6}, {"torque": 1.0}]},
+        r"load\.2\.torque = 1\.0: expected no torque .*: a rotation does not repeat",
+    ),
+    "tilt": (
+        {
+            "body_1": {
+                **STEEL,
+                "surface": {
+                    "shape": "rounded_punch",
+                    "flat_radius": 1e-4,
+                    "edge_radius": 1e-3,
+                    "tilt": ["0 deg", "1e-6 deg"],
+                },
+            }
+        },
+        r'body\.1\.surface\.tilt = \["0 deg", "1e-06 deg"\]: expected none in a window that repeats',
+    ),
+    "waviness": (
+        {"body_1": {**STEEL, "surface": {"shape": "waviness", "amplitude": 1e-6, "wavelength": 7e-4}}},
+        r"grid\.boundary .*: the waviness does not repeat .*: its side in x has 1\.42857 waves",
+    ),
     "both": ({"loads": {"mean_pressure": 1e6, "mean_gap": 1e-7}}, "mean_pressure or mean_gap, not both"),
     "mean_gap": ({"loads": {"mean_gap": 0.0}}, "mean_gap = 0.0: expected a length above 0"),
-    "sliding": ({"loads": {"mean_pressure": 1e6, "mean_traction_x": 4e5}}, "gross sliding"),
+    "sliding": (
+        {"loads": {"mean_pressure": 1e6, "mean_traction_x": 4e5}},
+        r"gross sliding: the mean traction of 400\.0 kPa .* x mean_pressure = 300\.0 kPa",
+    ),
     "direct": ({"method": "direct"}, 'solver.method = "direct": expected "fft"'),
     "accuracy": ({"accuracy": 0.02}, "accuracy: is not available yet beside a window that repeats"),
 }

@@ -7,6 +7,7 @@ import pytest
 from validation import repeating
 
 from hexcontact import Case, DeckError
+from hexcontact.problem import plausibility
 from hexcontact.surfaces import Rough
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -79,6 +80,24 @@ def test_a_rough_ball_has_several_spots() -> None:
     last = case.run().dataset.isel(step=-1)
     smooth = np.pi * (0.75 * 20.0 * 10e-3 / E_STAR) ** (2 / 3)
     assert 0.2 * smooth < float(last["contact_area"]) < 0.9 * smooth
+
+
+def test_equal_surfaces_of_both_bodies_are_told() -> None:
+    """Their peaks would meet, as those of independent surfaces do not."""
+    for seeds, words in (
+        ((2, 2), ["note: two rough surfaces have seed = 2: their waves coincide"]),
+        ((2, 3), []),
+    ):
+        one, two = (
+            {**STEEL, "surface": {"shape": "rough", **WAVES, "rms_slope": 0.05, "seed": n}} for n in seeds
+        )
+        case = Case(
+            body_1=one, body_2=two, boundary="periodic", extent=[SIDE, SIDE], nodes_across=32,
+            loads={"mean_pressure": 1e6},
+        )  # fmt: skip
+        assert [note.split(", ")[0] for note in plausibility.notes(case).values()] == [
+            word.removeprefix("note: ") for word in words
+        ]
 
 
 def sheared(nodes: int):

@@ -1,6 +1,6 @@
 """The command ``hexcontact`` and the list of the modules that hold its sub-commands.
 
-Every sub-command imports what it needs when it runs, and a process imports only the module of the sub-command
+Every sub-command imports its modules when it runs, and a process imports only the module of the sub-command
 that it is called with.
 """
 

@@ -278,7 +278,7 @@ def file_rows(result: Result) -> list[Row]:
         ("load steps", f"{len(result)} ({state})"),
         *([("stopped", str(attributes["stopped"]))] if "stopped" in attributes else []),
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
-        ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
+        ("spacing", result.lattice.cells),
         ("algorithm", algorithm(attributes)),
         *([("accuracy", _reached(attributes))] if "accuracy_reached" in attributes else []),
         ("fields", ", ".join(fields_of(result))),

@@ -181,7 +181,7 @@ def _below(result: Result) -> printed.Table:
 
 
 def _pictures(result: Result) -> Iterator[tuple[str, str]]:
-    """Yield title and data (PNG, base64) of a picture of each kind of what `_below` lists."""
+    """Yield title and data (PNG, base64) of a picture of each kind of table of `_below`."""
     from ..plotting.below import fatigue, stress
 
     kinds = {type(table) for table in tables_of(result.deck).values()}

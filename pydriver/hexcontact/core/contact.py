@@ -248,25 +248,18 @@ S = TypeVar("S", bound=NormalSolution)
 class Contact(Handle):
     """A contact problem of the core: its lattice, initial gap, and nodes that can touch."""
 
-    def __init__(
-        self,
-        lattice: Lattice,
-        pair: ElasticPair,
-        initial_gap: ArrayLike,
-        candidate: ArrayLike | None,
-        rim_warning: bool,
-    ) -> None:
+    def __init__(self, lattice: Lattice, pair: ElasticPair, rim_warning: bool) -> None:
         self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
-        self._mask: Mask = np.ones(lattice.shape, dtype=bool)
-        if candidate is not None:
-            self._mask = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
-        self._gap = shaped(initial_gap, lattice, "initial_gap")
 
-    @property
-    def _surfaces(self) -> tuple[Any, ...]:
-        """Lattice, materials, gap and nodes that can touch, for the core; the gap of others is 0."""
-        gap = _finite(np.where(self._mask, self._gap, 0.0), "initial_gap")
-        return self.lattice, self._pair, gap, self._mask
+    def _surfaces(self, initial_gap: ArrayLike, candidate: ArrayLike | None) -> tuple[Any, ...]:
+        """Return lattice, materials, gap and nodes that can touch, for the core; the gap of others is 0."""
+        self._mask: Mask = np.ones(self.lattice.shape, dtype=bool)
+        if candidate is not None:
+            self._mask = reals(candidate, "candidate", self.lattice.shape, _SHAPE) != 0
+        gap = shaped(initial_gap, self.lattice, "initial_gap")
+        self._beyond = gap[~self._mask]  # of nodes that cannot touch
+        touching = gap if self._mask.all() else np.where(self._mask, gap, 0.0)
+        return self.lattice, self._pair, _finite(touching, "initial_gap"), self._mask
 
     def called(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
         """Return the results of a procedure of the core that uses spectra of kernels."""
@@ -331,8 +324,8 @@ class NormalContact(Contact):
         rim_warning: bool = True,
         interface: Interface = UNILATERAL,
     ) -> None:
-        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        given = *self._surfaces, *checked(interface=interface, threads=threads)
+        super().__init__(lattice, pair, rim_warning)
+        given = *self._surfaces(initial_gap, candidate), *checked(interface=interface, threads=threads)
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -354,9 +347,14 @@ class NormalContact(Contact):
         target, *limits = checked(**driven, tolerance=tolerance, max_sweeps=max_sweeps)
         control = 2 if normal_load is None else 1
         solution = self._found(NormalSolution, self.called(flat.press, control, target, *limits))
-        solution.gap[~self._mask] += self._gap[~self._mask]
+        solution.gap[~self._mask] += self._beyond
         self._warn_of_rim(solution)
         return solution
+
+    @property
+    def initial_gap(self) -> Array:
+        """Copy of the gap before loading, 0 where the bodies cannot touch."""
+        return np.asarray(flat.gap_of_pressed(self))
 
 
 def rough_pressure(

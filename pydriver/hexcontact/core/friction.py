@@ -202,10 +202,10 @@ class FrictionalContact(Contact):
         interface: Interface = UNILATERAL,
         rim_warning: bool = True,
     ) -> None:
-        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
+        super().__init__(lattice, pair, rim_warning)
         law = _checked_law(friction_coefficient, shear_limit, lattice)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
-        given = *self._surfaces, law, springs, coupling == "goodman", count
+        given = *self._surfaces(initial_gap, candidate), law, springs, coupling == "goodman", count
         wake = np.empty(0, np.int32)
         if ranks.count > 1 and method == "fft":
             number = ranks.numbered(self)
@@ -214,9 +214,14 @@ class FrictionalContact(Contact):
             ranks.others(_create_part, number, dataclasses.replace(lattice), *given[1:2], *given[4:])
         self._create(flat.create_sheared, method_code(method, iteration), *given, wake)
 
+    @property
+    def initial_gap(self) -> Array:
+        """Copy of the gap before loading and without wear, 0 where the bodies cannot touch."""
+        return np.asarray(flat.gap_of_sheared(self))
+
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
-        gap, zero = np.where(self._mask, self._gap, 0.0), np.broadcast_to(0.0, self.lattice.shape)
+        gap, zero = self.initial_gap, np.broadcast_to(0.0, self.lattice.shape)
         held = HeldState.copied(dict.fromkeys(_FIELDS, zero) | {"gap": gap, "zone": zero}, {})
         fields: dict[str, Any] = {name: held.view(name) for name in _FIELDS}
         zone = np.zeros(self.lattice.shape, np.int8)

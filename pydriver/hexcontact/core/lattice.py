@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
 from ..errors import DeckError
+from ..text import quantity
 from . import flat
 from .calls import checked
 
@@ -127,6 +128,20 @@ class Lattice:
     def pattern(self) -> Pattern:
         """The lattice but for spacing and window."""
         return Pattern(self.origin, self.cell_ratio, self.cell_angle, self.direction)
+
+    def apart(self, angle: float) -> float:
+        """Return the distance (m) of nodes along a direction (rad from x), as between the sides of a cell."""
+        turned = angle - self.direction
+        return self.spacing * math.hypot(math.cos(turned), self.cell_ratio * math.sin(turned))
+
+    @property
+    def cells(self) -> str:
+        """The spacing in words, with the cells of a lattice that is not equilateral."""
+        spacing, across = (quantity(self.spacing * ratio, "m") for ratio in (1.0, self.cell_ratio))
+        if self.pattern[1:] == Pattern()[1:]:
+            return spacing
+        turned = f", first axis at {math.degrees(self.direction):.4g} deg" if self.direction else ""
+        return f"{spacing} by {across}, at {math.degrees(self.cell_angle):.4g} deg{turned}"
 
     @cached_property
     def basis(self) -> Array:

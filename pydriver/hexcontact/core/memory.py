@@ -17,6 +17,7 @@ GB = 1e9
 # Bytes of address space: of the netCDF library, and of its buffers for fifty variables; of the second thread
 # of a run, for its stack and 64 MiB of malloc.
 _LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
+_ARENA_MAX = -8  # the option of mallopt
 _NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
 
 
@@ -67,6 +68,12 @@ def give_back() -> None:
     """Return the free memory of the C library to the system."""
     with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def share_heap() -> None:
+    """Let all threads take memory from one heap: that of a second one is not returned to the system."""
+    with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
+        ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
 
 
 def claim(needed: int) -> None:

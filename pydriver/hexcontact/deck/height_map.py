@@ -165,7 +165,7 @@ class HeightMap:
     def touch_fault(self, turned: str = _TURNED) -> str:
         """Return the sentence about a lowest point at the end of the map; empty if it lies inside.
 
-        `turned` says what is expected of heights that point the other way.
+        `turned` is the part of the sentence about heights that point the other way.
         """
         low, high = (_is_at_end(values) for values in (self.gap, -np.where(self._there, self.gap, -np.inf)))
         if not low:

@@ -63,7 +63,7 @@ PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
 
 
 class Coating(Table):
-    """A layer on a body, bonded to what lies below it."""
+    """A layer on a body, bonded to the layer or body below."""
 
     thickness: Annotated[float, Quantity(LENGTH, above=0)] = meaning(..., "thickness t", '"3 um"')
     young_modulus: YoungModulus = meaning(..., "Young's modulus E")

@@ -30,6 +30,7 @@ _HEIGHTS = ("z", "h", "height", "heights")  # headers of a column of heights, in
 _EXPECTED = "heights as text: a matrix, or columns x, y and z with headers"
 _MOST_SENTENCES = 5
 _SAME = 1e-7  # distance of equal coordinates of columns, as a share of their range
+_EVEN = 0.01  # steps of coordinates may differ by this share, since they are rounded
 _MOST_EMPTY = 4  # points of the rectangular grid of columns for each line of the file
 
 
@@ -72,6 +73,11 @@ def _read(path: Path, variable: str | None, profile: bool, version: tuple[int, i
         raise DeckError(f"{path}: expected {kind}, not values of {found.values.ndim} dimensions")
     if min(found.values.shape) < 2:
         raise DeckError(f"{path}: expected at least two points along each axis")
+    if found.x is None and not profile and (edge := _edge_of_coordinates(found.values)):
+        raise DeckError(
+            f"{path}: {edge} evenly, as coordinates and numbers of columns do, and no other ones; expected a "
+            "matrix without them, or columns x, y and z with headers"
+        )
     if np.isinf(found.values).any():
         raise DeckError(f"{path}: expected finite heights, and NaN or nothing in holes; one is infinite")
     for name, points in (("x", found.x), ("y", found.y)):
@@ -141,6 +147,25 @@ def _of_text(path: Path, variable: str | None, profile: bool) -> MapFile:
         raise DeckError(f"{path}: expected x and y in one unit, not {shown(units)} and {shown(others)}")
     gridded = _gridded(path, values[:, x], values[:, y], values[:, z], numbers)
     return MapFile(*gridded, units, value_units)
+
+
+def _edge_of_coordinates(rows: Array) -> str:
+    """Return which edge of a matrix looks like coordinates: it rises evenly, its neighbors do not."""
+
+    def alone(matrix: Array) -> bool:
+        steps = np.diff(matrix[:2, 1:], axis=1)
+        if steps.shape[1] < 3:
+            return False
+        means = np.abs(steps.mean(axis=1))
+        first, second = np.ptp(steps, axis=1) <= _EVEN * means
+        return bool(first and means[0] > 0.0 and not second)
+
+    if alone(rows) and alone(rows.T):
+        return "the first row and the first column rise"
+    counted = np.diff(rows[0])
+    return (
+        "the first row rises" if alone(rows) and (counted == 1.0).all() and rows[0, 0] in (0.0, 1.0) else ""
+    )
 
 
 def _is_number(cell: str) -> bool:

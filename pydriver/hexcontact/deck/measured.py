@@ -7,7 +7,7 @@ file, in m, so that it needs no other file.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
@@ -31,6 +31,7 @@ _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file al
 _POINTS = ("x", "y", "heights")
 _LONG = 1e6  # half the length (m) of an extruded profile
 _EVEN = 1e-6  # of distances between points that repeat, and of their period
+_ROUNDED = 1e-9  # of heights, over their range
 _BEYOND = 12  # points on each side of a period that its interpolation sees
 _SQUARE, _SLENDER = 1.02, 1.1  # ratios of sides of cells that are squares, and that are not
 
@@ -283,7 +284,7 @@ class Measured(Surface):
 
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""
-        x, y = np.meshgrid(self.field.x, self.field.y, indexing="ij")
+        x, y = np.meshgrid(*self._in_period(self.field.x, self.field.y), indexing="ij")
         return x.ravel() + self._origin[0], y.ravel() + self._origin[1]
 
     def repeating(self, sides: tuple[float, float] | None) -> Measured:
@@ -298,15 +299,17 @@ class Measured(Surface):
         return other
 
     def _height(self, x: Array, y: Array) -> Array:
-        x, y = np.broadcast_arrays(x, y)
-        if self._period:
-            x, y = (
-                low + np.mod(at - low, side)
-                for at, low, side in zip(
-                    (x, y), (self.points.x.min(), self.points.y.min()), self._period, strict=True
-                )
-            )
-        return np.asarray(self.field(x, y))
+        return np.asarray(self.field(*self._in_period(*np.broadcast_arrays(x, y))))
+
+    def _in_period(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return coordinates of the map; those of the measured period if it repeats."""
+        if not self._period:
+            return x, y
+        lows = self.points.x.min(), self.points.y.min()
+        at, up = (
+            low + np.mod(one - low, side) for one, low, side in zip((x, y), lows, self._period, strict=True)
+        )
+        return at, up
 
     def _repeated(self, x: Array, y: Array, height: Array) -> tuple[Array, Array, Array]:
         """Return heights over a period and some points beyond it; DeckError if its sides do not fit."""
@@ -439,11 +442,11 @@ class Map(Measured):
         x, y, z, _ = self.points
         return {"x": x.tolist(), "y": y.tolist(), "heights": z.tolist()}
 
-    def rows(self, spacing: float) -> Iterator[str]:
-        """Yield lines about the map, beside the spacing of a lattice."""
+    def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
+        """Yield lines about the map, beside the distance of nodes along a direction."""
         (x, y, _, about), ends = self.points, []
-        apart = [float(np.median(np.diff(np.sort(at)))) for at in (x, y)]
-        for name, at, step in (("x", x, apart[0]), ("y", y, apart[1])):
+        of_points = [float(np.median(np.diff(np.sort(at)))) for at in (x, y)]
+        for name, at, step in (("x", x, of_points[0]), ("y", y, of_points[1])):
             low, high = at.min(), at.max()
             cells = quantity(high - low + step, "m")
             ends.append(
@@ -452,10 +455,12 @@ class Map(Measured):
             )
         yield about
         yield f"{len(x)} x {len(y)} points; {'; '.join(ends)}"
-        steps = " by ".join(dict.fromkeys(quantity(step, "m", 3) for step in apart))
-        ratios = " by ".join(dict.fromkeys(f"{step / spacing:.3g}" for step in apart))
+        of_nodes = apart(0.0), apart(math.pi / 2)
+        steps = " by ".join(dict.fromkeys(quantity(step, "m", 3) for step in of_points))
+        shares = [f"{step / node:.3g}" for step, node in zip(of_points, of_nodes, strict=True)]
+        ratios = " by ".join(dict.fromkeys(shares))
         yield f"points {steps} apart, {ratios} spacings of the lattice; x to the right, y to the top"
-        u, v = (a + b for a, b in zip(self.field.first_touch, self._origin, strict=True))
+        u, v = (a + b for a, b in zip(self._in_period(*self.field.first_touch), self._origin, strict=True))
         yield f"{self._heights}; nearest to the other body at x = {quantity(u, 'm')}, y = {quantity(v, 'm')}"
         yield self.field.interpolated
 
@@ -559,16 +564,18 @@ class Profile(Measured):
     def _written_points(self) -> dict[str, Any]:
         return {"y": self.points.y.tolist(), "heights": self.points.z[0].tolist()}
 
-    def rows(self, spacing: float) -> Iterator[str]:
-        """Yield lines about the profile, beside the spacing of a lattice."""
+    def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
+        """Yield lines about the profile, beside the distance of nodes along a direction."""
         _, y, _, about = self.points
-        apart = float(np.median(np.diff(np.sort(y))))
+        step = float(np.median(np.diff(np.sort(y))))
         yield f"{about}; extruded along {math.degrees(self.angle):.6g} deg from x"
+        spacings = step / apart(self.angle + math.pi / 2)
         yield (
             f"{len(y)} points, y from {quantity(y.min(), 'm')} to {quantity(y.max(), 'm')}, "
-            f"{quantity(apart, 'm', 3)} apart, {apart / spacing:.3g} spacings of the lattice"
+            f"{quantity(step, 'm', 3)} apart, {spacings:.3g} spacings of the lattice"
         )
-        yield f"{self._heights}; nearest to the other body at y = {quantity(self.field.first_touch[1], 'm')}"
+        lowest = quantity(float(self._in_period(*self.field.first_touch)[1]), "m")
+        yield f"{self._heights}; nearest to the other body at y = {lowest}"
         yield self.field.interpolated
 
 
@@ -628,7 +635,7 @@ def _closed(at: Array, height: Array, axis: int, side: float, taper: float | Non
         float(np.fmax.reduce(np.abs(steps), axis=None, initial=0.0))
         for steps in (seam, np.diff(heights, axis=0))
     )
-    if largest > 1.001 * beside:
+    if largest > 1.001 * beside + _ROUNDED * float(np.nanmax(heights) - np.nanmin(heights)):
         raise DeckError(
             f"the map does not repeat: between its opposite ends in {name} it steps by {readable(largest)}, "
             f"between neighboring points by {readable(beside)} at most; level it, or give taper, the width "

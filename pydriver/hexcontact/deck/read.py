@@ -190,7 +190,7 @@ class RecordedDeck:
         return Deck.checked(data) if data else ({}, [])
 
     def tables(self, *names: str) -> dict[str, Any]:
-        """Return the named tables; refuse a key or a value in them that this version does not know."""
+        """Return the named tables; refuse a key or a value in them that this version does not have."""
         found, mistakes = self._checked
         if wrong := [mistake for mistake in mistakes if mistake.key and mistake.key[0] in names]:
             error = deck_error(wrong, self._source)

@@ -9,7 +9,7 @@ adds waves and changes none.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -130,7 +130,8 @@ class Rough(Surface):
     def _in_words(self) -> str:
         return " by ".join(readable(side) for side in self.sides)
 
-    def rows(self, spacing: float) -> Iterator[str]:
-        """Yield lines about its period, and its shortest wave beside the spacing of a lattice."""
+    def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
+        """Yield lines about its period, and its shortest wave beside the distance of nodes."""
+        spacing = max(apart(0.0), apart(math.pi / 2))
         yield f"repeats after {self._in_words}"
         yield f"shortest wave of {self.shortest / spacing:.3g} spacings; the contact area needs 8 or more"

@@ -79,6 +79,7 @@ else:
 _SAME_FORM = 1e-10  # rounding errors of a quadratic form, as a share of its largest coefficient
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
+_WHOLE = 1e-6  # rounding of the number of waves in a period
 
 
 class Surface(Argument):
@@ -164,8 +165,8 @@ class Surface(Argument):
         """Distance (m) from the center beyond which nothing can touch; infinite for most shapes."""
         return math.inf
 
-    def rows(self, spacing: float) -> Iterator[str]:
-        """Yield lines about its data, beside the spacing (m) of a lattice."""
+    def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
+        """Yield lines about its data, beside the distance (m) of nodes along a direction (rad)."""
         yield from ()
 
     def _height(self, x: Array, y: Array) -> Array:
@@ -392,6 +393,17 @@ class Waviness(Surface):
     wavelength: Radius = meaning(..., "wavelength λ")
     angle: Angle = meaning(0.0, "direction of the wave, from x towards y")
     formula: ClassVar[str] = "h = a (1 − cos 2πs/λ), s along the direction"
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return itself; DeckError if a side of the window is no whole number of its waves."""
+        for name, side, share in zip("xy", sides or (), _axes(self.angle)[0], strict=False):
+            waves = abs(side * float(share)) / self.wavelength
+            if abs(waves - round(waves)) > _WHOLE:
+                raise DeckError(
+                    f"the waviness does not repeat with the window: its side in {name} has {waves:.6g} "
+                    "waves; expected a whole number of them"
+                )
+        return self
 
     def _height(self, x: Array, y: Array) -> Array:
         (a, b), _ = _axes(self.angle)

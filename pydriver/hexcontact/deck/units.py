@@ -64,6 +64,7 @@ _SPELLED = {  # by SI unit
     "N": _POUNDS,
     "N m": _POUNDS,
 }
+_PRINTED = {"px", "css_pixel", "point", "points", "pica", "picas", "scaled_point", "didot", "cicero"}
 _MOMENT = re.compile(r"([nuµmkMG]?N)(um|µm|mm|cm|m)")
 _BRACKETS = re.compile(r"(/ ?)?\(([^()/]*)\)(?! ?[*^])")
 _TIMES = re.compile(r" ?(?<!\*)[*·](?!\*) ?|(?<=\w) (?=[^\W\d])")
@@ -142,6 +143,8 @@ def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
     unknown = UnitError(_unknown(number, unit, dimension))
     if len(unit) > _LONGEST_UNIT or _UNIT.fullmatch(plain := _plain(unit, dimension)) is None:
         raise unknown
+    if _PRINTED & set(re.findall(r"\w+", plain)):
+        raise UnitError(f'"{unit}" is a size of print and screens')
     registry = _registry()
     try:
         quantity = registry.Quantity(number, plain).to_base_units()

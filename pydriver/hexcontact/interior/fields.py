@@ -165,8 +165,8 @@ def at_points(
     """Return G u (step, n, 3) and the stress (step, n, 6; xx, yy, zz, xy, yz, xz) of a body in load steps.
 
     `inside` is Poisson's ratio of a half-space, or thickness (m), shear modulus (Pa) and Poisson's ratio of
-    each layer, outermost first, and of what lies below; G is the shear modulus of the surface. The influence
-    of each node on each point is worked out once for all steps.
+    each layer, outermost first, and of the body below; G is the shear modulus of the surface. The influence
+    of each node on each point is computed once for all steps.
     """
     x, y, depth = np.asarray(points, dtype=float).reshape(-1, 3).T
     if not x.size:

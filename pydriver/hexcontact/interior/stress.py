@@ -159,7 +159,7 @@ class Loaded:
 
     @property
     def layers(self) -> Array:
-        """Thickness (m), shear modulus (Pa) and Poisson's ratio of the layers, and of what lies below."""
+        """Thickness (m), shear modulus (Pa) and Poisson's ratio of the layers, and of the body below."""
         if integer(self.body, "body") not in (1, 2):
             raise DeckError(f"body = {self.body}: expected 1 or 2")
         if not self.bodies:

@@ -173,7 +173,7 @@ def _first_of(found: Dataset, name: str) -> DataArray:
 def _color(
     axes: Axes, x: Array, y: Array, field: DataArray, limits: tuple[Any, Any] | None = None
 ) -> Callable[[], None]:
-    """Draw a parameter in colors with their scale; return what marks its largest value, or the least life.
+    """Draw a parameter in colors with their scale; return a function that marks its worst value.
 
     Life is drawn as a power of ten. The worst value is bright.
     """

@@ -33,7 +33,7 @@ Limits = tuple[float, float, float, float]
 ARROWS, FEWER_ARROWS = 13, 9  # across the contact, about, in a large and in a small picture
 _WIDTH = 7.2  # inches of a picture with several panels, or of an elongated contact
 _HIGH = 4.5  # inches of a map of an upright contact among others
-_THIN, _LEAST_ASPECT = 1.0 / 15.0, 1.0 / 7.0  # of maps that are stretched across, and what they become
+_THIN, _LEAST_ASPECT = 1.0 / 15.0, 1.0 / 7.0  # of maps that are stretched across, and their new one
 _ROWS = 5  # maps of a wide contact in one column
 
 

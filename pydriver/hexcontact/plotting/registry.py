@@ -61,7 +61,7 @@ class Entry:
 
     @property
     def shows(self) -> str:
-        """What it shows: a "result", a "study", a "table" [[stress]] or [[fatigue]], or a "deck"."""
+        """Kind of its argument: a "result", a "study", a "table" [[stress]] or [[fatigue]], or a "deck"."""
         kinds = {"study": "study", "table": "table", "case": "deck"}
         return next((kind for option, kind in kinds.items() if option in self.options), "result")
 
@@ -80,7 +80,7 @@ def entries() -> dict[str, Entry]:
 
 
 def _documented(draw: Draw[P], needs: str) -> str:
-    """Complete the docstring of a figure: shared parameters, what it returns, and its errors."""
+    """Complete the docstring of a figure: shared parameters, returned value, and errors."""
     text, *parts = re.split(r"\n\n(Parameters|Raises)\n-+\n", inspect.getdoc(draw) or "")
     own = dict(zip(parts[::2], parts[1::2], strict=True))
     known = {one[1]: one[0] for one in _PARAMETER.finditer(f"{_SHARED}\n{own.get('Parameters', '')}")}

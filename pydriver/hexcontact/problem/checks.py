@@ -14,6 +14,7 @@ from ..deck.keys import MEANS, Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MOST_STEPS
+from ..deck.surfaces import SurfaceSum
 from ..errors import DeckError
 from ..text import did_you_mean, listed, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
@@ -82,7 +83,7 @@ _SOME_PERIOD = Period(1.0, math.inf)  # for means in a deck that is refused anyw
 
 
 class Repeating(NamedTuple):
-    """The window of a case that repeats, with what its loads refer to, and the surfaces over it."""
+    """The window of a case that repeats, with the references of its loads, and the surfaces over it."""
 
     lattice: Lattice
     period: Period
@@ -93,6 +94,14 @@ def _repeating(
     tables: Mapping[str, Any], gap: FieldSource | None, lattice: Lattice | None
 ) -> tuple[Repeating | None, list[Mistake]]:
     """Return the window that repeats, and faults of it and of the gap over it."""
+    bodies = enumerate((tables["body"].body_1, tables["body"].body_2), 1)
+    for number, surface in ((number, body.surface) for number, body in bodies):
+        parts = surface.parts if isinstance(surface, SurfaceSum) else (surface,)
+        for place in (place for place, part in enumerate(parts) if part is not None and any(part.tilt)):
+            inner = (place,) if len(parts) > 1 else ()
+            fault = "expected none in a window that repeats, which a tilted surface does not"
+            given = [f"{math.degrees(angle):g} deg" for angle in parts[place].tilt]
+            return None, [Mistake(("body", str(number), "surface", *inner, "tilt"), given, fault)]
     if lattice is None:
         lattice, faults = window.repeating(tables["grid"])
         if faults:
@@ -123,8 +132,17 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
                     yield ("load", place, name), 'expected a window that repeats: grid.boundary = "periodic"'
         return
     whole = "beside a window that repeats"
-    if any(step.twist.value or step.twist.control == "force" for step in steps):
-        yield ("load",), f"expected no torque and no twist {whole}: a rotation does not repeat"
+    turned = f"expected no torque and no twist {whole}: a rotation does not repeat"
+    named = [
+        (*key, name)
+        for key, segment in _segments(tables["load"])
+        for name in ("torque", "twist")
+        if getattr(segment, name)
+    ]
+    if named:
+        yield from ((key, turned) for key in named)
+    elif any(step.twist.value or step.twist.control == "force" for step in steps):
+        yield ("load",), turned
     if tables.get("bulk"):
         yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
     if tables["solver"].method == "direct":

@@ -238,7 +238,7 @@ class History:
             step = LoadStep(*place, **self._now, fraction=fraction, ramp=ramp if chosen else None, roll=roll)
             self.steps.append(step)
             for part in _WATCHED if chosen else (1.0,):
-                problems = list(_overload(key, stretch.segment, step.until(part), self._mu))
+                problems = list(_overload(key, stretch.segment, step.until(part), self._mu, self._period))
                 # a load that is too large at the beginning of a segment is a fault of the segment before it
                 if not self._overloaded or self._overloaded == key:
                     for problem in problems:
@@ -363,11 +363,16 @@ def cycle_entries(loads: Sequence[Load], label: str) -> list[Load]:
 
 
 def wearing_cycle(
-    loads: Sequence[Load], friction_coefficient: float, bulk: Bulk | None, label: str
+    loads: Sequence[Load],
+    friction_coefficient: float,
+    bulk: Bulk | None,
+    label: str,
+    period: Period | None = None,
 ) -> tuple[LoadStep, ...]:
     """Return the load steps of the last entries, which have the label, once more after the history."""
-    steps, _ = load_steps([*loads, *cycle_entries(loads, label)], friction_coefficient, bulk)
-    return steps[len(load_steps(loads, friction_coefficient, bulk)[0]) :]
+    given = friction_coefficient, bulk, period
+    steps, _ = load_steps([*loads, *cycle_entries(loads, label)], *given)
+    return steps[len(load_steps(loads, *given)[0]) :]
 
 
 def _turn(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
@@ -395,7 +400,11 @@ def _count(segment: Segment) -> int:
 
 
 def _overload(
-    key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float | None
+    key: tuple[str | int, ...],
+    segment: Segment,
+    step: LoadStep,
+    mu: float | None,
+    period: Period | None = None,
 ) -> Iterator[Mistake]:
     """Yield the tangential loads of a step that friction cannot carry, as far as the deck determines them."""
     tangential: tuple[tuple[Motion, Target], ...] = ("x", step.x), ("y", step.y), ("twist", step.twist)
@@ -429,8 +438,12 @@ def _overload(
         name = next((name for name in blamed if getattr(segment, name) is not None), "steps")
         given = getattr(segment, name)
         given = str(given) if isinstance(given, Share) else given
+        words = f"tangential load of {force:g} N", f"normal_load = {bound:g} N"
+        if period and name in MEANS:
+            mean, most = (quantity(load / period.area, "Pa") for load in (force, bound))
+            words = f"mean traction of {mean}", f"mean_pressure = {most}"
         sentence = (
-            f"gross sliding: the tangential load of {force:g} N in load step {step.index + 1} is more than "
-            f"friction.coefficient x normal_load = {bound:g} N"
+            f"gross sliding: the {words[0]} in load step {step.index + 1} is more than "
+            f"friction.coefficient x {words[1]}"
         )
         yield Mistake((*key, name), MISSING if given is None else given, sentence)

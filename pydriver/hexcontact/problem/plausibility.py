@@ -21,6 +21,8 @@ from ..core.measures import (
     slip_ring,
 )
 from ..deck.interface import TwoCoefficients
+from ..deck.rough import Rough
+from ..deck.surfaces import SurfaceSum
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -197,7 +199,13 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if math.isfinite(known.max_pressure):
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
-        along = np.concatenate([one.distances for one in case.maps]) / case.lattice.spacing
+        along = np.array(
+            [
+                distance / case.lattice.apart(one.angle + axis * math.pi / 2)
+                for one in case.maps
+                for axis, distance in zip(one.axes, one.distances, strict=True)
+            ]
+        )
         found |= {
             "spacings_between_points": float(along.max()),
             "points_between_nodes": float(1.0 / along.min()),
@@ -291,8 +299,10 @@ def row(case: Problem) -> str:
 
 
 def notes(case: Problem) -> dict[str, str]:
-    """Return notes by what they are about: limits that are not judged, rounded distances."""
+    """Return notes by their subjects: limits that are not judged, rounded distances, equal seeds."""
     found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    if case.surfaces.curvature is None:
+        found["seeds"] = equal_seeds(case)
     return {about: note for about, note in found.items() if note}
 
 
@@ -326,6 +336,21 @@ def rounded_distances(case: Problem) -> str:
                 f"of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
+
+
+def equal_seeds(case: Problem) -> str:
+    """Return a note on rough surfaces whose waves coincide; empty without two of them."""
+    found = set()
+    for surface in (case.surfaces.surface_1, case.surfaces.surface_2):
+        for part in surface.parts if isinstance(surface, SurfaceSum) else (surface,):
+            if not isinstance(part, Rough):
+                continue
+            if (waves := (part.seed, part.sides, part.offset)) in found:
+                return (
+                    f"two rough surfaces have seed = {part.seed}: their waves coincide, and peaks meet peaks"
+                )
+            found.add(waves)
+    return ""
 
 
 def _steepest(case: Problem, found: dict[str, Any]) -> dict[str, str]:
@@ -373,7 +398,7 @@ def _load_ratio(case: Problem, step: LoadStep) -> float:
 
 
 def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
-    """Return the largest Q/mu P, and what follows from loads or motions along x, y and about z.
+    """Return the largest Q/mu P, and two numbers from loads or motions along x, y and about z.
 
     These are the error of the dissipated energy by loads that turn, None without slip or such steps, and the
     largest Q/mu P of tangential loads that return, None if none is known to. Q/mu P is that of a wide ring if

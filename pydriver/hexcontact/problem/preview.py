@@ -134,20 +134,12 @@ def machine() -> str:
     )
 
 
-def _cells(lattice: Lattice) -> str:
-    """Return the cells of a lattice that is not equilateral."""
-    if lattice.pattern[1:] == Lattice(1.0, 0, 0, 1, 1).pattern[1:]:
-        return ""
-    turned = f", first axis at {math.degrees(lattice.direction):.4g} deg" if lattice.direction else ""
-    across = quantity(lattice.spacing * lattice.cell_ratio, "m")
-    return f" by {across}, at {math.degrees(lattice.cell_angle):.4g} deg{turned}"
-
-
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
     """Return the rows of an overview of a case."""
     lattice, pair, bulk, solver = case.lattice, case.pair, case.deck.bulk, case.solver
-    # without the coordinates, for which the window may be too large
-    width, height = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)
+    # without the coordinates, for which the window may be too large; a period has a cell for each node
+    last = 0 if lattice.periodic else 1
+    width, height = [lattice.n_col - last, lattice.n_row - last] @ abs(lattice.basis)
     constants = (
         f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
     )
@@ -179,11 +171,11 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         ("contact", plausibility.row(case)),
         ("plane contact", _plane_contact(case)),
         ("contact", "full, one unknown: p = P/A over all nodes" if case.full_contact else ""),
-        ("spacing", quantity(lattice.spacing, "m") + _cells(lattice)),
+        ("spacing", lattice.cells),
         (
             "window",
             f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {size}, "
-            f"{'fixed' if case.window_fixed else 'grows with the contact'}",
+            f"{'repeats' if case.period else 'fixed' if case.window_fixed else 'grows with the contact'}",
         ),
         ("accuracy", accuracy or ""),
         ("bulk stress", _bulk(bulk, case.load_steps) if bulk else ""),
@@ -264,7 +256,10 @@ def _largest(case: Problem) -> str:
     normal, *tangential = largest_loads(case).values()
     words = quantity(normal, "N") if normal else "follows from the approach"
     along = zip(tangential, "xy", strict=True)
-    return ", ".join([words, *(f"{quantity(load, 'N')} along {axis}" for load, axis in along if load)])
+    found = [words, *(f"{quantity(load, 'N')} along {axis}" for load, axis in along if load)]
+    if case.period and normal:
+        found[0] += f" (mean pressure {quantity(normal / case.period.area, 'Pa')})"
+    return ", ".join(found)
 
 
 def largest_loads(case: Problem) -> dict[str, float]:
@@ -296,7 +291,7 @@ def surfaces_in_words(case: Problem) -> list[dict[str, Any]]:
         {"body": number, "shape": one.shape, "lines": lines}
         for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
         for one in (surface.parts if isinstance(surface, SurfaceSum) else (surface,))
-        if (lines := [*one.rows(case.lattice.spacing)])
+        if (lines := [*one.rows(case.lattice.apart)])
     ]
 
 

@@ -222,7 +222,8 @@ class Problem:
         """The load steps of the cycle that wears the surfaces, after the load history."""
         if (wear := self.deck.wear) is None:
             return ()
-        return wearing_cycle(self.deck.load, self.friction_coefficient, self.deck.bulk, wear.cycle)
+        given = self.friction_coefficient, self.deck.bulk, wear.cycle, self.period
+        return wearing_cycle(self.deck.load, *given)
 
     @property
     def solved_pair(self) -> ElasticPair:
@@ -305,7 +306,7 @@ class Problem:
 
     def method_for(self, lattice: Lattice) -> Method:
         """Return the method for a window, "direct" or "fft", also for "auto"."""
-        small = lattice.size <= MOST_DIRECT_NODES and not self.frictional
+        small = lattice.size <= MOST_DIRECT_NODES and not (self.frictional or lattice.periodic)
         return "direct" if self.solver.method in ("direct", "auto" if small else "direct") else "fft"
 
     def contact_nodes(self, lattice: Lattice) -> int:

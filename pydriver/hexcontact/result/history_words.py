@@ -97,12 +97,26 @@ def fitted(name: str, history: History) -> float:
 
 
 def contact_size(history: History) -> tuple[str, str]:
-    """Return name and value of the radius of the contact, or its half-axes, with the estimated error."""
+    """Return name and value of the radius of the contact, or its half-axes, with the estimated error.
+
+    Of a window that repeats it is the share of its area that is in contact.
+    """
+    if repeats(history):
+        window = float(history["normal_load"] / history["mean_pressure"])
+        share, error = (
+            100 * float(history[name]) / window for name in ("contact_area", "contact_area_error")
+        )
+        return "contact area", f"{share:.1f} ± {error:.1g} % of the window"
     if (axes := half_axes(history)) is None:
         error = error_of("contact_radius", history)
         return "contact radius", quantity(fitted("contact_radius", history), "m") + error
     words = " by ".join(quantity(axis, "m") for axis in axes)
     return "contact half-axes", words + error_of("contact_semi_major", history)
+
+
+def repeats(history: History) -> bool:
+    """Test whether a step is that of a window that repeats, under load."""
+    return "mean_gap" in history and float(history["mean_pressure"]) > 0.0
 
 
 def extent_of(step: Any) -> Extent | None:
@@ -131,7 +145,7 @@ def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]
 def _moments(history: History, extent: Extent | None) -> str:
     """Name the ellipse of equal moments if the contact is not elliptic, and the extent of the contact."""
     axes, area = half_axes(history), fitted("contact_area", history)
-    if axes is None or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+    if axes is None or repeats(history) or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
         return ""
     words = " of the ellipse with the same moments"
     if extent is None:
@@ -232,7 +246,9 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
         if name == "contact_radius"
         else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
         for name in SUMMARY
-        if name in history and not (name == "dissipated_energy" and rolls(history) and not history[name])
+        if name in history
+        and not (name == "dissipated_energy" and rolls(history) and not history[name])
+        and not (name == "stick_radius" and repeats(history))
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))

@@ -59,7 +59,7 @@ _NOISE = 1e-3  # of energies beside the normal load times the contact radius
 
 
 _POSITIVE, _NOT_NEGATIVE, _BELOW_PI = (SMALLEST, LARGEST), (0.0, LARGEST), math.nextafter(math.pi, 0.0)
-# What attributes are: text, some of a few words, so many finite numbers, or a number between two bounds.
+# Rules of attributes: text, some of a few words, so many finite numbers, or a number between two bounds.
 _HALF_SPACES: dict[str, Any] = {  # that bodies with coatings do not have
     **{"effective_modulus": _POSITIVE, "dundurs_beta": (-LARGEST, LARGEST)},
     "tangential_compliance_ratio": (-LARGEST, LARGEST),
@@ -91,7 +91,7 @@ _LATER: dict[str, Any] = {  # that some files have
 
 
 def _fits(name: str, value: Any, rule: Any) -> bool:
-    """Test whether an attribute is what a rule of the tables says."""
+    """Test whether an attribute meets a rule of the tables."""
     if rule is str:
         return isinstance(value, str)
     if isinstance(rule, int):
@@ -220,7 +220,7 @@ def _faults_of_fields(
     if not kept:
         return
     q_x, q_y = fields.get("traction_x"), fields.get("traction_y")
-    # quantity of the history, its value by the fields, what rounding errors are relative to, and its fault
+    # quantity of the history, its value by the fields, the scale of rounding errors, and its fault
     own: list[tuple[str, float, float, str]] = []
     if p is not None:
         own.append(("max_pressure", p.max(), p.max(), "pressure does not fit to max_pressure"))

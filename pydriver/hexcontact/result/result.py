@@ -47,7 +47,7 @@ class Result:
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; ``result.dataset`` is the
-    `xarray.Dataset` of all. It is made from that, or from what makes it when it is first used, and the path
+    `xarray.Dataset` of all. It is made from that, or from a function that makes it at first use, and the path
     of its file, empty if there is none.
     """
 
@@ -178,7 +178,7 @@ class Result:
         """Closed cycles of a load history with friction, a line each; empty if there are none.
 
         Columns: kind of loading ("shear", "torsion", "normal"), first and last step, energy that friction
-        dissipated (J), area (J) of the loop of the load over its motion, and what else does work in the cycle
+        dissipated (J), area (J) of the loop of the load over its motion, and other loads that do work
         ("bulk stress", "normal load"): the area is not the energy then. A cycle begins where the motion turns
         back, at the end of the step before its first. Cycles of wear, which represent many, are left out.
         """
@@ -265,14 +265,14 @@ class Result:
         """Return the wear of one cycle of the loads, of a run with friction and without [wear].
 
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
-        `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
+        `segment` or `steps` choose the cycle, as in `fatigue`. ``worn_depth``,
         ``cycle_dissipation_density`` and ``cycle_slip_amplitude`` (a quarter of the slip path) are over the
         nodes, ``wear_volume`` of all. Raises DeckError without friction, such a cycle, or its fields.
 
         Of rolling bodies `steps` is one load step, ``[-1]`` the last. ``worn_depth`` is that of the
         material at the node, on its way through the contact; behind it that of one pass.
         ``wear_by_distance`` (m3/m) is the volume by rolled distance, ``wear_by_distance_error`` (of similar
-        bodies) what the lattice leaves out.
+        bodies) its discretization error.
         """
         number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
         if "dissipation_density" not in self:
@@ -284,7 +284,7 @@ class Result:
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
     def _worn_by_pass(self, coefficient: float, step: Dataset) -> Dataset:
-        """Return what rolling wears, by the energy of Coulomb friction."""
+        """Return the wear of a pass, by the energy of Coulomb friction."""
         mu = friction_of(self.dataset.attrs)
         if not 0.0 < mu < math.inf or SHEAR_LIMIT in self.dataset.attrs:
             raise DeckError("wear of rolling bodies: expected one finite friction.coefficient above 0")

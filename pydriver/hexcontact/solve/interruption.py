@@ -8,6 +8,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 
+from ..core.memory import share_heap
 from ..netcdf_library import LOCK
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
@@ -68,6 +69,7 @@ def in_background(
             os.write(own, bytes([0]))  # is the number of no signal
         os.close(own)
 
+    share_heap()
     thread = threading.Thread(target=worker, daemon=True)
     LOCK.waiting += 1
     try:

@@ -98,7 +98,7 @@ def _number(value: float) -> str:
 def _sliding(
     case: Problem, lattice: Lattice, solution: Any, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[bool, str, str]:
-    """Return whether friction may not carry the load, and if it cannot, a sentence and what was expected."""
+    """Return whether friction may not carry the load, and if it cannot, a sentence and the expected value."""
     if not case.frictional:
         return False, "", ""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)

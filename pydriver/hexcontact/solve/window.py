@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+import weakref
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -48,10 +49,30 @@ class Window:
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
         self._bodies: dict[int, Any] = {}
-        self.gap, self.candidate = case.initial_gap(lattice)
-        self.initial_gap: Array = self._where_touching(self.gap)
+        gap, self.candidate = case.initial_gap(lattice)
         self.friction = case.friction_law(lattice)
-        self.contact: Any = self._solver(self.gap)
+        self.contact: Any = self._solver(gap)
+        self._lent: Callable[[], Array | None] = lambda: None
+        # of surfaces that move, and of nodes that cannot touch, the core has another one
+        keeps = case.moves or not self.candidate.all()
+        self._own_gap: Array | None = gap if keeps else None
+        self._first_gap: Array | None = self._where_touching(gap) if keeps else None
+
+    @property
+    def gap(self) -> Array:
+        """Gap before loading (inf where nothing can touch): a copy of the core's as long as it is in use."""
+        if self._own_gap is not None:
+            return self._own_gap
+        gap = self._lent()
+        if gap is None:
+            gap = self.contact.initial_gap
+            self._lent = weakref.ref(gap)
+        return gap
+
+    @property
+    def initial_gap(self) -> Array:
+        """Gap of the surfaces that have not moved, NaN where nothing can touch."""
+        return self.gap if self._first_gap is None else self._first_gap
 
     def _solver(self, gap: Array) -> Any:
         """Return the solver for an initial gap (inf where nothing can touch)."""
@@ -290,8 +311,8 @@ class FrictionWindow(Window):
     ) -> ContactState:
         """Advance a state to new loads and motions, with surfaces that move at their new place."""
         if self.case.moves:
-            self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
-            self.contact = self._solver(self.gap)
+            self._own_gap, self.candidate = self.case.initial_gap(self.lattice, target)
+            self.contact = self._solver(self._own_gap)
         return self.contact.advance(
             self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],

@@ -182,7 +182,7 @@ contains
     call new_active_set(step%pressed, now%contact, step%system%space)
     step%system%pressed => step%pressed
     step%system%sheared => step%sheared
-    step%sticks = any(shear_active(n + 1:))
+    step%sticks = step%system%space%count(shear_active(n + 1:)) > 0
     deallocate (shear_active)
   end subroutine find_nodes
 
@@ -236,7 +236,7 @@ contains
     real(wp), allocatable :: rhs(:), unknown(:), kept(:)
     type(active_set_t) :: fixed
     real(wp) :: residual, p_max
-    integer :: n
+    integer :: n, n_active(1)
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -267,8 +267,10 @@ contains
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       if (step%determined()) deallocate (now%p, now%q)
       residual = min(residual, 1.0_wp)
+      n_active = step%nodes%n_active
+      call system%space%ranks%add_counts(n_active)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
-                                options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
+                                options%final_accuracy*now%tolerance)*real(n_active(1), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
       call pack_unknowns(step, unknown, fixed, kept)

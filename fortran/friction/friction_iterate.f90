@@ -129,7 +129,7 @@ contains
     call set_problem(self, problem, operators, step)
     n = size(self%p)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
-    do row = 1, problem%lattice%extent(2)
+    do row = 1, size(start%pressure, 2)
       to = row*problem%lattice%extent(1)
       from = to - problem%lattice%extent(1) + 1
       self%p(from:to) = start%pressure(:, row)
@@ -176,7 +176,7 @@ contains
     type(load_step_t), intent(in) :: step
     integer :: n
 
-    n = problem%lattice%size()
+    n = problem%own_size()
     self%problem => problem
     self%operators => operators
     self%target = step%target
@@ -399,7 +399,7 @@ contains
   subroutine find_tangential_residual(self)
     class(friction_iterate_t), intent(inout) :: self
     real(wp), dimension(self%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: unit, largest, worst
+    real(wp) :: unit, largest, worst, most(2)
     integer :: n, n_col, row, from, to, low, high
 
     n = size(self%p)
@@ -420,13 +420,15 @@ contains
                                            self%q(from:to), self%q(n + from:n + to), dsx(low:high), dsy(low:high), largest, worst)
     end do
     !$omp end parallel do
-    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, 1.0_wp/unit, largest)
+    most = [largest, worst]
+    call self%operators%space%most(most)
+    self%residual_tangential = sqrt(most(2))/tangential_scale(self%problem%friction, 1.0_wp/unit, most(1))
   end subroutine find_tangential_residual
 
   !> Return whether all tractions and motions are finite numbers.
   logical function is_finite(self)
     class(friction_iterate_t), intent(in) :: self
-    real(wp) :: rest
+    real(wp) :: rest, wrong(1)
     integer :: n, i
 
     n = size(self%p)
@@ -437,7 +439,9 @@ contains
       rest = rest + (self%p(i) - self%p(i)) + (self%q(i) - self%q(i)) + (self%q(n + i) - self%q(n + i))
     end do
     !$omp end parallel do simd
-    is_finite = all(ieee_is_finite(self%motion)) .and. abs(rest) <= 0.0_wp
+    wrong = merge(0.0_wp, 1.0_wp, abs(rest) <= 0.0_wp)
+    call self%operators%space%most(wrong)
+    is_finite = all(ieee_is_finite(self%motion)) .and. .not. wrong(1) > 0.0_wp
   end function is_finite
 
   !> Compute R_n of a gap under the present pressure.
@@ -447,7 +451,7 @@ contains
     real(wp), intent(in), contiguous, target :: gap(:)
     real(wp), pointer, contiguous :: p(:, :), g(:, :)
 
-    associate (n => self%problem%lattice%extent)
+    associate (n => self%problem%own_extent())
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate

@@ -190,7 +190,9 @@ contains
       end do
     end do
     !$omp end parallel do
-    along = sum(part, dim=2)
+    do m = 1, size(along)
+      along(m) = space%total(part(m, :))
+    end do
   end subroutine advance_residual
 
   !> Compute r <- r + B change, and its largest element.
@@ -202,6 +204,7 @@ contains
     real(wp), intent(out) :: largest
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    real(wp) :: all(1)
     integer :: i, m, from, to
 
     largest = 0.0_wp
@@ -217,6 +220,9 @@ contains
       end do
     end do
     !$omp end parallel do
+    all = largest
+    call space%most(all)
+    largest = all(1)
   end subroutine add_constraints
 
   !> Project z <- z + M B share, and compute r^T z.
@@ -245,7 +251,7 @@ contains
       part(k) = ddot(to - from + 1, r(from:to), 1, z(from:to), 1)
     end do
     !$omp end parallel do
-    rz = sum(part)
+    rz = space%total(part)
   end subroutine project
 
   !> Compute y <- alpha x + beta y; where beta is 0, y need not be a number.

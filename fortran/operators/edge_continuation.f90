@@ -73,7 +73,7 @@ contains
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
-    !> Nodes beyond which there are no rings (n_col, n_row), on one rank; absent: all of the window
+    !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
     logical, intent(in), contiguous, optional :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
@@ -85,7 +85,7 @@ contains
     step = neighbor_steps(size(active, 1) + 2)
     if (present(near)) step = pack(step, near)
     if (space%ranks%size > 1) then
-      call share_rings(self, active, space, options, step)
+      call share_rings(self, active, space, options, step, within)
     else
       call mark_window(active, space, mark, within)
       call find_edge(active, mark, step, space, frontier)
@@ -172,7 +172,7 @@ contains
 
   !> Find the rings in own rows and in those that their values depend on: smoothed rings further in or out, and the active nodes
   !> that these begin at.
-  subroutine share_rings(self, active, space, options, step)
+  subroutine share_rings(self, active, space, options, step, within)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
     logical, intent(in), contiguous :: active(:, :)
@@ -180,7 +180,9 @@ contains
     type(preconditioner_options_t), intent(in) :: options
     !> Steps to the neighbors of a node
     integer, intent(in), contiguous :: step(:)
-    logical, allocatable :: wider(:, :)
+    !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
+    logical, intent(in), contiguous, optional :: within(:, :)
+    logical, allocatable :: wider(:, :), around(:, :)
     integer, allocatable :: mark(:), frontier(:)
     integer :: counts(3), n_ring
 
@@ -191,13 +193,15 @@ contains
     self%n_row = counts(1)
     self%own = space%own_rows(self%n_row)
     call take_rows(self, active, 1, wider)
-    call mark_window(wider, space, mark)
+    if (present(within)) call take_rows(self, within, 1, around)
+    call mark_window(wider, space, mark, around)
     call find_edge(wider, mark, step, space, frontier)
     counts = [count(active), count(is_own(self, size(active, 1), frontier)), 0]
     call space%ranks%add_counts(counts)
     n_ring = number_of_rings(options, counts(1), counts(2))
     call take_rows(self, active, n_ring*(options%smoothings + 2) + 1, wider)
-    call mark_window(wider, space, mark)
+    if (present(within)) call take_rows(self, within, n_ring*(options%smoothings + 2) + 1, around)
+    call mark_window(wider, space, mark, around)
     call find_edge(wider, mark, step, space, frontier)
     call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
   end subroutine share_rings

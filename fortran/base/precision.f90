@@ -1,10 +1,11 @@
 !> Working precision and the constants every module shares.
 module hc_precision
   use, intrinsic :: iso_fortran_env, only: real32, real64
+  use, intrinsic :: iso_c_binding, only: c_bool
   implicit none
   private
 
-  public :: wp, sp, xp, pi
+  public :: wp, sp, xp, lk, pi
 
   !> Kind of every real in the library; every literal carries it.
   integer, parameter :: wp = real64
@@ -14,6 +15,9 @@ module hc_precision
 
   !> Kind of the few sums that cancel: thirty digits or more, or wp where there is none.
   integer, parameter :: xp = merge(selected_real_kind(30), wp, selected_real_kind(30) > 0)
+
+  !> Kind of the marks of nodes: a byte each.
+  integer, parameter :: lk = c_bool
 
   !> Circle constant.
   real(wp), parameter :: pi = 3.14159265358979323846_wp

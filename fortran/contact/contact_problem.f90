@@ -10,7 +10,7 @@
 !> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_rolling, only: rolling_t
@@ -312,7 +312,7 @@ contains
     type(contact_state_t), intent(inout) :: state
 
     real(wp), allocatable :: over_spacing(:, :, :)
-    real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2), wrong(1)
+    real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2)
     integer :: row, m, n_contact
     logical :: finite
 
@@ -351,12 +351,10 @@ contains
                all(ieee_is_finite(state%relative_displacement(:, row, :)))
     end do
     !$omp end parallel do
-    wrong = merge(0.0_wp, 1.0_wp, finite)
-    call self%space%most(wrong)
-    finite = .not. wrong(1) > 0.0_wp
+    finite = self%space%number(merge(0, 1, finite)) == 0
 
     state%load = self%resultants(state%pressure, state%traction)
-    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
+    state%residual_normal = normal_residual(state%pressure, state%gap, logical(self%candidate), self%normal_compliance, &
                                             self%space, self%normal_law)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
                                                     self%friction, self%tangential_compliance, self%space)

@@ -5,6 +5,7 @@ module hc_contact_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t
+  use hc_normal_problem, only: normal_problem_t
   use hc_contact_problem, only: friction_problem_t
   implicit none
   private
@@ -16,8 +17,8 @@ module hc_contact_solver
   contains
     !> One load step
     procedure(solve_step), deferred :: solve_step
-    !> Gap before loading
-    procedure(solver_gap), deferred :: copy_gap
+    !> The normal part of the problem: lattice, gap and candidates
+    procedure(solver_problem), deferred :: normal_part
   end type contact_solver_t
 
   !> A method of solving one with friction.
@@ -32,8 +33,9 @@ module hc_contact_solver
     procedure :: wear
     !> Another gap before loading
     procedure :: set_gap
+    procedure :: normal_part
     !> Gap before loading, without the wear
-    procedure :: copy_gap => copy_unworn_gap
+    procedure :: copy_gap
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure(solver_displacements), deferred :: displacements
   end type friction_solver_t
@@ -62,13 +64,12 @@ module hc_contact_solver
       type(error_t), allocatable, intent(out) :: error
     end subroutine solve_step
 
-    !> Copy the gap before loading.
-    pure subroutine solver_gap(self, gap)
-      import :: contact_solver_t, wp
-      class(contact_solver_t), intent(in) :: self
-      !> The gap (n_col, n_row) [m]
-      real(wp), intent(out), contiguous :: gap(:, :)
-    end subroutine solver_gap
+    !> Point to the normal part of the problem.
+    function solver_problem(self) result(problem)
+      import :: contact_solver_t, normal_problem_t
+      class(contact_solver_t), intent(in), target :: self
+      class(normal_problem_t), pointer :: problem
+    end function solver_problem
 
     !> Compute the relative displacements (w, u_x, u_y) of given tractions.
     subroutine solver_displacements(self, pressure, traction, displacement, error)
@@ -84,6 +85,13 @@ module hc_contact_solver
   end interface
 
 contains
+
+  function normal_part(self) result(problem)
+    class(friction_solver_t), intent(in), target :: self
+    class(normal_problem_t), pointer :: problem
+
+    problem => self%problem
+  end function normal_part
 
   !> Set the worn depth of the surfaces.
   subroutine wear(self, depth)
@@ -105,8 +113,9 @@ contains
   end subroutine set_gap
 
   !> Copy the gap before loading, without the wear.
-  pure subroutine copy_unworn_gap(self, gap)
+  pure subroutine copy_gap(self, gap)
     class(friction_solver_t), intent(in) :: self
+    !> The gap (n_col, n_row) [m]
     real(wp), intent(out), contiguous :: gap(:, :)
 
     if (allocated(self%unworn_gap)) then
@@ -114,6 +123,6 @@ contains
     else
       gap = self%problem%initial_gap
     end if
-  end subroutine copy_unworn_gap
+  end subroutine copy_gap
 
 end module hc_contact_solver

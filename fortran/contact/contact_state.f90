@@ -1,7 +1,7 @@
 !> The state of a contact: tractions, gap, zones, loads and rigid motions over a window.
 module hc_contact_state
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_rolling, only: rolling_t

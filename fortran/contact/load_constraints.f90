@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F4), (F14).
 module hc_load_constraints
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
   use hc_active_set, only: find_span
@@ -46,7 +46,7 @@ contains
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, own rows)
-    logical, intent(in) :: contact(size(problem%initial_gap, 1), size(problem%initial_gap, 2))
+    logical(lk), intent(in) :: contact(size(problem%initial_gap, 1), size(problem%initial_gap, 2))
     !> Nodes of each row, and the sum of their columns
     real(wp), dimension(size(contact, 2)) :: nodes, columns
     real(wp) :: middle(2), n_row, in_row, touching
@@ -207,7 +207,7 @@ contains
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
     real(wp) :: carried, error, factor, before, bounds(size(pressure))
-    logical, allocatable :: contact(:, :)
+    logical(lk), allocatable :: contact(:, :)
     integer :: k, try, n_contact
 
     overloads = .false.
@@ -264,7 +264,7 @@ contains
     real(wp), intent(inout) :: length(:)
     !> Least load factor so far
     real(wp), intent(inout) :: factor
-    real(wp) :: stiffness(size(load), size(load)), motion(size(load), 1), moved(size(bound), 2), longest(1)
+    real(wp) :: stiffness(size(load), size(load)), motion(size(load), 1), moved(size(bound), 2)
     integer :: i, k
 
     do k = 1, size(load)
@@ -285,9 +285,7 @@ contains
     end do
     length = norm2(moved, dim=2)
     factor = min(factor, space%total([dot_product(bound, length)]))
-    longest = maxval(length)
-    call space%most(longest)
-    length = max(length, least_length*longest(1))
+    length = max(length, least_length*space%largest(maxval(length)))
   end subroutine improve_motion
 
   !> Set the nodes that slip least to stick: without any, nothing resists a prescribed load.
@@ -300,7 +298,7 @@ contains
     real(wp), intent(inout), contiguous :: compliance(:)
     !> Zone of each node
     integer, intent(inout) :: zone(:)
-    logical :: slips(size(zone))
+    logical(lk) :: slips(size(zone))
     real(wp) :: low, high, middle
     integer :: i, n_slip
 
@@ -311,7 +309,7 @@ contains
     high = space%max(compliance, slips)
     do i = 1, 60
       middle = sqrt(low)*sqrt(high)
-      if (space%count(slips .and. compliance <= middle) < share*n_slip) then
+      if (space%count(logical(slips .and. compliance <= middle, lk)) < share*n_slip) then
         low = middle
       else
         high = middle

@@ -5,7 +5,7 @@
 !> Equations: docs/theory/conditions.md, (C1), (C2), (C5); docs/theory/normal_contact.md, (N2), (N6).
 module hc_normal_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
@@ -156,16 +156,18 @@ contains
     !> Pressure [Pa] and gap [m], row by row
     real(wp), intent(in), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: p, gap
     !> Nodes that may come into contact
-    logical, intent(in) :: candidate(size(self%initial_gap, 1), size(self%initial_gap, 2))
+    logical(lk), intent(in) :: candidate(size(self%initial_gap, 1), size(self%initial_gap, 2))
     !> The nodes; those of the smallest gap where the law calls for none
-    logical, intent(out) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
+    logical(lk), intent(out) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
+    logical :: touching(size(p, 1))
     real(wp) :: r, least
     integer :: row
 
     r = self%normal_classification_parameter(n_contact)
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(touching)
     do row = 1, size(p, 2)
-      call self%normal_law%find_contact(r, p(:, row), gap(:, row), candidate(:, row), contact(:, row))
+      call self%normal_law%find_contact(r, p(:, row), gap(:, row), logical(candidate(:, row)), touching)
+      contact(:, row) = touching
     end do
     !$omp end parallel do
     if (self%space%count(contact) > 0) return
@@ -181,7 +183,7 @@ contains
     !> Pressure [Pa] and gap [m], row by row
     real(wp), intent(in), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: p, gap
     !> Nodes in contact
-    logical, intent(in) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
+    logical(lk), intent(in) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
     !> Compliance [m/Pa] and offset [m] of the spring of each node, 0 off the contact
     real(wp), intent(out), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: compliance, offset
     type(tangent_t) :: tangent
@@ -190,7 +192,7 @@ contains
     tangent = tangent_t(r, self%softest_spring(self%space%max(abs(p))))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(p, 2)
-      call self%normal_law%linearize((row - 1)*size(p, 1) + 1, tangent, p(:, row), gap(:, row), contact(:, row), &
+      call self%normal_law%linearize((row - 1)*size(p, 1) + 1, tangent, p(:, row), gap(:, row), logical(contact(:, row)), &
                                      compliance(:, row), offset(:, row))
     end do
     !$omp end parallel do
@@ -201,8 +203,8 @@ contains
     !> Gap [m]
     real(wp), intent(in) :: gap(:)
     !> Nodes that may come into contact
-    logical, intent(in) :: candidate(:)
-    logical :: nodes(size(gap))
+    logical(lk), intent(in) :: candidate(:)
+    logical(lk) :: nodes(size(gap))
 
     nodes = candidate .and. gap <= minval(gap, mask=candidate)
   end function nearest_nodes
@@ -215,12 +217,12 @@ contains
     class(normal_problem_t), intent(in) :: self
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    logical, allocatable :: active(:)
+    logical(lk), allocatable :: active(:)
     !> Share of the overlap that the gap at the edge of a contact never exceeds: it is 2/pi for a cone, 1/2 for a sphere, and less
     !> for blunter bodies (Sneddon, Int. J. Eng. Sci. 3, 1965)
     real(wp), parameter :: edge_share = 0.65_wp
     real(wp), allocatable :: h(:)
-    logical, allocatable :: candidate(:)
+    logical(lk), allocatable :: candidate(:)
     real(wp) :: low, high, overlap, radius
     integer :: i
 
@@ -265,8 +267,8 @@ contains
     end do
     !$omp end parallel do
     state%load(normal) = self%lattice%cell_area()*self%space%sum(state%pressure)
-    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, self%space, &
-                                            self%normal_law)
+    state%residual_normal = normal_residual(state%pressure, state%gap, logical(self%candidate), self%normal_compliance, &
+                                            self%space, self%normal_law)
     state%residual_force = 0.0_wp
     if (target%control(normal) == force_control) then
       state%residual_force = force_residual(state%load(normal), target%value(normal))
@@ -277,7 +279,7 @@ contains
     if (state%converged) state%stopped = within_tolerance
     if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
     ! penetration without any pressure is infinite as well, but a state that can be shown
-    if (self%space%count(ieee_is_finite(state%pressure) .and. (ieee_is_finite(state%gap) .or. .not. self%candidate)) &
+    if (self%space%count(logical(ieee_is_finite(state%pressure) .and. (ieee_is_finite(state%gap) .or. .not. self%candidate), lk)) &
         == self%lattice%size()) return
     call raise(error, status%no_convergence, not_finite)
   end subroutine complete_pressed
@@ -287,17 +289,17 @@ contains
     class(normal_problem_t), intent(in) :: self
     !> State, with own rows of its pressure
     type(contact_state_t), intent(in) :: state
-    logical, allocatable :: rim(:, :)
+    logical(lk), allocatable :: rim(:, :)
 
     if (self%space%ranks%size == 1) then
       reaches_rim = touches_rim(state)
       return
     end if
-    allocate (rim(size(state%pressure, 1), size(state%pressure, 2)), source=.false.)
+    allocate (rim(size(state%pressure, 1), size(state%pressure, 2)), source=.false._lk)
     rim([1, size(rim, 1)], :) = .true.
     if (self%space%ranks%rank == 0) rim(:, 1) = .true.
     if (self%space%ranks%rank == self%space%ranks%size - 1) rim(:, size(rim, 2)) = .true.
-    reaches_rim = self%space%count(rim .and. state%pressure > 0.0_wp) > 0
+    reaches_rim = self%space%count(logical(rim .and. state%pressure > 0.0_wp, lk)) > 0
   end function reaches_rim
 
 end module hc_normal_problem

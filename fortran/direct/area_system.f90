@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F7), (F11) and "Direct method".
 module hc_area_system
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t, normal, along_x
   use hc_contact_problem, only: friction_problem_t
@@ -92,7 +92,7 @@ contains
       constraints%rows = area%resultant(:, determined)
       allocate (constraints%multiplier(size(determined)), source=0.0_wp)
       allocate (ax(n))
-      call new_active_set(nodes, spread(.true., 1, n), system%space)
+      call new_active_set(nodes, spread(.true._lk, 1, n), system%space)
       call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb, error)
       if (allocated(error)) return
       call constraints%satisfy(system%space, area%load(determined) - matmul(x, constraints%rows), x, solved)

@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N1), (N6).
 module hc_direct_contact
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: options_t
   use hc_lapack, only: dposv
@@ -37,7 +37,7 @@ module hc_direct_contact
     type(direct_contact_t), allocatable :: coarser
   contains
     procedure :: solve_step
-    procedure :: copy_gap
+    procedure :: normal_part
     !> Solve for a normal load or an approach
     procedure :: solve
   end type direct_contact_t
@@ -45,7 +45,7 @@ module hc_direct_contact
   !> A contact area with its pressure; over the nodes of the window.
   type :: pressed_area_t
     !> Nodes that may come into contact, active nodes
-    logical, allocatable :: candidate(:), active(:)
+    logical(lk), allocatable :: candidate(:), active(:)
     !> Initial gap, gap [m] and pressure, zero off the active nodes [Pa]
     real(wp), allocatable :: h(:), gap(:), p(:)
     !> Compliance [m/Pa] and offset [m] of the springs of a compliant law
@@ -102,13 +102,12 @@ contains
     end if
   end subroutine solve_step
 
-  !> Copy the gap before loading.
-  pure subroutine copy_gap(self, gap)
-    class(direct_contact_t), intent(in) :: self
-    real(wp), intent(out), contiguous :: gap(:, :)
+  function normal_part(self) result(problem)
+    class(direct_contact_t), intent(in), target :: self
+    class(normal_problem_t), pointer :: problem
 
-    gap = self%problem%initial_gap
-  end subroutine copy_gap
+    problem => self%problem
+  end function normal_part
 
   !> Solve for a normal load or an approach.
   recursive subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
@@ -148,7 +147,7 @@ contains
     area%candidate = reshape(self%problem%candidate, [n])
     allocate (area%p(n), area%gap(n), area%compliance(n), area%offset(n), source=0.0_wp)
     if (.not. self%problem%is_pressed(goal)) then
-      allocate (area%active(n), source=.false.)
+      allocate (area%active(n), source=.false._lk)
       area%approach = target
       if (control == force_control) area%approach = minval(area%h, mask=area%candidate)
     else if (present(start)) then
@@ -203,7 +202,7 @@ contains
         if (allocated(error)) return
         if (law%is_compliant()) then
           worst = 0.0_wp
-          call law%violation(1, self%problem%normal_compliance, area%p, area%gap, area%candidate, worst)
+          call law%violation(1, self%problem%normal_compliance, area%p, area%gap, logical(area%candidate), worst)
           if (worst <= options%final_accuracy*tolerance*maxval(area%p)) return
           n_active = count(area%active)
           call self%problem%find_contact(n_active, area%p, area%gap, area%candidate, area%active)
@@ -229,7 +228,7 @@ contains
     !> Active sets that may be tried
     integer, intent(in) :: max_sweeps
     !> First guess of the contact area; then the better one, if there is one
-    logical, intent(inout) :: active(:)
+    logical(lk), intent(inout) :: active(:)
     !> A start is of use only: without the coarse one the first guess serves
     type(error_t), allocatable :: error
     type(direct_contact_t), allocatable :: coarser
@@ -267,7 +266,7 @@ contains
     !> Those that are left; all of them at the start
     integer, intent(inout) :: left
     !> Active nodes
-    logical, intent(inout) :: active(:)
+    logical(lk), intent(inout) :: active(:)
     integer :: last
 
     if (count(wrong) < fewest) then

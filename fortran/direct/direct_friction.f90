@@ -373,7 +373,7 @@ contains
       if (allocated(error)) return
       if (self%problem%normal_law%is_compliant()) then
         violation = 0.0_wp
-        call self%problem%normal_law%violation(1, self%problem%normal_compliance, it%p, it%gap, it%candidate, violation)
+        call self%problem%normal_law%violation(1, self%problem%normal_compliance, it%p, it%gap, logical(it%candidate), violation)
         if (violation <= self%problem%options%direct%settled_spring*maxval(it%p)) return
         cycle
       end if

@@ -2,7 +2,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F5) to (F8).
 module hc_direct_iterate
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, load_step_t, separated, stick, slip, normal, along_x, n_motion, &
@@ -20,7 +20,7 @@ module hc_direct_iterate
   !> An iterate; over the nodes of the window.
   type :: direct_iterate_t
     !> Nodes that may come into contact, nodes in contact
-    logical, allocatable :: candidate(:), contact(:)
+    logical(lk), allocatable :: candidate(:), contact(:)
     !> Initial gap (n) and relative displacement at the beginning of the step (n, 2) [m]
     real(wp), allocatable :: initial_gap(:), reference(:, :)
     !> Pressure (n) and shear traction (n, 2) [Pa]

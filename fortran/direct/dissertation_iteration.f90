@@ -138,7 +138,8 @@ contains
       else if (shrinks) then
         return
       else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then
-        wider = it%candidate .and. reshape(problem%lattice%dilated(reshape(it%contact, problem%lattice%extent)), [size(it%p)])
+        wider = it%candidate &
+                .and. reshape(problem%lattice%dilated(logical(reshape(it%contact, problem%lattice%extent))), [size(it%p)])
         where (wider .and. .not. it%contact) it%zone = stick
         it%contact = wider
       else

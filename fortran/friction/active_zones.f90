@@ -2,7 +2,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_contact_state, only: separated, stick, slip, n_motion, force_control
   use hc_active_set, only: active_set_t, find_span
   use hc_frame_rows, only: plane_row
@@ -52,7 +52,7 @@ contains
     !> Fix some nodes in stick where none sticks
     logical, intent(in) :: fixing
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
-    logical, allocatable, intent(out) :: active(:)
+    logical(lk), allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy, bound, ahead, aside
     real(wp) :: r, p_max, soft
@@ -81,8 +81,9 @@ contains
         from = from + low - 1
         associate (m => to - from + 1)
           call now%slip_row(row, low, dsx(:m), dsy(:m))
-          call friction%linearize(from, p_max, r, now%contact(from:to), now%p(from:to), now%q(from:to), now%q(n + from:n + to), &
-                                  dsx(:m), dsy(:m), zone(from:to), direction(:, from:to), compliance(from:to))
+          call friction%linearize(from, p_max, r, logical(now%contact(from:to)), now%p(from:to), now%q(from:to), &
+                                  now%q(n + from:n + to), dsx(:m), dsy(:m), zone(from:to), direction(:, from:to), &
+                                  compliance(from:to))
         end associate
       end do
       !$omp end parallel do

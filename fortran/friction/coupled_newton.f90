@@ -19,7 +19,7 @@
 !>
 !> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
@@ -65,7 +65,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(coupled_step_t), target :: step
-    logical, allocatable :: shear_active(:)
+    logical(lk), allocatable :: shear_active(:)
     real(wp), allocatable :: missing(:)
 
     ! 1.
@@ -107,9 +107,9 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Components of the shear traction that are unknown (2 n)
-    logical, allocatable, intent(out) :: shear_active(:)
+    logical(lk), allocatable, intent(out) :: shear_active(:)
     real(wp), allocatable :: gap(:)
-    logical, allocatable :: contact(:)
+    logical(lk), allocatable :: contact(:)
 
     call now%find_gap(gap)
     allocate (contact(size(gap)))
@@ -126,7 +126,7 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
     !> Components of the shear traction that are unknown (2 n)
-    logical, intent(in), contiguous :: shear_active(:)
+    logical(lk), intent(in), contiguous :: shear_active(:)
     !> The step
     type(coupled_step_t), intent(inout) :: step
     real(wp), dimension(:), allocatable :: ahead, aside, bound
@@ -170,7 +170,7 @@ contains
     !> Tractions and motions
     type(friction_iterate_t), intent(in) :: now
     !> Components of the shear traction that are unknown (2 n); freed
-    logical, allocatable, intent(inout) :: shear_active(:)
+    logical(lk), allocatable, intent(inout) :: shear_active(:)
     !> The step
     type(coupled_step_t), intent(inout), target :: step
     integer :: n
@@ -236,7 +236,7 @@ contains
     real(wp), allocatable :: rhs(:), unknown(:), kept(:)
     type(active_set_t) :: fixed
     real(wp) :: residual, p_max
-    integer :: n, n_active(1)
+    integer :: n
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -267,10 +267,8 @@ contains
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       if (step%determined()) deallocate (now%p, now%q)
       residual = min(residual, 1.0_wp)
-      n_active = step%nodes%n_active
-      call system%space%ranks%add_counts(n_active)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
-                                options%final_accuracy*now%tolerance)*real(n_active(1), wp)**0.25_wp
+                                options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
       call pack_unknowns(step, unknown, fixed, kept)
@@ -330,7 +328,7 @@ contains
     call step%nodes%pack(step%x, unknown)
     call step%system%space%fill(zero, 0.0_wp)
     call step%nodes%unpack(zero, step%x)
-    call new_active_set(fixed, abs(step%x) > 0.0_wp, step%system%space)
+    call new_active_set(fixed, logical(abs(step%x) > 0.0_wp, lk), step%system%space)
     allocate (kept(fixed%n_active))
     call fixed%pack(step%x, kept)
     deallocate (step%x)

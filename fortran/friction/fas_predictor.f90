@@ -51,7 +51,7 @@ contains
     if (size(coarse) == 0) return
     model = coarse(1)
     call restrict_state(problem, start, model, before)
-    if (model%space%count(before%pressure > 0.0_wp) < problem%options%multilevel%least_contact) return
+    if (model%space%count_positive(before%pressure) < problem%options%multilevel%least_contact) return
 
     allocate (displacement(model%lattice%extent(1), model%own_rows(), 3))
     operators(1)%flexibility%applications = 0.0_wp

@@ -6,7 +6,7 @@
 !> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
@@ -39,7 +39,7 @@ module hc_friction_iterate
     !> Bound of the error of these displacements off the contact by directions of single precision [m]
     real(wp) :: rounding = 0.0_wp
     !> Nodes in contact
-    logical, allocatable :: contact(:)
+    logical(lk), allocatable :: contact(:)
     !> Approach, shifts and twist
     real(wp) :: motion(n_motion) = 0.0_wp
     real(wp) :: residual_normal = 1.0_wp, residual_tangential = 1.0_wp
@@ -57,8 +57,8 @@ module hc_friction_iterate
     !> Initial gap; relative displacement at the beginning of the step
     real(wp), pointer, contiguous :: h(:) => null(), origin(:) => null()
     !> Nodes that may touch: those of the problem, or the ones among them where the bodies would overlap
-    logical, pointer, contiguous :: candidate(:) => null()
-    logical, allocatable :: reached(:)
+    logical(lk), pointer, contiguous :: candidate(:) => null()
+    logical(lk), allocatable :: reached(:)
     !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
     logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
     !> Factor of the classification parameter: smaller under strong coupling and where nodes are fixed in stick
@@ -428,7 +428,7 @@ contains
   !> Return whether all tractions and motions are finite numbers.
   logical function is_finite(self)
     class(friction_iterate_t), intent(in) :: self
-    real(wp) :: rest, wrong(1)
+    real(wp) :: rest
     integer :: n, i
 
     n = size(self%p)
@@ -439,9 +439,7 @@ contains
       rest = rest + (self%p(i) - self%p(i)) + (self%q(i) - self%q(i)) + (self%q(n + i) - self%q(n + i))
     end do
     !$omp end parallel do simd
-    wrong = merge(0.0_wp, 1.0_wp, abs(rest) <= 0.0_wp)
-    call self%operators%space%most(wrong)
-    is_finite = all(ieee_is_finite(self%motion)) .and. .not. wrong(1) > 0.0_wp
+    is_finite = self%operators%space%number(merge(0, 1, abs(rest) <= 0.0_wp)) == 0 .and. all(ieee_is_finite(self%motion))
   end function is_finite
 
   !> Compute R_n of a gap under the present pressure.
@@ -455,7 +453,7 @@ contains
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate
-    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space, &
+    gap_residual = normal_residual(p, g, logical(self%problem%candidate), self%problem%normal_compliance, self%operators%space, &
                                    self%problem%normal_law)
   end function gap_residual
 

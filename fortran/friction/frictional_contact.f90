@@ -125,7 +125,7 @@ contains
     integer(long) :: given
 
     ! initial gap, candidates
-    given = 12*int(extent(1), long)*extent(2)
+    given = 9*int(extent(1), long)*extent(2)
     frictional_contact_memory = given + operators_memory(extent, threads, n_spectrum, .false., periodic) &
                                 + (given + operators_memory(extent, threads, n_spectrum, .true., periodic))/3
   end function frictional_contact_memory
@@ -141,8 +141,8 @@ contains
     !> Pressure and shear move each other
     logical, intent(in) :: coupled
     integer, parameter :: long = selected_int_kind(18)
-    !> Bytes of a field of numbers, and of logical values or in single precision
-    integer, parameter :: field = 8, half = 4
+    !> Bytes of a field of numbers, in single precision, and of marks
+    integer, parameter :: field = 8, half = 4, mark = 1
     integer(long) :: n, everywhere, inside, n_shear, directions
     type(newton_options_t) :: options
 
@@ -151,7 +151,7 @@ contains
     ! all that GMRES may store but one, since mostly a few are enough
     directions = options%max_directions - 1
     ! iterate; shear system
-    everywhere = 6*field + half + 3*field
+    everywhere = 6*field + mark + 3*field
     ! packed: traction estimates; weights of the preconditioner of the shear traction, its vectors in the frames; its fields
     ! are in the memory of the transforms
     inside = (1 + 2*n_shear)*half + 2*half + 2*field

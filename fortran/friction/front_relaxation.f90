@@ -55,7 +55,7 @@ contains
     if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return
     if (now%operators%space%count(now%contact) < options%front_nodes) return
     call find_fronts(now, options%front_rings, fronts%node)
-    if (now%operators%space%count([(.true., pass=1, size(fronts%node, 2))]) == 0) return
+    if (now%operators%space%number(size(fronts%node, 2)) == 0) return
     call describe(now, fronts)
     associate (extent => now%problem%own_extent())
       q(1:extent(1), 1:extent(2), 1:2) => now%q
@@ -226,7 +226,7 @@ contains
     allocate (around(size(q, 1), wanted(1):wanted(2), 2))
     around(:, own(1):own(2), :) = q
     call relax(problem, fronts, backwards, q, u, changed)
-    changed = problem%space%count([changed]) > 0
+    changed = problem%space%number(merge(1, 0, changed)) > 0
     if (.not. changed) return
     do m = 1, 2
       change = q(:, :, m) - around(:, own(1):own(2), m)

@@ -227,7 +227,7 @@ contains
   real(wp) function cut_off(now, state)
     type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(in) :: state
-    real(wp) :: largest, total, less, displaced, most(1)
+    real(wp) :: largest, total, less, displaced
     integer :: n, row, col, i
 
     n = size(now%p)
@@ -245,9 +245,7 @@ contains
       end do
     end do
     !$omp end parallel do
-    most = largest
-    call now%operators%space%most(most)
-    largest = most(1)
+    largest = now%operators%space%largest(largest)
     total = now%operators%space%total([total])
     displaced = 2.0_wp*now%problem%medium%largest_point(now%problem%lattice%spacing()) &
                 *sqrt(pi*now%problem%lattice%cell_area()*total*largest) + now%rounding

@@ -8,7 +8,7 @@
 module hc_shared_friction
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, raise, status
   use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
@@ -164,9 +164,9 @@ contains
   subroutine deal_mask(self, field, own)
     class(shared_friction_t), intent(in) :: self
     !> Mask (n_col, n_row); on ranks but the first one absent
-    logical, intent(in), contiguous, optional, target :: field(:, :)
+    logical(lk), intent(in), contiguous, optional, target :: field(:, :)
     !> Rows of this rank (n_col, rows)
-    logical, intent(out), contiguous, target :: own(:, :)
+    logical(lk), intent(out), contiguous, target :: own(:, :)
     integer, target :: none(1)
 
     if (present(field)) then

@@ -11,7 +11,7 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
@@ -94,7 +94,7 @@ contains
       self%compliance(i) = 0.0_wp
     end do
     !$omp end parallel do
-    call new_active_set(self%nodes, spread(.true., 1, n), self%space)
+    call new_active_set(self%nodes, spread(.true._lk, 1, n), self%space)
   end subroutine reset_frames
 
   !> Free frames and compliances.
@@ -108,7 +108,7 @@ contains
   subroutine set_contact(self, contact)
     class(shear_system_t), intent(inout), target :: self
     !> Nodes in contact (n)
-    logical, intent(in), contiguous :: contact(:)
+    logical(lk), intent(in), contiguous :: contact(:)
 
     if (.not. self%nodes%is_set(contact)) call new_active_set(self%nodes, contact, self%space)
     call self%operators%tangential%set_active(contact, self%compliance, self%direction)
@@ -198,7 +198,6 @@ contains
     !> Rounding error of the displacements [m]: very soft springs stretch by so much that the displacements of the nodes are
     !> lost in it
     real(wp), intent(out) :: rounding
-    real(wp) :: largest(1)
     integer :: n, k, from, to
 
     n = size(self%compliance)
@@ -212,9 +211,7 @@ contains
       call turn_row(to - from + 1, self%direction(:, from:to), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
-    largest = rounding
-    call self%space%most(largest)
-    rounding = epsilon(1.0_wp)*largest(1)
+    rounding = epsilon(1.0_wp)*self%space%largest(rounding)
   end subroutine leave_frames
 
   !> Turn components along x and y to those along t and e, or back, at the nodes in contact: a reflection, which is its own

@@ -21,7 +21,7 @@
 !>
 !> The tolerance of linear problems is loose while the sets change; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_memory, only: give_back
   use hc_options, only: newton_options_t
@@ -102,7 +102,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     real(wp), allocatable :: gap(:)
-    logical, allocatable :: contact(:)
+    logical(lk), allocatable :: contact(:)
     type(newton_options_t) :: options
     integer :: area, n_contact
     logical :: changed, searching, estimated, accurate
@@ -313,7 +313,7 @@ contains
     type(active_set_t), intent(out) :: loaded
     !> The traction there [Pa]
     real(wp), allocatable, intent(out) :: before(:)
-    logical :: active(size(now%p))
+    logical(lk) :: active(size(now%p))
     integer :: n
 
     n = size(now%p)
@@ -349,7 +349,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: nodes
-    logical, allocatable :: active(:)
+    logical(lk), allocatable :: active(:)
     integer :: n, try
 
     n = size(now%p)
@@ -525,7 +525,7 @@ contains
       call new_packed_fields(now%punch_pressure, nodes, size(mb, 2), now%pressure%space)
       do k = 1, size(mb, 2)
         call now%pressure%space%fill(pressure, 0.0_wp)
-        column = mb(:, k)
+        column(:) = mb(:, k)
         call nodes%unpack(column, pressure)
         call now%punch_pressure%keep(k, pressure)
       end do
@@ -577,8 +577,10 @@ contains
     if (size(mb, 2) == 0) return
     call now%shear%take_image(2*n, own, plane, stat)
     if (stat == 0) allocate (column(size(mb, 1)), stat=stat)
-    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
-    if (allocated(error)) return
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+      return
+    end if
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)
@@ -587,7 +589,7 @@ contains
         mb(:, k) = real(column, sp)
       else
         call now%shear%space%fill(plane, 0.0_wp)
-        column = mb(:, k)
+        column(:) = mb(:, k)
         call now%shear%put_in_plane(nodes%pairs, column(:n_t), column(n_t + 1:), plane)
         call now%rigid_traction%keep(k, plane)
       end if

@@ -5,7 +5,7 @@
 !>
 !> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_options, only: options_t
@@ -23,7 +23,7 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_target, normal, force_control
   use hc_contact_solver, only: contact_solver_t
   use hc_normal_law, only: normal_law_t, tangent_t
-  use hc_normal_problem, only: new_normal_problem
+  use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
@@ -59,7 +59,7 @@ module hc_normal_contact
     type(communicator_t) :: ranks
   contains
     procedure :: solve_step
-    procedure :: copy_gap
+    procedure :: normal_part
     !> Solve for a normal load or an approach
     procedure :: solve
   end type normal_contact_t
@@ -107,6 +107,7 @@ contains
     do l = 2, size(self%level)
       call self%level(l - 1)%coarsen(self%level(l))
     end do
+    call free_coarse_gaps(self)
     do l = 1, size(self%level)
       ! operators for iterations on the finest lattice are set up on demand: a part of it may be enough
       call self%level(l)%prepare(self%kernel, l == 1, l > 1, space_of(self, self%level(l)%lattice), error, self%cache)
@@ -123,8 +124,8 @@ contains
     !> The window repeats
     logical, intent(in) :: periodic
     integer, parameter :: long = selected_int_kind(18)
-    !> Bytes of a field of numbers, and of logical values or in single precision
-    integer, parameter :: field = 8, half = 4
+    !> Bytes of a field of numbers, in single precision, and of marks
+    integer, parameter :: field = 8, half = 4, mark = 1
     integer(long) :: n, exact, each
 
     n = int(extent(1), long)*extent(2)
@@ -132,23 +133,22 @@ contains
     exact = fft_memory(extent, .true., threads, shared=.true., periodic=periodic)
     ! on all lattices: the inverse symbol, buffers; gap, candidates
     each = preconditioner_memory(extent, threads, .false., shared=.true.) &
-           + convolution_memory(extent, padded_length(extent, periodic), 0, 0, threads) + n*(field + half)
+           + convolution_memory(extent, padded_length(extent, periodic), 0, 0, threads) + n*(field + mark)
     normal_contact_memory = each + exact + (each + merge(exact, exact/2, periodic))/3
     ! on the finest: row transforms in single precision, beside them those in double precision or two fields, and a third one
     associate (rows => transform_memory(extent, padded_length(extent, periodic), 1))
       normal_contact_memory = normal_contact_memory + rows + max(rows, 2*half*n) + half*n
     end associate
-    ! pressure, closing; direction, punch, zones now and next, marks about the edge of the contact
-    normal_contact_memory = normal_contact_memory + n*(2*field + 6*half)
+    ! pressure, closing; direction, punch, places about the edge of the contact; zones now and next
+    normal_contact_memory = normal_contact_memory + n*(2*field + 3*half + 2*mark)
   end function normal_contact_memory
 
-  !> Copy the gap before loading.
-  pure subroutine copy_gap(self, gap)
-    class(normal_contact_t), intent(in) :: self
-    real(wp), intent(out), contiguous :: gap(:, :)
+  function normal_part(self) result(problem)
+    class(normal_contact_t), intent(in), target :: self
+    class(normal_problem_t), pointer :: problem
 
-    gap = self%level(1)%initial_gap
-  end subroutine copy_gap
+    problem => self%level(1)
+  end function normal_part
 
   !> Solve a load step, of which the normal load or the approach matters.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
@@ -195,6 +195,9 @@ contains
     if (allocated(error)) return
     goal = load_target_t([control], [target])
     work = 0.0_wp
+    do l = 2, size(self%level)
+      call self%level(l - 1)%coarsen_gap(self%level(l))
+    end do
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
         if (level%space%count(level%candidate) == 0) cycle
@@ -226,6 +229,7 @@ contains
             deallocate (passing)
           end if
           coarse = contact_state_t()
+          call free_coarse_gaps(self)
           call solve_finest(self, goal, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
         end if
@@ -237,6 +241,16 @@ contains
     call self%scratch%free()
     call give_back(self%level(1)%own_size())
   end subroutine solve
+
+  !> Free the gaps of the coarse lattices, whose memory set-up and iterations on the finest one take; each load finds them anew.
+  subroutine free_coarse_gaps(self)
+    class(normal_contact_t), intent(inout) :: self
+    integer :: l
+
+    do l = 2, size(self%level)
+      deallocate (self%level(l)%initial_gap)
+    end do
+  end subroutine free_coarse_gaps
 
   !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.
   pure logical function is_smooth(level, p_max)

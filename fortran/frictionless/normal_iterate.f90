@@ -3,7 +3,7 @@
 !> Equations: docs/theory/normal_contact.md, (N2) to (N6).
 module hc_normal_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
@@ -35,7 +35,7 @@ module hc_normal_iterate
     !> Estimate of the pressure of a rigid punch over the active nodes: M times one; zero off them
     real(sp), allocatable :: punch(:, :)
     real(wp) :: punch_sum = 0.0_wp
-    logical, allocatable :: active(:, :)
+    logical(lk), allocatable :: active(:, :)
     !> Columns between which the active nodes of each row lie, now and before: no pressure outside
     integer, allocatable :: span(:, :)
     real(wp) :: approach = 0.0_wp
@@ -137,9 +137,9 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in), contiguous :: candidate(:, :)
+    logical(lk), intent(in), contiguous :: candidate(:, :)
     !> Nodes that pressure and gap call for (n_col, n_row)
-    logical, intent(out), contiguous :: next(:, :)
+    logical(lk), intent(out), contiguous :: next(:, :)
     !> The new set is another one
     logical, intent(out) :: changed
     !> Allocated on failure: a pressure or a gap that is not a finite number
@@ -194,10 +194,11 @@ contains
     integer, intent(in) :: row
     !> Classification parameter [Pa/m]
     real(wp), intent(in) :: r
-    logical, intent(in), contiguous :: candidate(:)
-    logical, intent(out), contiguous :: next(:)
+    logical(lk), intent(in), contiguous :: candidate(:)
+    logical(lk), intent(out), contiguous :: next(:)
     !> Residuals and numbers of nodes
     type(classification_t), intent(out) :: found
+    logical, dimension(size(next)) :: possible, called_for
     real(wp) :: gap(size(next)), left(size(next))
     integer :: first
 
@@ -206,10 +207,12 @@ contains
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
     found%finite = all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
     if (.not. found%finite) return
-    call level%normal_law%find_contact(r, now%p(:, row), gap, candidate, next)
-    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, candidate, found%worst)
+    possible = candidate
+    call level%normal_law%find_contact(r, now%p(:, row), gap, possible, called_for)
+    next = called_for
+    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, possible, found%worst)
     call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, &
-                                    candidate .and. (next .neqv. now%active(:, row)), found%worst_changed)
+                                    possible .and. (called_for .neqv. now%active(:, row)), found%worst_changed)
     found%p_max = max(0.0_wp, maxval(now%p(:, row)))
     found%worst_active = max(0.0_wp, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
     found%n_next = count(next)
@@ -266,9 +269,9 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(inout), target :: now
     !> The new set; on return the old one
-    logical, allocatable, intent(inout) :: next(:, :)
-    logical, allocatable :: swap(:, :)
-    logical, pointer, contiguous :: active(:)
+    logical(lk), allocatable, intent(inout) :: next(:, :)
+    logical(lk), allocatable :: swap(:, :)
+    logical(lk), pointer, contiguous :: active(:)
     integer :: row
 
     call move_alloc(now%active, swap)
@@ -288,7 +291,7 @@ contains
     if (.not. allocated(now%punch)) return
     now%punch_sum = level%space%sum(now%punch)
     ! nodes that came back are not in it
-    if (2*level%space%count(now%punch > 0.0_sp) < now%n_active) deallocate (now%punch)
+    if (2*level%space%count(logical(now%punch > 0.0_sp, lk)) < now%n_active) deallocate (now%punch)
   end subroutine set_active
 
   !> Find the columns between which the active nodes of each row lie, those of earlier sets included.
@@ -430,7 +433,7 @@ contains
     !> Iterate, whose pressure is the one to start from, up to a factor
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
+    logical(lk), intent(in) :: candidate(:, :)
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: scale, largest
@@ -459,7 +462,7 @@ contains
       now = normal_iterate_t()                                                 ! fields that did fit
       return
     end if
-    known = level%space%count(now%p > 0.0_wp .and. candidate) > 0
+    known = level%space%count(logical(now%p > 0.0_wp .and. candidate, lk)) > 0
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, n(2)
       now%active(:, row) = candidate(:, row)

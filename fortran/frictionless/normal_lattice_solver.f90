@@ -21,7 +21,7 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N2) to (N8).
 module hc_normal_lattice_solver
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
@@ -102,8 +102,8 @@ contains
         ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from mean planes it
         ! closes it, and layers bulge
         everywhere = level%lattice%is_periodic() .or. .not. level%medium%trace() > 0.0_wp
-        call iterate(level, now, level%candidate .and. (level%initial_gap < now%target .or. everywhere), &
-                     tolerance, max_sweeps, state%sweeps, error)
+        call iterate(level, now, logical(level%candidate .and. (level%initial_gap < now%target .or. everywhere), lk), tolerance, &
+                     max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return
@@ -136,7 +136,7 @@ contains
     !> Its pressure is the start, up to a factor; on return the solution
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in), contiguous :: candidate(:, :)
+    logical(lk), intent(in), contiguous :: candidate(:, :)
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
     !> Iterations made
@@ -145,7 +145,7 @@ contains
 
     type(progress_t) :: progress
     type(conjugate_gradient_t) :: recurrence
-    logical, allocatable :: next(:, :)
+    logical(lk), allocatable :: next(:, :)
     real(wp) :: share
     logical :: changed, compliant, anew, corrected, follows
 
@@ -265,7 +265,7 @@ contains
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
       ! without tension, or after it was taken away
-      found = level%space%count(now%p < 0.0_wp) == 0
+      found = level%space%count(logical(now%p < 0.0_wp, lk)) == 0
       if (found .or. progress%step == searched .or. progress%emptied) then
         call search_step(level, now, progress, found)
       end if

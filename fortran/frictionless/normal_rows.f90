@@ -2,7 +2,7 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N2) to (N5).
 module hc_normal_rows
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   implicit none
   private
 
@@ -37,8 +37,8 @@ contains
     type(limits_t), intent(in) :: limits
     !> Gap of the undeformed bodies, pressure and the closing of the gap
     real(wp), intent(in), contiguous :: initial_gap(:), pressure(:), closing(:)
-    logical, intent(in), contiguous :: candidate(:), active(:)
-    logical, intent(out), contiguous :: next(:)
+    logical(lk), intent(in), contiguous :: candidate(:), active(:)
+    logical(lk), intent(out), contiguous :: next(:)
     !> Residuals and numbers of nodes
     type(classification_t), intent(out) :: found
     real(wp) :: gap(size(next)), rest, p_max, worst, worst_active
@@ -80,7 +80,7 @@ contains
     integer, intent(in) :: n
     !> Inverse of the unit of r [1/m], approach, gap of the undeformed bodies and its closing [m]
     real(wp), intent(in) :: scale, approach, initial_gap(n), closing(n)
-    logical, intent(in) :: active(n)
+    logical(lk), intent(in) :: active(n)
     real(sp), intent(inout) :: r(n)
     !> Lowest number of single precision: the gap may be infinite where nothing can touch
     real(wp), parameter :: lowest = -huge(1.0_sp)
@@ -103,7 +103,7 @@ contains
     !> Number of nodes
     integer, intent(in) :: n
     real(sp), intent(in) :: field(n)
-    logical, intent(in) :: active(n)
+    logical(lk), intent(in) :: active(n)
     !> The sum
     real(wp), intent(out) :: total
     real(sp), intent(in), optional :: other(n)
@@ -129,7 +129,7 @@ contains
     !> Unit of d and z [Pa], and pressure [Pa]
     real(wp), intent(in) :: unit
     real(wp), intent(in), contiguous :: pressure(:)
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     !> The direction
     real(sp), intent(out), contiguous :: d(:)
     !> Sum of p + d
@@ -172,7 +172,7 @@ contains
     integer, intent(in) :: n
     !> Share of the last direction, and the preconditioned residual
     real(sp), intent(in) :: back, z(n)
-    logical, intent(in) :: active(n)
+    logical(lk), intent(in) :: active(n)
     real(sp), intent(inout) :: d(n)
     integer :: carries(n), col
 

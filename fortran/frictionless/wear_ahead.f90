@@ -9,7 +9,7 @@
 !>
 !> Equations: docs/theory/wear.md, (V3), (V4).
 module hc_wear_ahead
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -90,7 +90,7 @@ contains
 
     ahead = now%energy
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
-    if (problem%space%count(now%candidate .and. before > 0.0_wp) == 0) return
+    if (problem%space%count(logical(now%candidate .and. before > 0.0_wp, lk)) == 0) return
     spring = merge(wear*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
     call settle(now, problem, before, spring, tolerance, after, error, cache)
     if (allocated(error)) return
@@ -145,7 +145,7 @@ contains
     if (allocated(error)) return
     closing = closing + layer*before
     ! the gap under `before` is that of the cycle, 0 where nodes carry
-    lift = problem%space%max(closing, now%candidate)
+    lift = problem%space%max(closing, logical(now%candidate, lk))
     level%initial_gap = lift - closing
     do row = 1, size(before, 2)
       do col = 1, size(before, 1)

@@ -5,7 +5,7 @@
 !> values, do not depend on the number of ranks, either.
 module hc_field_space
   use, intrinsic :: iso_c_binding, only: c_loc
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_communicator, only: communicator_t
   use hc_scratch, only: scratch_t
   !$ use omp_lib, only: omp_get_max_threads
@@ -47,7 +47,7 @@ module hc_field_space
     generic :: count => count_nodes, count_window
     procedure :: count_positive
     !> Sum of values by row; largest values, in place
-    procedure :: total, most
+    procedure :: total, most, largest, number
     !> First and last row of this rank, and the size of its part of a field
     procedure :: own_rows, own_extent
     !> Rows of a field over the window, wherever they lie
@@ -113,7 +113,7 @@ contains
 
   !> Return the largest of a value of all ranks.
   real(wp) function largest(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     real(wp), intent(in) :: value
     real(wp) :: values(1)
 
@@ -124,7 +124,7 @@ contains
 
   !> Return the sum of a count of all ranks.
   integer function number(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     integer, intent(in) :: value
     integer :: values(1)
 
@@ -192,15 +192,14 @@ contains
   subroutine fetch_mask(self, n_row, own, first, values)
     class(field_space_t), intent(in) :: self
     integer, intent(in) :: n_row
-    logical, intent(in), contiguous, target :: own(:, :)
+    logical(lk), intent(in), contiguous :: own(:, :)
     integer, intent(in) :: first
-    logical, intent(out), contiguous, target :: values(:, :)
+    logical(lk), intent(out), contiguous :: values(:, :)
+    real(sp) :: rows(size(values, 1), size(values, 2))
 
-    if (self%ranks%size == 1) then
-      values = own(:, first:first + size(values, 2) - 1)
-    else
-      call self%ranks%fetch(size(own, 1), n_row, c_loc(own), [first, first + size(values, 2) - 1], c_loc(values))
-    end if
+    ! a row of bytes is no number of words, which ranks exchange
+    call self%fetch(n_row, merge(1.0_sp, 0.0_sp, own), first, rows)
+    values = rows > 0.5_sp
   end subroutine fetch_mask
 
   !> Set x <- value.
@@ -289,7 +288,7 @@ contains
     !> Vector
     real(wp), intent(in), contiguous :: x(:)
     !> True on the nodes of the set
-    logical, intent(in), contiguous :: nodes(:)
+    logical(lk), intent(in), contiguous :: nodes(:)
     integer :: i
 
     vector_max_on = -huge(1.0_wp)
@@ -307,7 +306,7 @@ contains
     !> Field (n_col, n_row)
     real(wp), intent(in), contiguous :: x(:, :)
     !> True on the nodes of the set (n_col, n_row)
-    logical, intent(in), contiguous :: nodes(:, :)
+    logical(lk), intent(in), contiguous :: nodes(:, :)
     integer :: row
 
     window_max_on = -huge(1.0_wp)
@@ -325,7 +324,7 @@ contains
     !> Vector
     real(wp), intent(in), contiguous :: x(:)
     !> True on the nodes of the set
-    logical, intent(in), contiguous :: nodes(:)
+    logical(lk), intent(in), contiguous :: nodes(:)
     integer :: i
 
     vector_min = huge(1.0_wp)
@@ -343,7 +342,7 @@ contains
     !> Field (n_col, n_row)
     real(wp), intent(in), contiguous :: x(:, :)
     !> True on the nodes of the set (n_col, n_row)
-    logical, intent(in), contiguous :: nodes(:, :)
+    logical(lk), intent(in), contiguous :: nodes(:, :)
     integer :: row
 
     window_min = huge(1.0_wp)
@@ -375,7 +374,7 @@ contains
   integer function count_window(self, nodes)
     class(field_space_t), intent(in) :: self
     !> True on the nodes of the set (n_col, n_row)
-    logical, intent(in), contiguous :: nodes(:, :)
+    logical(lk), intent(in), contiguous :: nodes(:, :)
     integer :: row
 
     count_window = 0
@@ -407,7 +406,7 @@ contains
   integer function count_nodes(self, nodes)
     class(field_space_t), intent(in) :: self
     !> Vector, true on the nodes of the set
-    logical, intent(in), contiguous :: nodes(:)
+    logical(lk), intent(in), contiguous :: nodes(:)
     integer :: i
 
     count_nodes = 0
@@ -457,7 +456,7 @@ contains
     !> Field (n_col, n_row)
     real(wp), intent(in), contiguous :: x(:, :)
     !> True on the nodes of the set (n_col, n_row)
-    logical, intent(in), contiguous :: nodes(:, :)
+    logical(lk), intent(in), contiguous :: nodes(:, :)
     real(wp) :: part(size(x, 2))
     integer :: row
 

@@ -4,7 +4,7 @@
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_hierarchy
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_communicator, only: rows_held
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
@@ -21,7 +21,7 @@ module hc_hierarchy
     !> Initial gap (n_col, own rows) [m]
     real(wp), allocatable :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, own rows)
-    logical, allocatable :: candidate(:, :)
+    logical(lk), allocatable :: candidate(:, :)
     !> Space of the fields
     type(field_space_t) :: space
   contains
@@ -82,7 +82,7 @@ contains
     !> The problem there
     class(level_t), intent(inout) :: coarse
 
-    logical, allocatable :: rows(:, :)
+    logical(lk), allocatable :: rows(:, :)
     integer :: first(2), n
 
     coarse%lattice = self%lattice%coarsened()
@@ -262,7 +262,7 @@ contains
     !> The problem there
     class(level_t), intent(inout) :: part
 
-    logical, allocatable :: rows(:, :)
+    logical(lk), allocatable :: rows(:, :)
 
     part%lattice = self%lattice%subwindow(low, high)
     part%space = self%space

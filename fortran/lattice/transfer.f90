@@ -6,7 +6,7 @@
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_transfer
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_lattice, only: lattice_t, neighbors, floor_half
   use hc_field_space, only: field_space_t
   implicit none
@@ -256,11 +256,11 @@ contains
     !> Fine lattice and window
     type(lattice_t), intent(in) :: fine_lattice
     !> Fine mask (n_col, n_row)
-    logical, intent(in) :: fine(:, :)
+    logical(lk), intent(in) :: fine(:, :)
     !> Coarse lattice and window, inside the fine one
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse mask (n_col, n_row)
-    logical :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
+    logical(lk) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
     integer :: start(2)
 
     start = 2*coarse_lattice%first - fine_lattice%first + 1

@@ -4,7 +4,7 @@
 !> as much of the work on them. Active nodes come in runs along the rows of the window, so
 !> that packing is a copy of a few hundred pieces.
 module hc_active_set
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -60,7 +60,7 @@ contains
 
   !> Find the first and the last active node.
   pure subroutine active_span(active, low, high)
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     integer, intent(out) :: low, high
 
     high = size(active)
@@ -97,7 +97,7 @@ contains
     !> Set to be set up
     type(active_set_t), intent(out) :: self
     !> Active nodes
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Where the runs of each block begin in the list, less one
@@ -139,7 +139,7 @@ contains
 
   !> Count the runs of active nodes.
   pure integer function count_runs(active)
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     integer :: i
 
     count_runs = merge(1, 0, active(1))
@@ -151,7 +151,7 @@ contains
 
   !> List the runs of active nodes.
   pure subroutine list_runs(active, shift, first, last)
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     !> Shift of the nodes
     integer, intent(in) :: shift
     !> First and last node of each run
@@ -289,7 +289,7 @@ contains
     class(active_set_t), intent(in) :: self
     !> Number of all nodes
     integer, intent(in) :: n
-    logical :: gap(size(self%first) + 1)
+    logical(lk) :: gap(size(self%first) + 1)
 
     others%space%threads = self%space%threads
     associate (first => [1, self%last + 1], last => [self%first - 1, n])
@@ -388,7 +388,7 @@ contains
   logical function is_set(self, active)
     class(active_set_t), intent(in) :: self
     !> The set
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     type(field_space_t) :: own
     integer :: k, within
 

@@ -204,7 +204,6 @@ contains
     real(wp), intent(out) :: largest
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: all(1)
     integer :: i, m, from, to
 
     largest = 0.0_wp
@@ -220,9 +219,7 @@ contains
       end do
     end do
     !$omp end parallel do
-    all = largest
-    call space%most(all)
-    largest = all(1)
+    largest = space%largest(largest)
   end subroutine add_constraints
 
   !> Project z <- z + M B share, and compute r^T z.

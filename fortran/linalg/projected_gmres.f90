@@ -205,7 +205,7 @@ contains
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
       real(wp), allocatable :: packed(:)
-      real(wp) :: largest(1)
+      real(wp) :: largest
       integer :: i
 
       if (allocated(own)) deallocate (own)
@@ -235,9 +235,8 @@ contains
       do i = 1, directions
         call add_direction(y(i), basis(i)%mr)
         call others%add(y(i), basis(i)%beyond, ax)
-        largest = max(maxval(abs(basis(i)%beyond)), 0.0_sp)
-        call space%most(largest)
-        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*largest(1)
+        largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
+        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*largest
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return

@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/interior.md, (I17) and (I18).
 module hc_edge_residue
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_elastic_medium, only: elastic_medium_t, influence_t, n_block, block_index
@@ -171,7 +171,7 @@ contains
         allocate (ax(size(x)))
         call means%product(x, ax, error)
         if (allocated(error)) return
-        call new_active_set(nodes, spread(.true., 1, size(x)), space)
+        call new_active_set(nodes, spread(.true._lk, 1, size(x)), space)
         if (.not. allocated(none%mb)) allocate (none%columns(size(x), 0), none%mb(size(x), 0))
         iteration = iteration_t(tolerance=accuracy*maxval(abs(rhs)), most=most_iterations)
         call projected_cg(means, nodes, none, rhs, x, ax, iteration, error)

@@ -10,7 +10,7 @@
 !> Equations: docs/theory/interior.md, (I16) to (I18).
 module hc_edge_tractions
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
@@ -231,7 +231,7 @@ contains
     real(wp), allocatable :: x(:), ax(:), rhs(:)
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
-    logical, allocatable :: active(:)
+    logical(lk), allocatable :: active(:)
     type(active_set_t) :: set
     logical :: independent
     integer :: k

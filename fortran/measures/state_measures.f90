@@ -3,7 +3,7 @@
 !> Equations: docs/theory/residuals.md, (R1) to (R3).
 module hc_state_measures
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
@@ -189,7 +189,7 @@ contains
     center = ieee_value(1.0_wp, ieee_quiet_nan)
     lower = center
     upper = center
-    n = space%count(zone)
+    n = space%count(logical(zone, lk))
     if (n == 0) return
     !$omp parallel do schedule(static) num_threads(space%threads) private(x, y)
     do row = 1, size(zone, 2)
@@ -267,10 +267,10 @@ contains
     found%stick_lower = found%stick_center
     found%stick_upper = found%stick_center
     if (lattice%is_periodic()) then
-      found%stick = cells_of(lattice, space%count(zone))
+      found%stick = cells_of(lattice, space%count(logical(zone, lk)))
       return
     end if
-    found%stick = size_of(lattice, space%count(zone), edges%stick_edge(zone, reserve))
+    found%stick = size_of(lattice, space%count(logical(zone, lk)), edges%stick_edge(zone, reserve))
     call zone_extent(lattice, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
   end function measure_state
 
@@ -299,7 +299,7 @@ contains
       if (lattice%is_periodic()) then
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
-        found%contact = cells_of(lattice, space%count(contact))
+        found%contact = cells_of(lattice, space%count(logical(contact, lk)))
         found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact, lattice%extent(2), space)
         found%mean_gap = space%sum(state%gap)/lattice%size()
         return
@@ -311,7 +311,7 @@ contains
         call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
         edge = edges%contact_edge()
       end if
-      found%contact = size_of(lattice, space%count(contact), edge)
+      found%contact = size_of(lattice, space%count(logical(contact, lk)), edge)
     end associate
   end subroutine measure_contact
 
@@ -331,7 +331,7 @@ contains
     type(zone_edge_t), intent(out) :: edge
     type(edge_options_t) :: options
     real(wp), allocatable :: pressure(:, :), gap(:, :), sums(:, :)
-    logical, allocatable :: touching(:, :), possible(:, :)
+    logical(lk), allocatable :: touching(:, :), possible(:, :)
     real(wp) :: totals(n_cell_sum)
     integer :: own(2), wanted(2), k
 
@@ -345,10 +345,10 @@ contains
     end associate
     call space%fetch(lattice%extent(2), state%pressure, wanted(1), pressure)
     call space%fetch(lattice%extent(2), state%gap, wanted(1), gap)
-    call space%fetch(lattice%extent(2), contact, wanted(1), touching)
-    call space%fetch(lattice%extent(2), candidate, wanted(1), possible)
-    call new_contact_edges(edges, lattice%subwindow([1, wanted(1)], [lattice%extent(1), wanted(2)]), pressure, gap, touching, &
-                           possible)
+    call space%fetch(lattice%extent(2), logical(contact, lk), wanted(1), touching)
+    call space%fetch(lattice%extent(2), logical(candidate, lk), wanted(1), possible)
+    call new_contact_edges(edges, lattice%subwindow([1, wanted(1)], [lattice%extent(1), wanted(2)]), pressure, gap, &
+                           logical(touching), logical(possible))
     if (own(1) == 1) own(1) = 0                                               ! the cells below the first row
     sums = edges%contact_sums(own - wanted(1) + 1, wanted(1) - 1)
     do k = 1, n_cell_sum
@@ -369,7 +369,7 @@ contains
     type(field_space_t), intent(in) :: space
     integer, intent(in) :: n_row
     real(wp), allocatable :: near(:, :)
-    logical, allocatable :: touching(:, :)
+    logical(lk), allocatable :: touching(:, :)
     real(wp) :: found(1)
     integer :: own(2)
 
@@ -381,8 +381,8 @@ contains
     own = [max(own(1) - 1, 1), min(own(2) + 1, n_row)]
     allocate (near(size(pressure, 1), own(2) - own(1) + 1), touching(size(pressure, 1), own(2) - own(1) + 1))
     call space%fetch(n_row, pressure, own(1), near)
-    call space%fetch(n_row, candidate, own(1), touching)
-    found = merge(1.0_wp, 0.0_wp, rises_in(touching, near))
+    call space%fetch(n_row, logical(candidate, lk), own(1), touching)
+    found = merge(1.0_wp, 0.0_wp, rises_in(logical(touching), near))
     call space%most(found)
     rises = found(1) > 0.5_wp
   end function rises_to_end
@@ -422,13 +422,13 @@ contains
     integer, intent(in) :: n_row
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    logical :: around(size(zone, 1), 0:size(zone, 2) + 1)
+    logical(lk) :: around(size(zone, 1), 0:size(zone, 2) + 1)
     integer :: own(2), row, counts(1)
 
     own = space%own_rows(n_row)
     around(:, 1:size(zone, 2)) = zone
-    call space%fetch(n_row, zone, modulo(own(1) - 2, n_row) + 1, around(:, 0:0))
-    call space%fetch(n_row, zone, modulo(own(2), n_row) + 1, around(:, size(zone, 2) + 1:))
+    call space%fetch(n_row, logical(zone, lk), modulo(own(1) - 2, n_row) + 1, around(:, 0:0))
+    call space%fetch(n_row, logical(zone, lk), modulo(own(2), n_row) + 1, around(:, size(zone, 2) + 1:))
     counts = 0
     do row = 1, size(zone, 2)
       associate (here => around(:, row))

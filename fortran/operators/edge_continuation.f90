@@ -13,7 +13,7 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
 module hc_edge_continuation
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbor_steps
   use hc_field_space, only: field_space_t
@@ -68,17 +68,18 @@ contains
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous, target :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
     !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
-    logical, intent(in), contiguous, optional :: within(:, :)
+    logical(lk), intent(in), contiguous, optional, target :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
     !> Rings by the width of the contact, in nodes, on one rank; absent: those of `options`
     real(wp), intent(in), optional :: by_width
+    logical(lk), pointer, contiguous :: around(:, :), until(:, :)
     integer, allocatable :: mark(:), frontier(:), step(:)
     integer :: n_ring
 
@@ -87,8 +88,17 @@ contains
     if (space%ranks%size > 1) then
       call share_rings(self, active, space, options, step, within)
     else
-      call mark_window(active, space, mark, within)
-      call find_edge(active, mark, step, space, frontier)
+      ! marks take memory: rows that no ring reaches have none
+      self%rows = [1, size(active, 2)]
+      if (.not. present(by_width)) then
+        call find_span(any(active, dim=1), self%rows(1), self%rows(2))
+        self%rows = [max(self%rows(1) - options%max_rings - 1, 1), min(self%rows(2) + options%max_rings + 1, size(active, 2))]
+      end if
+      around => active(:, self%rows(1):self%rows(2))
+      until => null()                                                          ! the same as absent
+      if (present(within)) until => within(:, self%rows(1):self%rows(2))
+      call mark_window(around, space, mark, until)
+      call find_edge(around, mark, step, space, frontier)
       n_ring = number_of_rings(options, space%count(active), size(frontier))
       if (present(by_width)) n_ring = int(by_width*space%count(active)/max(size(frontier), 1))
       call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
@@ -118,7 +128,7 @@ contains
   subroutine set_floor(self, active, across, share)
     class(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, n_row), on one rank
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Dimension across the contact
     integer, intent(in) :: across
     !> Height at the end of a line over the mean
@@ -175,14 +185,14 @@ contains
   subroutine share_rings(self, active, space, options, step, within)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
     !> Steps to the neighbors of a node
     integer, intent(in), contiguous :: step(:)
     !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
-    logical, intent(in), contiguous, optional :: within(:, :)
-    logical, allocatable :: wider(:, :), around(:, :)
+    logical(lk), intent(in), contiguous, optional :: within(:, :)
+    logical(lk), allocatable :: wider(:, :), around(:, :)
     integer, allocatable :: mark(:), frontier(:)
     integer :: counts(3), n_ring
 
@@ -210,11 +220,11 @@ contains
   subroutine take_rows(self, active, more, wider)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Number of further rows
     integer, intent(in) :: more
     !> Active nodes of all of these rows
-    logical, allocatable, intent(out) :: wider(:, :)
+    logical(lk), allocatable, intent(out) :: wider(:, :)
 
     self%rows = [max(self%own(1) - more, 1), min(self%own(2) + more, self%n_row)]
     allocate (wider(size(active, 1), self%rows(2) - self%rows(1) + 1))
@@ -246,7 +256,7 @@ contains
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
     integer, allocatable :: next(:), node(:)
-    integer :: n_ring, width, r, n, k
+    integer :: n_ring, width, before, r, n, k
     real(wp) :: fall, found(1)
 
     width = n_col + 2
@@ -272,6 +282,7 @@ contains
     end if
     n = size(node)
     n_ring = size(self%ring) - 1
+    before = merge(self%rows(1) - 1, 0, space%ranks%size == 1)
     self%smoothings = options%smoothings
     if (n >= worth_sharing) self%space = space
     allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%mean(n), self%inner(6, n), &
@@ -299,7 +310,7 @@ contains
       integer, intent(in) :: place
       integer :: row
       row = (place - 1)/width
-      in_window = place - 1 - row*width + (row - 1)*n_col
+      in_window = place - 1 - row*width + (row - 1 + before)*n_col
     end function in_window
 
   end subroutine find_rings
@@ -307,13 +318,13 @@ contains
   !> Mark all nodes before there are rings.
   subroutine mark_window(active, space, mark, within)
     !> Active nodes (n_col, n_row)
-    logical, intent(in) :: active(:, :)
+    logical(lk), intent(in) :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Marks of the nodes, with those around the window
     integer, allocatable, intent(out) :: mark(:)
     !> Nodes that are not outside (n_col, n_row); absent: all of the window
-    logical, intent(in), optional :: within(:, :)
+    logical(lk), intent(in), optional :: within(:, :)
     integer :: row, width, start
 
     width = size(active, 1) + 2
@@ -343,7 +354,7 @@ contains
   !> Find the active nodes with a neighbor that is not; a node at the rim of the window has none there.
   subroutine find_edge(active, mark, step, space, edge)
     !> Active nodes (n_col, n_row)
-    logical, intent(in), contiguous :: active(:, :)
+    logical(lk), intent(in), contiguous :: active(:, :)
     !> Marks of all nodes, and steps to the neighbors of a node
     integer, intent(in), contiguous :: mark(:)
     integer, intent(in) :: step(:)
@@ -377,7 +388,7 @@ contains
   !> List the nodes of a row at the edge.
   pure subroutine list_edge(active, mark, step, before, node)
     !> Active nodes of the row
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
     integer, intent(in), contiguous :: mark(:)
     integer, intent(in) :: step(:), before
@@ -485,7 +496,7 @@ contains
         return
       end if
       lines(1:size(self%floor, 1), 1:size(self%floor, 2)) => field
-      mean = self%mean_of_lines(lines)
+      allocate (mean, source=self%mean_of_lines(lines))
       call self%extend_rings(field)
       !$omp parallel do schedule(static) num_threads(self%fields%threads)
       do row = 1, size(lines, 2)

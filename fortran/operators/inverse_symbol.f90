@@ -8,7 +8,7 @@
 module hc_inverse_symbol
   use, intrinsic :: iso_c_binding, only: c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
@@ -257,7 +257,7 @@ contains
     !> Compliance of each spring (n) [m/Pa]
     real(wp), intent(in), contiguous :: compliance(:)
     !> Active nodes (n)
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     type(error_t), allocatable :: error
     real(wp) :: stiffest, elastic, softer
     real(sp) :: stretch
@@ -265,7 +265,7 @@ contains
     integer :: block, i
 
     self%loose = 0.0_wp
-    if (self%convolution%space%count(active .and. compliance > 0.0_wp) == 0) return
+    if (self%convolution%space%count(logical(active .and. compliance > 0.0_wp, lk)) == 0) return
     if (.not. allocated(self%sprung)) then
       allocate (self%sprung, self%share(size(compliance)), self%stiffness(size(compliance)))
       call new_convolution(self%sprung, self%extent, self%length, [1, 0], 1, self%convolution%space, error)
@@ -276,7 +276,7 @@ contains
         return
       end if
     end if
-    stiffest = self%convolution%space%min(compliance, active .and. compliance > 0.0_wp)
+    stiffest = self%convolution%space%min(compliance, logical(active .and. compliance > 0.0_wp, lk))
     elastic = options%wave_of_nodes*self%self_compliance + options%wave_of_springs*stiffest
     self%loose = max(self%self_compliance, (1.0_wp + negligible)*stiffest)
     self%height = real(self%self_compliance/(self%self_compliance + stiffest), sp)

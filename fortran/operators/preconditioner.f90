@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/preconditioner.md.
 module hc_preconditioner
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_field_space, only: field_space_t
   use hc_active_set, only: active_set_t, new_active_set
   implicit none
@@ -35,10 +35,10 @@ module hc_preconditioner
   abstract interface
     !> Set the active nodes, and the springs in series with them.
     subroutine set_active(self, active, compliance, direction)
-      import :: preconditioner_t, wp
+      import :: preconditioner_t, wp, lk
       class(preconditioner_t), intent(inout) :: self
       !> Active nodes (n)
-      logical, intent(in), contiguous :: active(:)
+      logical(lk), intent(in), contiguous :: active(:)
       !> Compliance D of the springs along the first component of a vector (n); absent: no springs [m/Pa]. It has to outlive
       !> the applications
       real(wp), intent(in), optional, target, contiguous :: compliance(:)
@@ -76,7 +76,7 @@ contains
     real(wp), allocatable :: wanted(:)
     type(active_set_t) :: nodes
 
-    call new_active_set(nodes, spread(.true., 1, size(displacement)), field_space_t())
+    call new_active_set(nodes, spread(.true._lk, 1, size(displacement)), field_space_t())
     allocate (wanted(size(traction)))
     call self%apply_packed(nodes, size(displacement), self%unit*displacement, wanted, work)
     traction = real(wanted, sp)

@@ -17,7 +17,7 @@
 !> Equations: docs/theory/preconditioner.md, (P2) to (P6).
 module hc_shear_preconditioner
   use, intrinsic :: iso_fortran_env, only: int8
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t, neighbor_steps
@@ -84,9 +84,9 @@ contains
   !> Set the nodes in contact, and the springs of those that slip.
   subroutine set_sheared(self, active, compliance, direction)
     class(shear_preconditioner_t), intent(inout) :: self
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
-    logical, allocatable :: slips(:)
+    logical(lk), allocatable :: slips(:)
     real(wp) :: ratio
     integer :: i, k, at
     logical :: known
@@ -132,11 +132,8 @@ contains
   logical function all_know(self, known)
     class(shear_preconditioner_t), intent(in) :: self
     logical, intent(in) :: known
-    integer :: without(1)
 
-    without = merge(0, 1, known)
-    call self%space%ranks%add_counts(without)
-    all_know = without(1) == 0
+    all_know = self%space%number(merge(0, 1, known)) == 0
   end function all_know
 
   !> Set up the continuation from stick into slip.
@@ -145,7 +142,7 @@ contains
     !> Columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact, and those of them that slip
-    logical, intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
+    logical(lk), intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
 
     call new_edge_extension(self%front, active .and. .not. slips, self%space, self%options, within=active, &
                             near=self%beside)
@@ -157,11 +154,11 @@ contains
     !> Columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact, and those of them that slip
-    logical, intent(in), contiguous :: active(:), slips(:)
+    logical(lk), intent(in), contiguous :: active(:), slips(:)
     !> 1 at nodes near slip along their rows; of one row at those that slip, and at those near slip
     integer(int8), allocatable :: along(:, :)
     integer(int8) :: slip(extent(1)), beside(extent(1))
-    logical, allocatable :: near(:), around(:, :)
+    logical(lk), allocatable :: near(:), around(:, :)
     integer :: row, other, first, last, k, before
 
     allocate (near(size(active)))
@@ -204,21 +201,20 @@ contains
     !> Columns and own rows of the window
     integer, intent(in) :: extent(2)
     !> Slipping nodes
-    logical, intent(in) :: slips(extent(1), extent(2))
+    logical(lk), intent(in) :: slips(extent(1), extent(2))
     !> Rows on each side, and how many of them there are before own rows
     integer, intent(in) :: reach
     integer, intent(out) :: before
     !> The nodes of all of these rows
-    logical, allocatable, intent(out) :: around(:, :)
-    integer :: n_row(1), own(2), last
+    logical(lk), allocatable, intent(out) :: around(:, :)
+    integer :: n_row, own(2), last
 
-    n_row = extent(2)
-    call self%space%ranks%add_counts(n_row)
-    own = self%space%own_rows(n_row(1))
+    n_row = self%space%number(extent(2))
+    own = self%space%own_rows(n_row)
     before = own(1) - max(own(1) - reach, 1)
-    last = min(own(2) + reach, n_row(1))
+    last = min(own(2) + reach, n_row)
     allocate (around(extent(1), last - own(1) + before + 1))
-    call self%space%fetch(n_row(1), slips, own(1) - before, around)
+    call self%space%fetch(n_row, slips, own(1) - before, around)
   end subroutine take_slipping
 
   !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there: the component along t at all
@@ -361,16 +357,15 @@ contains
     real(sp), intent(inout), contiguous, target :: field(low:)
     real(sp), pointer, contiguous :: own(:, :)
     real(sp), allocatable :: around(:, :)
-    integer :: n_row(1), rows(2), before, after
+    integer :: n_row, rows(2), before, after
 
-    n_row = extent(2)
-    call self%space%ranks%add_counts(n_row)
-    rows = self%space%own_rows(n_row(1))
+    n_row = self%space%number(extent(2))
+    rows = self%space%own_rows(n_row)
     before = rows(1) - max(rows(1) - step, 1)
-    after = min(rows(2) + step, n_row(1)) - rows(2)
+    after = min(rows(2) + step, n_row) - rows(2)
     own(1:extent(1), 1:extent(2)) => field(1:product(extent))
     allocate (around(extent(1), before + extent(2) + after))
-    call self%space%fetch(n_row(1), own, rows(1) - before, around)
+    call self%space%fetch(n_row, own, rows(1) - before, around)
     field(1 - before*extent(1):0) = reshape(around(:, :before), [before*extent(1)])
     field(product(extent) + 1:product(extent) + after*extent(1)) = reshape(around(:, before + extent(2) + 1:), [after*extent(1)])
   end subroutine take_beside

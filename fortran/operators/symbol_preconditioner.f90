@@ -8,7 +8,7 @@
 module hc_symbol_preconditioner
   use, intrinsic :: iso_c_binding, only: c_f_pointer
   use, intrinsic :: iso_fortran_env, only: int64
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
@@ -125,7 +125,7 @@ contains
   !> Set the nodes in contact, and their springs.
   subroutine set_contact(self, active, compliance, direction)
     class(pressure_preconditioner_t), intent(inout) :: self
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
     if (any(self%margin > 0)) then
@@ -133,7 +133,7 @@ contains
     else if (present(compliance)) then
       call self%inverse%set_springs(self%options, compliance, active)
       ! displacements continue beyond the nodes on stiff springs
-      call self%continue_beyond(self%extent, active .and. .not. self%inverse%is_loose(compliance))
+      call self%continue_beyond(self%extent, logical(active .and. .not. self%inverse%is_loose(compliance), lk))
     else
       call self%continue_beyond(self%extent, active)
     end if
@@ -143,13 +143,13 @@ contains
   subroutine set_wide_contact(self, active, compliance)
     class(pressure_preconditioner_t), intent(inout) :: self
     !> Active nodes of the window, and compliances of their springs
-    logical, intent(in) :: active(self%extent(1), self%extent(2))
+    logical(lk), intent(in) :: active(self%extent(1), self%extent(2))
     real(wp), intent(in), optional :: compliance(self%extent(1), self%extent(2))
     type(preconditioner_options_t) :: options
-    logical, allocatable :: wide(:, :)
+    logical(lk), allocatable :: wide(:, :)
     real(wp), allocatable :: springs(:, :)
 
-    allocate (wide(self%wide(1), self%wide(2)), source=.false.)
+    allocate (wide(self%wide(1), self%wide(2)), source=.false._lk)
     associate (from => self%margin + 1, to => self%margin + self%extent)
       wide(from(1):to(1), from(2):to(2)) = active
       if (present(compliance)) then
@@ -176,7 +176,7 @@ contains
     !> Columns and rows of the window
     integer, intent(in) :: extent(2)
     !> The nodes
-    logical, intent(in) :: active(extent(1), extent(2))
+    logical(lk), intent(in) :: active(extent(1), extent(2))
     type(preconditioner_options_t) :: options
 
     options = self%options

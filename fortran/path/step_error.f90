@@ -5,7 +5,7 @@
 !>
 !> Equations: docs/theory/step_control.md, (S1).
 module hc_step_error
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_options, only: step_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
@@ -60,10 +60,10 @@ contains
       call edges_of(problem, halves, edges)
       contact = edges%contact_edge()
       sticking = stick_edge_of(edges, friction, halves)
-      entered = space%count((halves%zone /= separated) .neqv. (halves_before%zone /= separated))
+      entered = space%count(logical((halves%zone /= separated) .neqv. (halves_before%zone /= separated), lk))
       if (contact%radius() < steps%small_radius*spacing) then
         change%lattice = contact%area/area
-      else if (space%count(whole%zone == slip .or. half%zone == slip .or. halves%zone == slip) > 0) then
+      else if (space%count(logical(whole%zone == slip .or. half%zone == slip .or. halves%zone == slip, lk)) > 0) then
         change%lattice = steps%ring_shift*spacing*sticking%length()/area &
                          *min(1.0_wp, steps%entering_factor*entered*spacing/max(contact%length(), spacing))
       end if
@@ -118,8 +118,8 @@ contains
     here = problem%lattice
     here%first = 0
     here%origin = 0.0_wp
-    call new_contact_edges(edges, here, state%pressure, state%gap, state%zone /= separated, problem%candidate, &
-                           problem%options%edges)
+    call new_contact_edges(edges, here, state%pressure, state%gap, state%zone /= separated, &
+                           logical(problem%candidate), problem%options%edges)
   end subroutine edges_of
 
   !> Find the edge of the stick area of a state.

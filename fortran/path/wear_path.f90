@@ -489,8 +489,9 @@ contains
     call require_memory(energy_ahead_memory(problem%lattice%extent, pressed%space%threads), error, pressed%space%threads)
     if (allocated(error)) return
     now = worn_cycle_t(cycle%energy, cycle%path, cycle%state%pressure, merge(cycle%state%gap, 0.0_wp, problem%candidate), &
-                       problem%candidate, self%friction, self%steps(1)%target%control(normal) == force_control)
-    call new_normal_problem(pressed, problem%lattice, problem%medium, now%gap, problem%candidate, error, problem%normal_law)
+                       logical(problem%candidate), self%friction, self%steps(1)%target%control(normal) == force_control)
+    call new_normal_problem(pressed, problem%lattice, problem%medium, now%gap, logical(problem%candidate), error, &
+                            problem%normal_law)
     if (allocated(error)) return
     allocate (energy, mold=cycle%energy)
     call energy_ahead(now, pressed, cycles*self%coefficient, self%cycle_tolerance, energy, error, cache)

@@ -20,6 +20,7 @@ else:  # xarray and pandas are imported at their first use
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+BAND = 256  # rows that are read and written at once, those of a chunk
 
 
 def reals(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None, meaning: str = "") -> Array:
@@ -77,3 +78,19 @@ class Banded(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         """Return the number of fields."""
         return len(self._names)
+
+
+def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
+    """Join and cut bands so that each but the last has so many rows."""
+    left: list[NDArray[Any]] = []
+    for part in parts:
+        start = 0
+        while start < len(part):
+            missing = rows - sum(map(len, left))
+            left.append(part[start : start + missing])
+            start += missing
+            if sum(map(len, left)) == rows:
+                yield left[0] if len(left) == 1 else np.concatenate(left)
+                left = []
+    if left:
+        yield left[0] if len(left) == 1 else np.concatenate(left)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Body", "Case", "LoadStep", "Target"]
 
-_LOADS = ("normal_load", "approach", "steps")
+_LOADS = ("normal_load", "approach", "mean_pressure", "mean_gap", "steps")
 _ARGUMENTS = {  # of a case, with their keys in a deck
     "title": "title",
     "body_1": "body.1",
@@ -71,8 +71,8 @@ class Case(Problem):
         Keys of [grid].
     cell_ratio, cell_angle, direction, boundary : optional
         Keys of [grid]; an angle carries its unit: "90 deg".
-    normal_load, approach : float, optional
-        The only load (N) or motion (m), in one step or in `steps`.
+    normal_load, approach, mean_pressure, mean_gap : float, optional
+        The only load (N, Pa) or motion (m), in one step or in `steps`.
     steps : int or "auto", optional
         Number of equal increments of it; "auto": chosen by `step_tolerance`.
     loads : sequence of mappings, or mapping, optional
@@ -144,6 +144,8 @@ class Case(Problem):
         direction: str | None = None,
         normal_load: float | str | None = None,
         approach: float | str | None = None,
+        mean_pressure: float | str | None = None,
+        mean_gap: float | str | None = None,
         steps: int | str | None = None,
         interface: Mapping[str, Any] | None = None,
         loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,
@@ -312,7 +314,7 @@ def _deck_keys(arguments: Mapping[str, Any], lattice: Lattice | None) -> dict[st
     single = {name: arguments[name] for name in _LOADS if arguments.get(name) is not None}
     loads, accuracy = arguments.get("loads"), arguments.get("accuracy")
     if single and loads is not None:
-        raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
+        raise DeckError("loads: expected either loads, or one load or motion with steps, not both")
     found = {_ARGUMENTS[name]: value for name, value in arguments.items()}
     if "load" in found:
         loads = single if loads is None else loads

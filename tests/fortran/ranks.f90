@@ -2,7 +2,7 @@
 module ranks_tests
   use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int32
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
@@ -109,9 +109,9 @@ contains
       if (allocated(error)) return
       call check(error, space%max(own), maxval(field), 0.0_wp, 'max')
       if (allocated(error)) return
-      call check(error, space%min(own, own > 0.0_wp), minval(field), 0.0_wp, 'min')
+      call check(error, space%min(own, logical(own > 0.0_wp, lk)), minval(field), 0.0_wp, 'min')
       if (allocated(error)) return
-      call check_true(error, space%count(own > 1.0_wp) == count(field > 1.0_wp), 'count')
+      call check_true(error, space%count(logical(own > 1.0_wp, lk)) == count(field > 1.0_wp), 'count')
       if (allocated(error)) return
     end associate
     largest = [real(ranks%rank, wp), -real(ranks%rank, wp)]
@@ -137,7 +137,7 @@ contains
     type(field_space_t) :: space
     real(wp), target :: field(5, 23)
     real(wp), allocatable, target :: some(:, :)
-    logical, allocatable :: mask(:, :)
+    logical(lk), allocatable :: mask(:, :)
     integer :: i, rows(2), first, last
 
     field = reshape([(real(i, wp), i=1, size(field))], shape(field))
@@ -149,7 +149,7 @@ contains
     call space%fetch(size(field, 2), field(:, rows(1):rows(2)), first, some)
     call check_true(error, all(abs(some - field(:, first:last)) <= 0.0_wp), 'rows')
     if (allocated(error)) return
-    call space%fetch(size(field, 2), field(:, rows(1):rows(2)) > 50.0_wp, first, mask)
+    call space%fetch(size(field, 2), logical(field(:, rows(1):rows(2)) > 50.0_wp, lk), first, mask)
     call check_true(error, all(mask .eqv. field(:, first:last) > 50.0_wp), 'rows of a mask')
     if (allocated(error) .or. ranks%size == 1) return
     some = 0.0_wp

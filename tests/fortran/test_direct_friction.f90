@@ -3,7 +3,7 @@
 !> E* = 1, R = 1 and P = 4/3 make the contact radius of the sphere 1, its approach 1 and p0 = 2/pi.
 module test_direct_friction
   use, intrinsic :: iso_fortran_env, only: real32
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
@@ -159,7 +159,8 @@ contains
   !> Whole sets as long as the number of wrong nodes falls, then the last one alone.
   subroutine test_exchange(error)
     type(error_t), allocatable, intent(out) :: error
-    logical :: active(4), wrong(4)
+    logical(lk) :: active(4)
+    logical :: wrong(4)
     integer, parameter :: most = 10
     integer :: fewest, left, i
 
@@ -470,7 +471,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, f], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
+    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, logical(problem%candidate), error)
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return
@@ -500,7 +501,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, d], [load, 0.1_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
+    call new_direct_contact(smooth, problem%lattice, problem%medium, problem%initial_gap, logical(problem%candidate), error)
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return

@@ -2,7 +2,7 @@
 module test_friction
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_invalid, ieee_get_halting_mode, &
     ieee_set_halting_mode
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
@@ -402,7 +402,7 @@ contains
   subroutine precondition_shear(system, unknown, x, m_x, error)
     type(shear_system_t), intent(inout) :: system
     !> Unknowns, values to be multiplied and the products, one component after the other
-    logical, intent(in) :: unknown(:)
+    logical(lk), intent(in) :: unknown(:)
     real(wp), intent(in) :: x(:)
     real(wp), intent(out) :: m_x(:)
     type(error_t), allocatable, intent(out) :: error
@@ -442,7 +442,7 @@ contains
     system%direction(2, :) = sin(2.0_wp*pi*angle)
     ! stick, and slip with compliances from far below to far above that of a node
     system%compliance = [(merge(0.0_wp, system%elastic_compliance*10.0_wp**(0.4_wp*(i - 14)), modulo(i, 3) == 0), i=1, n)]
-    call system%set_contact(spread(.true., 1, n))
+    call system%set_contact(spread(.true._lk, 1, n))
     call random_number(x)
     call system%product(x, y, error)
     if (allocated(error)) return
@@ -462,7 +462,7 @@ contains
     do i = 1, 2*n
       frame = 0.0_wp
       frame(i) = 1.0_wp
-      call precondition_shear(system, spread(.true., 1, 2*n), frame, m(:, i), error)
+      call precondition_shear(system, spread(.true._lk, 1, 2*n), frame, m(:, i), error)
       if (allocated(error)) return
     end do
     ! on the unknowns: a slipping node carries only its component across e
@@ -490,7 +490,7 @@ contains
     type(shear_system_t), target :: system
     type(elastic_pair_t) :: pair
     real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:)
-    logical, allocatable :: active(:)
+    logical(lk), allocatable :: active(:)
     type(active_set_t) :: nodes
     type(constraints_t) :: none
     type(iteration_t) :: iteration

@@ -1,6 +1,6 @@
 !> What every step of the algorithm with friction leaves behind, and what full sliding carries.
 module test_friction_sweeps
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -228,7 +228,7 @@ contains
     !> Nodes whose zone is not that of the solution.
     integer function count_wrong()
       type(friction_iterate_t), target :: copy
-      logical, allocatable :: active(:)
+      logical(lk), allocatable :: active(:)
 
       copy = now
       call classify(copy, .false., active)

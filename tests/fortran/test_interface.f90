@@ -1,7 +1,7 @@
 !> Interfaces with a normal compliance: the sphere of the reference table, rigid flats on a layer, limits.
 module test_interface
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
@@ -210,21 +210,21 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n(2) = [3, 2]
     real(wp), parameter :: gap(3, 2) = reshape([3.0_wp, 1.0_wp, 2.0_wp, 4.0_wp, 2.0_wp, 5.0_wp], n)
-    logical, parameter :: candidate(3, 2) = reshape([.true., .false., .true., .true., .true., .true.], n)
+    logical(lk), parameter :: candidate(3, 2) = reshape([logical(lk) :: .true., .false., .true., .true., .true., .true.], n)
     type(nodal_springs_t) :: law
     type(lattice_t) :: lattice
     type(normal_problem_t) :: alone
     type(friction_problem_t) :: sheared
     real(wp), dimension(3, 2) :: p, compliance, offset
-    logical :: contact(3, 2)
+    logical(lk) :: contact(3, 2)
     integer :: i
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], n, error)
     if (allocated(error)) return
     law%spring = [(1.0_wp*i, i=1, 6)]
-    call new_normal_problem(alone, lattice, pair, gap, candidate, error, law)
+    call new_normal_problem(alone, lattice, pair, gap, logical(candidate), error, law)
     if (allocated(error)) return
-    call new_friction_problem(sheared, lattice, pair, gap, candidate, coulomb_t(0.3_wp), .false., error, law)
+    call new_friction_problem(sheared, lattice, pair, gap, logical(candidate), coulomb_t(0.3_wp), .false., error, law)
     if (allocated(error)) return
     p = 0.0_wp
     call alone%find_contact(0, p, gap, candidate, contact)
@@ -232,7 +232,7 @@ contains
     if (allocated(error)) return
     p = 1.0e6_wp
     call sheared%find_contact(6, p, gap, candidate, contact)
-    call check_true(error, all(contact .eqv. candidate), 'nodes under pressure')
+    call check_true(error, count(contact .neqv. candidate) == 0, 'nodes under pressure')
     if (allocated(error)) return
     call sheared%linearize(sheared%normal_classification_parameter(5), p, gap, contact, compliance, offset)
     call check(error, [compliance], [1.0_wp, 0.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp], 0.0_wp, 'springs with friction')

@@ -1,6 +1,6 @@
 !> Lattice geometry, coarse lattices and the fields between them.
 module test_lattice
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
   use hc_field_space, only: field_space_t
@@ -182,7 +182,8 @@ contains
     call prolong(coarse, coarse_field, lattice, back, field_space_t())
     call check(error, reshape(back, [99]), reshape(field, [99]), 100*thr, 'linear field')
     if (allocated(error)) return
-    call check_true(error, count(restrict_mask(lattice, field > 0.0_wp, coarse)) == count(coarse_field > 0.0_wp), 'mask')
+    call check_true(error, count(restrict_mask(lattice, logical(field > 0.0_wp, lk), coarse)) == count(coarse_field > 0.0_wp), &
+                    'mask')
   end subroutine test_prolongation
 
   !> A coarse pyramid has half its height at the six fine neighbors of its node.

@@ -1,6 +1,6 @@
 !> Laws of friction that the core does not know, how nodes are fixed, and parts of the window.
 module test_laws
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
@@ -132,9 +132,9 @@ contains
     call new_sphere(sphere, 8, 0.0_wp, 0.0_wp, coulomb_t(0.0_wp), error)
     if (allocated(error)) return
     associate (problem => sphere%problem)
-      call new_normal_contact(fft, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
+      call new_normal_contact(fft, problem%lattice, problem%medium, problem%initial_gap, logical(problem%candidate), error)
       if (allocated(error)) return
-      call new_direct_contact(dense, problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
+      call new_direct_contact(dense, problem%lattice, problem%medium, problem%initial_gap, logical(problem%candidate), error)
     end associate
     if (allocated(error)) return
     call check_solver(fft)
@@ -187,7 +187,7 @@ contains
     state%pressure(90:100, 90:100) = 1.0_wp
     state%gap(130, 95) = -1.0_wp
     state%gap(2, 2) = -1.0_wp
-    allocate (problem%candidate(200, 200), source=.true.)
+    allocate (problem%candidate(200, 200), source=.true._lk)
     problem%candidate(2, 2) = .false.
     call next_part(1, problem, state, low, high, found)
     call check_true(error, found .and. all(low < 90) .and. all(high > 100) .and. high(1) < 130, 'around the contact')

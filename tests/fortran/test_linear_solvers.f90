@@ -1,6 +1,6 @@
 !> Conjugate gradients and GMRES with constraints, on dense systems of five unknowns.
 module test_linear_solvers
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
@@ -83,7 +83,7 @@ contains
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, multiplier, residual, &
                           iterations, outcome, error, drift)
     type(dense_system_t), intent(inout) :: system
-    logical, intent(in) :: active(:)
+    logical(lk), intent(in) :: active(:)
     real(wp), intent(in) :: constraint(:, :), mb(:, :), rhs(:), tolerance
     real(wp), intent(inout), contiguous :: x(:), ax(:)
     integer, intent(in) :: max_iterations
@@ -113,7 +113,7 @@ contains
   !> M B over all nodes, zero off the active ones.
   subroutine precondition_constraints(system, active, constraint, mb, error)
     type(dense_system_t), intent(inout) :: system
-    logical, intent(in) :: active(:)
+    logical(lk), intent(in) :: active(:)
     real(wp), intent(in) :: constraint(:, :)
     real(wp), allocatable, intent(out) :: mb(:, :)
     type(error_t), allocatable, intent(out) :: error
@@ -164,7 +164,7 @@ contains
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, multiplier, &
                              independent, residual, iterations, outcome, error, drift, max_directions)
     type(dense_system_t), intent(inout) :: system
-    logical, intent(in) :: active(:)
+    logical(lk), intent(in) :: active(:)
     real(wp), intent(in) :: columns(:, :), mb(:, :), rows(:, :), weight(:), rhs(:), tolerance
     real(wp), intent(inout), contiguous :: x(:), ax(:)
     integer, intent(in) :: max_iterations
@@ -230,10 +230,11 @@ contains
     x = [6.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     ax = matmul(system%matrix, x)
     constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp]
-    call precondition_constraints(system, constraint(:, 1) > 0.0_wp, constraint, mb, error)
+    call precondition_constraints(system, logical(constraint(:, 1) > 0.0_wp, lk), constraint, mb, error)
     if (allocated(error)) return
-    call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, mb, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
-                      1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
+    call projected_cg(system, logical(constraint(:, 1) > 0.0_wp, lk), constraint, mb, &
+                      [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, 1.0e-12_wp, 20, multiplier, &
+                      residual, iterations, outcome, error)
     if (allocated(error)) return
     ! i x_i + 6 = b_i + m on the active nodes and sum x = 6: m (1 + 1/2 + 1/4) = 6 + sum (6 - b_i)/i
     call check(error, multiplier(1), (6.0_wp + 5.0_wp + 2.0_wp + 0.75_wp)/1.75_wp, 1.0e-11_wp, 'multiplier')
@@ -251,7 +252,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0)
-    logical, parameter :: active(5) = .true.
+    logical(lk), parameter :: active(5) = .true.
     integer, parameter :: expected(3) = [solution_accurate, iterations_used_up, solution_broke_off], most(3) = [20, 2, 20]
     integer :: iterations, outcome, i, k
 
@@ -279,7 +280,7 @@ contains
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), left, first
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
-    logical, parameter :: active(5) = .true.
+    logical(lk), parameter :: active(5) = .true.
     logical :: independent
     integer :: iterations, outcome, i, most
 
@@ -323,7 +324,7 @@ contains
     do i = 2, 5
       system%matrix(i, i - 1) = -4.0_wp
     end do
-    call new_active_set(nodes, [(.true., i=1, 5)], system%space)
+    call new_active_set(nodes, [(.true._lk, i=1, 5)], system%space)
     do i = 1, 2
       system%symmetric = i == 1
       x = 1.0_wp
@@ -352,7 +353,7 @@ contains
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), drift
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = 1.0_wp
-    logical, parameter :: active(5) = .true.
+    logical(lk), parameter :: active(5) = .true.
     logical :: independent
     integer :: iterations, outcome, i, k
 
@@ -400,7 +401,7 @@ contains
       system%matrix(i, i) = 1.0_wp + i
     end do
     system%matrix(2, 1) = -3.0_wp
-    call new_active_set(nodes, [.true., .true., .false., .true., .true.], system%space)
+    call new_active_set(nodes, [logical(lk) :: .true., .true., .false., .true., .true.], system%space)
     allocate (constraints%multiplier(1))
     do most = 2, 4
       x = [1.0_wp/3.0_wp, 2.0_wp, 0.0_wp, 3.0_wp, -1.0_wp/7.0_wp]
@@ -439,7 +440,7 @@ contains
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), solution(5), multiplier(1), residual, constraint(5, 1), left
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
-    logical, parameter :: active(5) = .true.
+    logical(lk), parameter :: active(5) = .true.
     logical :: independent
     integer :: iterations, outcome, i, most, all_at_once
 
@@ -506,7 +507,7 @@ contains
       system%matrix(i, i) = 1.0_wp + i
     end do
     system%matrix(2, 1) = -3.0_wp
-    call new_active_set(nodes, [.true., .true., .false., .true., .true.], system%space)
+    call new_active_set(nodes, [logical(lk) :: .true., .true., .false., .true., .true.], system%space)
     whole%columns = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.5_wp, 1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp], [4, 2])
     whole%mb = reshape([0.0_sp, 0.0_sp, 0.7_sp, 0.3_sp, 0.9_sp, 0.4_sp, 0.0_sp, 0.0_sp], [4, 2])
     whole%rows = reshape([0.2_wp, 0.1_wp, 1.0_wp, 1.0_wp], [2, 2])
@@ -548,7 +549,7 @@ contains
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(2), residual, constraint(5, 2)
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = 1.0_wp
-    logical, parameter :: active(5) = .true.
+    logical(lk), parameter :: active(5) = .true.
     logical :: independent
     integer :: iterations, outcome
 
@@ -588,7 +589,7 @@ contains
     real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
     real(wp), allocatable :: mb(:, :)
     real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
-    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
+    logical(lk), parameter :: active(5) = [.true., .true., .false., .true., .true.]
     logical :: independent
     integer :: iterations, outcome, i
 
@@ -644,7 +645,7 @@ contains
     real(wp), allocatable :: mb(:, :)
     type(constraints_t) :: constraints
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], length = 0.6_wp
-    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
+    logical(lk), parameter :: active(5) = [.true., .true., .false., .true., .true.]
     integer :: i
 
     system%matrix = 1.0_wp

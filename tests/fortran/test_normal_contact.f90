@@ -3,7 +3,7 @@
 module test_normal_contact
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
   use hc_build_options, only: debug_checks
-  use hc_precision, only: wp, sp, pi
+  use hc_precision, only: wp, sp, lk, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
@@ -55,13 +55,13 @@ contains
   subroutine test_rows(error)
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: p(5) = [2.0_wp, 0.5_wp, 0.0_wp, 0.0_wp, 1.0_wp], w(5) = [0.5_wp, 1.0_wp, 0.25_wp, 0.0_wp, 0.0_wp]
-    logical, parameter :: candidate(5) = [.true., .true., .true., .false., .true.]
-    logical, parameter :: active(5) = [.true., .true., .false., .false., .false.]
+    logical(lk), parameter :: candidate(5) = [.true., .true., .true., .false., .true.]
+    logical(lk), parameter :: active(5) = [.true., .true., .false., .false., .false.]
     real(sp), parameter :: z(5) = [1.0_sp, -8.0_sp, 4.0_sp, 2.0_sp, 1.0_sp], punch(5) = [2.0_sp, 1.0_sp, 0.0_sp, 0.0_sp, 0.0_sp]
     real(wp) :: h(5), total, product
     real(sp) :: r(5), d(5)
     type(classification_t) :: found
-    logical :: next(5)
+    logical(lk) :: next(5)
 
     h = [0.5_wp, 1.0_wp, 0.25_wp, ieee_value(1.0_wp, ieee_positive_inf), 1.25_wp]
     ! gaps of -0.5, 0.5, -1, infinite, -0.25 under an approach of 1.5
@@ -101,7 +101,7 @@ contains
     real(wp) :: p(3), w(3), odd(2)
     type(classification_t) :: found
     integer :: i
-    logical :: next(3)
+    logical(lk) :: next(3)
 
     if (debug_checks) return
     odd = [ieee_value(1.0_wp, ieee_quiet_nan), ieee_value(1.0_wp, ieee_positive_inf)]
@@ -110,8 +110,8 @@ contains
       w = 0.0_wp
       if (i < 2) p(2) = odd(1 + modulo(i, 2))
       if (i >= 2) w(3) = odd(1 + modulo(i, 2))
-      call classify_row(limits_t(1.0_wp, 1.0_wp, 0.5_wp), [0.0_wp, 0.0_wp, 0.0_wp], p, w, [.true., .true., .false.], &
-                        [.true., .true., .false.], next, found)
+      call classify_row(limits_t(1.0_wp, 1.0_wp, 0.5_wp), [0.0_wp, 0.0_wp, 0.0_wp], p, w, &
+                        [logical(lk) :: .true., .true., .false.], [logical(lk) :: .true., .true., .false.], next, found)
       call check_true(error, .not. found%finite, 'not finite')
       if (allocated(error)) return
     end do
@@ -206,7 +206,7 @@ contains
   pure function disc(n, radius) result(active)
     integer, intent(in) :: n
     real(wp), intent(in) :: radius
-    logical :: active(n, n)
+    logical(lk) :: active(n, n)
     integer :: i, j
     real(wp) :: x, y
 
@@ -224,7 +224,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 41
     type(edge_extension_t) :: edge
-    logical :: active(n, n)
+    logical(lk) :: active(n, n)
     real(sp), target :: x(n, n), y(n, n), extended(n, n), folded(n, n)
     real(sp), pointer, contiguous :: flat(:)
     real(wp) :: left, right
@@ -273,7 +273,7 @@ contains
     type(fft_flexibility_t) :: flexibility
     type(inverse_symbol_t) :: preconditioner
     type(edge_extension_t) :: edge
-    logical :: active(n, n)
+    logical(lk) :: active(n, n)
     real(wp), dimension(n, n, 1) :: x, r, z, d, kd
     real(wp) :: rz, rz_old, step
     integer :: i
@@ -318,7 +318,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 20
     type(edge_extension_t) :: edge
-    logical :: active(n, n)
+    logical(lk) :: active(n, n)
     real(sp) :: field(n*n), before(n*n)
 
     active = .false.

@@ -1,6 +1,6 @@
 !> Solvers with another operator and another preconditioner than the usual ones.
 module test_preconditioner
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_active_set, only: active_set_t, new_active_set
@@ -71,7 +71,7 @@ contains
     real(wp), dimension(n, n, 1) :: x, y, w
     real(wp), dimension(n*n) :: compliance, mx, mw, packed
     type(active_set_t) :: nodes
-    logical :: active(n, n)
+    logical(lk) :: active(n, n)
     real(wp) :: work, layer, inside
     integer :: col, row, softness
 
@@ -127,7 +127,7 @@ contains
     real(wp), dimension(side, side) :: x, y, radius
     real(wp), dimension(n) :: distance, turn
     real(wp), dimension(2*n) :: traction, moved, answer, other, other_moved, other_answer
-    logical :: unknown(2*n)
+    logical(lk) :: unknown(2*n)
     integer :: front, frame
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-24, -24], [side, side], error)
@@ -193,7 +193,7 @@ contains
     type(operators_t), target :: operators
     type(shear_system_t), target :: system
     real(wp), allocatable :: x(:, :), y(:, :), radius(:), slip(:), v(:), image(:), back(:)
-    logical, allocatable :: unknown(:)
+    logical(lk), allocatable :: unknown(:)
     real(wp) :: eigenvalue
     integer :: spacings, half, side, n, k
 
@@ -233,7 +233,7 @@ contains
 
   subroutine set_active(self, active, compliance, direction)
     class(diagonal_preconditioner_t), intent(inout) :: self
-    logical, intent(in), contiguous :: active(:)
+    logical(lk), intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
     self%spring = spread(0.0_wp, 1, size(active))
@@ -328,7 +328,7 @@ contains
     if (allocated(error)) return
     do k = 1, 2
       associate (problem => contact%problem)
-        call new_normal_problem(level(k), problem%lattice, problem%medium, problem%initial_gap, problem%candidate, error)
+        call new_normal_problem(level(k), problem%lattice, problem%medium, problem%initial_gap, logical(problem%candidate), error)
       end associate
       if (allocated(error)) return
       call level(k)%prepare(kernel, .true., .true., field_space_t(), error)

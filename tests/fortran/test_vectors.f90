@@ -1,7 +1,7 @@
 !> Fields and packed ones: whatever the number of threads, the same bits.
 module test_vectors
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
@@ -102,7 +102,7 @@ contains
       if (allocated(error)) return
       call check(error, space%max(-abs(window) - 1.0_wp), -minval(abs(window)) - 1.0_wp, 0.0_wp, 'the same over a window')
       if (allocated(error)) return
-      call check_true(error, space%count(x > 0.2_wp) == count(x > 0.2_wp), 'number of nodes')
+      call check_true(error, space%count(logical(x > 0.2_wp, lk)) == count(x > 0.2_wp), 'number of nodes')
       if (allocated(error)) return
       call space%fill(y, 0.25_wp)
       call space%add(x, y)
@@ -131,7 +131,7 @@ contains
     if (allocated(error)) return
     call check_true(error, max(alone%max(none), alone%max(no_window)) <= -huge(1.0_wp), 'largest of nothing')
     if (allocated(error)) return
-    call check_true(error, alone%count(none > 0.0_wp) == 0, 'no nodes')
+    call check_true(error, alone%count(logical(none > 0.0_wp, lk)) == 0, 'no nodes')
     if (allocated(error)) return
     call check_true(error, size(alone%dots(no_columns, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp])) == 0, 'no products')
   end subroutine test_odd_fields
@@ -163,7 +163,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 20011
     type(active_set_t) :: packing
-    logical :: active(n)
+    logical(lk) :: active(n)
     real(wp) :: x(n), back(n)
     real(wp), allocatable :: packed(:)
     integer :: pattern, threads
@@ -210,7 +210,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 3001
     type(active_set_t) :: nodes
-    logical :: active(2*n)
+    logical(lk) :: active(2*n)
     integer :: place(2*n), found(2*n), k, i, low, high
 
     active(:n) = sample(n) > -0.3_wp
@@ -243,7 +243,7 @@ contains
     call find_span([-1.0_wp, 0.0_wp, 2.0_wp, -3.0_wp, 4.0_wp, 0.0_wp], low, high)
     call check_true(error, low == 3 .and. high == 5, 'span of values above zero')
     if (allocated(error)) return
-    call find_span([.false., .false.], low, high)
+    call find_span([logical(lk) :: .false., .false.], low, high)
     call check_true(error, low == 1 .and. high == 0, 'no span')
   end subroutine test_pairs
 

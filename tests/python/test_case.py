@@ -316,7 +316,7 @@ def test_a_case_from_python_is_a_deck_too() -> None:
         ({"nodes_across": 41, "normal_load": None}, "load.1: expected at least one of normal_load"),
         (
             {"nodes_across": 41, "loads": []},
-            "loads: expected either loads, or normal_load or approach with steps",
+            "loads: expected either loads, or one load or motion with steps",
         ),
         ({"nodes_across": 41, "normal_load": None, "loads": [3]}, "load.1 = 3: expected a table of keys"),
         (
@@ -550,7 +550,7 @@ def test_arguments_may_change_as_keys_do() -> None:
     assert case.changed({"grid.nodes_in_radius": 9}, tolerance=1e-6).solver.tolerance == 1e-6
     with pytest.raises(TypeError, match="^spacin: unknown argument of Case.changed; did you mean spacing"):
         case.changed(spacin=1e-5)
-    with pytest.raises(DeckError, match="^loads: expected either loads, or normal_load or approach"):
+    with pytest.raises(DeckError, match="^loads: expected either loads, or one load or motion"):
         case.changed(normal_load=1.0, loads=[{"approach": 1e-6}])
 
 

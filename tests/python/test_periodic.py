@@ -37,6 +37,30 @@ def test_waves_between_their_limits(share: float, mean_gap: float) -> None:
     assert float(by_gap["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-6)
 
 
+def test_loads_by_means_are_arguments_of_a_case() -> None:
+    pressure = 0.3 * FULL
+    alone, listed = (
+        waves(nodes=16, mean_pressure=pressure),
+        waves(nodes=16, loads={"mean_pressure": pressure}),
+    )
+    assert alone.deck == listed.deck
+    assert waves(nodes=16, mean_gap="0.2 um").deck.load[0].mean_gap == pytest.approx(2e-7)
+
+
+def test_two_spacings_need_no_lattice() -> None:
+    """Cells of a window that repeats are rectangles."""
+    lattice = waves(nodes=None, spacing=["25 um", "50 um"], mean_pressure=1e8).lattice
+    assert lattice.shape == (20, 40)
+
+
+def test_no_approach_closes_more_than_the_mean_gap() -> None:
+    """There all of the window touches, and no pressure belongs to more."""
+    assert waves(nodes=16, approach=0.9 * HEIGHT).run().normal_load[-1] > 0.0
+    for approach in (HEIGHT, 2 * HEIGHT):
+        with pytest.raises(DeckError, match="approach = .*expected less than 1.000 µm, the mean gap"):
+            waves(approach=approach)
+
+
 @pytest.mark.parametrize("rows", [1, 4, 8])
 def test_few_rows_are_as_good_as_many(rows: int) -> None:
     """Westergaard's wave: the largest pressure at half of the load of complete contact."""

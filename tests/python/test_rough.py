@@ -150,7 +150,10 @@ BAD = {
     "both": ({"rms_height": 1e-6}, "expected rms_height or rms_slope, not both"),
     "none": ({"rms_slope": None}, "expected rms_height or rms_slope, one of them"),
     "hurst": ({"hurst": 1.5}, "hurst = 1.5: expected"),
-    "order": ({"shortest": "1 mm"}, "expected wavelengths that increase"),
+    "order": (
+        {"shortest": "1 mm"},
+        "^body.1.surface: shortest, rolloff, longest: expected wavelengths that",
+    ),
     "waves": ({"shortest": "1.2 mm", "longest": "1.3 mm"}, "no wave between shortest and longest fits"),
     "points": ({"shortest": "1 nm"}, "expected at most 67,108,864"),
     "period": ({"period": ["0.2 mm", "0.2 mm"]}, "the gap does not repeat"),

@@ -367,7 +367,11 @@ def _normal(closed: ClosedForms, load: float) -> list[Exact]:
     if not hertz_gap.pressure_is_frictionless(attributes):
         return []
     if pressed is None:
-        plane = hertz_gap.plane_contact(str(attributes.get("deck", "")), attributes, load)
+        deck = str(attributes.get("deck", ""))
+        if (crown := hertz_gap.crowned(deck, attributes, load)) is not None:
+            contact = crown.contact(load)
+            return [Exact("Hertz", {"max_pressure": contact.max_pressure, "approach": contact.approach})]
+        plane = hertz_gap.plane_contact(deck, attributes, load)
         return [Exact("Hertz, plane contact", {"max_pressure": plane[1]})] if plane else []
     contact = pressed.contact(load)
     values = {"max_pressure": contact.max_pressure, "approach": contact.approach + pressed.lowest}

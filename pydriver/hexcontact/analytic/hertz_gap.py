@@ -98,7 +98,7 @@ class QuadraticGap:
             return None
         height = float(coefficients[0] + 0.5 * lowest @ coefficients[1:3] / size)
         center = (float(x.mean() + lowest[0]), float(y.mean() + lowest[1]))
-        return cls._elliptic(dataset.attrs, hessian, center, height)
+        return cls.of_hessian(dataset.attrs, hessian, center, height)
 
     @classmethod
     def of_deck(cls, deck: str, attributes: Mapping[Any, Any]) -> QuadraticGap | None:
@@ -107,10 +107,10 @@ class QuadraticGap:
         if separation is None or separation.moves or separation.quadratic is None:
             return None
         hessian, center = separation.quadratic
-        return cls._elliptic(attributes, hessian, center, float(separation(*center)))
+        return cls.of_hessian(attributes, hessian, center, float(separation(*center)))
 
     @classmethod
-    def _elliptic(
+    def of_hessian(
         cls, attributes: Mapping[Any, Any], hessian: Array, center: tuple[float, float], lowest: float
     ) -> QuadraticGap | None:
         """Return the gap if it and the law of contact lead to an ellipse."""
@@ -130,6 +130,20 @@ class QuadraticGap:
         return self.contact(load).approach + self.lowest
 
 
+def crowned(deck: str, attributes: Mapping[Any, Any], load: float) -> QuadraticGap | None:
+    """Return the gap of a crowned roller whose contact under a load (N) ends before its length; else None."""
+    surface = recorded(deck).only_surface
+    if not isinstance(surface, Roller) or not surface.crown_radius:
+        return None
+    along = np.array([math.cos(surface.angle), math.sin(surface.angle)])
+    across = np.array([-along[1], along[0]])
+    hessian = np.outer(along, along) / surface.crown_radius + np.outer(across, across) / surface.radius
+    gap = QuadraticGap.of_hessian(
+        attributes, hessian, (float(surface.offset[0]), float(surface.offset[1])), 0.0
+    )
+    return gap if gap and gap.contact(load).semi_major < surface.reach else None
+
+
 def plane_contact(deck: str, attributes: Mapping[Any, Any], load: float) -> tuple[float, float] | None:
     """Return half-width (m) and pressure (Pa) of plane contact of the roller of a deck; None without one."""
     surface, modulus = recorded(deck).only_surface, attribute_of(attributes, "effective_modulus")
@@ -143,11 +157,12 @@ def against_hertz(
 ) -> list[tuple[str, float, float, str]]:
     """Compare a load step with Hertz: quantity, Hertz, computed, unit; empty if his assumptions fail.
 
-    Beside a roller on a flat stands the pressure of plane contact.
+    Beside a roller on a flat stands the pressure of plane contact alone, unless a crown ends the contact.
     """
-    gap, load = QuadraticGap.of_deck(deck, attributes), float(history["normal_load"])
+    load = float(history["normal_load"])
     if not load > 0.0 or is_worn(history) or not pressure_is_frictionless(attributes):
         return []
+    gap = QuadraticGap.of_deck(deck, attributes) or crowned(deck, attributes, load)
     if gap is None:
         plane = plane_contact(deck, attributes, load)
         return [("max_pressure", plane[1], float(history["max_pressure"]), "Pa")] if plane else []

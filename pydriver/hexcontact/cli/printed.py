@@ -222,6 +222,8 @@ def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: Histo
         "contact_semi_major": "larger half-axis of the contact",
         "contact_semi_minor": "smaller half-axis of the contact",
     }
+    if len(compared) == 1:  # beside a roller
+        named["max_pressure"] = f"{spelled('max_pressure')} (plane contact, P/l)"
     rows: list[Row] = []
     for name, exact, value, unit in compared:
         off, error = f"{100 * (value / exact - 1):+.3f} %", float(history.get(f"{name}_error", math.nan))

@@ -257,9 +257,10 @@ class Contact(Handle):
         rim_warning: bool,
     ) -> None:
         self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
-        self._mask: Mask = np.ones(lattice.shape, dtype=bool)
+        self._mask: Mask = np.broadcast_to(True, lattice.shape)  # takes no memory
         if candidate is not None:
-            self._mask = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
+            given = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
+            self._mask = self._mask if given.all() else given
         gap = shaped(initial_gap, lattice, "initial_gap")
         self._beyond = gap[~self._mask]  # of nodes that cannot touch
         gap = _finite(gap if self._mask.all() else np.where(self._mask, gap, 0.0), "initial_gap")

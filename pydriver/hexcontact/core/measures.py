@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..variables import VARIABLES
 from . import flat
-from .contact import ElasticPair, Interface, NormalSolution
+from .contact import Contact, ElasticPair, Interface, NormalSolution
 from .flat import area_radius as area_radius
 from .flat import boundary as boundary
 from .flat import boundary_circle as boundary_circle
@@ -121,16 +121,14 @@ def nodal_residuals(
     return np.asarray(flat.normal_residual(lattice, pair, interface, solution.pressure, solution.gap))
 
 
-def measures(
-    lattice: Lattice, friction: FrictionLaw, initial_gap: Array, candidate: Mask, solution: NormalSolution
-) -> dict[str, float]:
+def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:
     """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
-    given = initial_gap, candidate, solution
-    if isinstance(solution, ContactState):
-        found = flat.measure_friction(lattice, friction, *given)
+    frictional = isinstance(solution, ContactState)
+    found = (flat.measure_friction if frictional else flat.measure_pressure)(contact, solution)
+    if frictional and not contact.lattice.periodic:
         all_known: dict[str, float] = found._asdict()
-        return recorded(lattice, found, friction=True) if lattice.periodic else all_known
-    return recorded(lattice, flat.measure_pressure(lattice, *given), friction=False)
+        return all_known
+    return recorded(contact.lattice, found, friction=frictional)
 
 
 def recorded(lattice: Lattice, found: Any, *, friction: bool) -> dict[str, float]:

@@ -70,7 +70,8 @@ def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     for problem in problems:
         key = dotted(problem.key)
         value = "" if problem.value is MISSING else shown(problem.value)
-        message = f"{source.locate(key)}{key}{value and ' = '}{value}: {problem.sentence}"
+        lead = f"{source.locate(key)}{key}{value and ' = '}{value}"
+        message = f"{lead}: {problem.sentence}" if lead else problem.sentence
         file, place = source.found(key)
         line, column = place or (None, None)
         fault = Fault(message, key, value, file, line, column, problem.sentence)

@@ -275,7 +275,8 @@ class Grid(Table):
         two = isinstance(data.get("spacing"), list | tuple)
         if two and "cell_ratio" in data:
             yield "cell_ratio", "expected two spacings or cell_ratio, not both"
-        if two and data.get("lattice", "equilateral") == "equilateral" and "cell_angle" not in data:
+        usual = "rectangular" if data.get("boundary") == "periodic" else "equilateral"
+        if two and data.get("lattice", usual) == "equilateral" and "cell_angle" not in data:
             yield "spacing", 'expected one length on an equilateral lattice; or lattice = "rectangular"'
         if data.get("boundary") == "periodic":
             if data.get("spacing") == "auto":

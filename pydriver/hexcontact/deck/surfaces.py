@@ -37,7 +37,7 @@ from .kinds import (
     refuse,
 )
 from .table_base import Argument, meaning, refuse_key
-from .units import ANGLE, FORCE, LENGTH, NUMBER, Dimension
+from .units import ANGLE, FORCE, LENGTH, NUMBER, Dimension, readable
 
 _S = TypeVar("_S", bound="Surface")
 
@@ -463,6 +463,13 @@ class Roller(Surface):
                 yield key, f'missing; expected it for profile = "{name}"'
             elif name != profile and key in data:
                 yield key, f'expected it for profile = "{name}" only'
+
+    def model_post_init(self, context: Any) -> None:
+        """Refuse chamfers that meet."""
+        super().model_post_init(context)
+        if self.chamfer and self.chamfer >= self.reach:
+            half = readable(self.reach)
+            raise DeckError(f"chamfer: expected less than {half}, half the length")
 
     @property
     def reach(self) -> float:

@@ -207,6 +207,8 @@ class Table(BaseModel):
             return Mistake(key, MISSING, "expected at least one entry")
         if kind in ("model_type", "model_attributes_type", "dict_type"):
             return Mistake(key, value, "expected a table of keys")
+        if kind == "value_error":  # of a whole table
+            return Mistake(key, MISSING, str(details["ctx"]["error"]))
         return Mistake(key, value, details["msg"])
 
 

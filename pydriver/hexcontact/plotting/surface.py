@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -48,20 +49,24 @@ def surface(case: Any) -> Figure:
 
 def _map(axes: Axes, one: Measured, case: Any) -> None:
     """Draw the heights of a map as far as it is measured; points without one are gray."""
-    found = one.placed("").map
+    found, touch = one.placed("").map, case.deck.body.separation.first_touch
     (x, y), height = (found.x + one.offset[0], found.y + one.offset[1]), -found.gap  # type: ignore[operator]
-    _colored(axes, x, y, height if one.upwards else -height, "height" if one.upwards else "gap", case)
+    _colored(axes, x, y, height if one.upwards else -height, "height" if one.upwards else "gap", case, touch)
 
 
 def _gap(axes: Axes, case: Any) -> None:
     """Draw the gap over the rectangle about the window."""
     u, v = _window(case)
     x, y = (np.linspace(at.min(), at.max(), _POINTS) for at in (u, v))
-    gap = case.deck.body.separation(*np.meshgrid(x, y, indexing="ij"))
-    _colored(axes, x, y, gap, "gap", case)
+    # of rough surfaces, that over the period of the window
+    gap = case.plane_gap.at(*np.meshgrid(x, y, indexing="ij"))
+    col, row = np.unravel_index(np.nanargmin(gap), gap.shape)
+    _colored(axes, x, y, gap, "gap", case, (x[col], y[row]))
 
 
-def _colored(axes: Axes, x: Array, y: Array, values: Array, words: str, case: Any) -> None:
+def _colored(
+    axes: Axes, x: Array, y: Array, values: Array, words: str, case: Any, touch: Sequence[float]
+) -> None:
     """Draw values over the plane, with the window and the point of first touch."""
     shown = np.ma.masked_invalid(values)
     times, unit = scaled(float(shown.max() - shown.min()), "m")
@@ -71,7 +76,6 @@ def _colored(axes: Axes, x: Array, y: Array, values: Array, words: str, case: An
     axes.figure.colorbar(drawn, ax=axes, label=f"{words} ({unit})")
     u, v = _window(case)
     axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
-    touch = case.deck.body.separation.first_touch
     axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
     axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})", aspect="equal")
     axes.legend(loc="upper right", labelcolor="w", fontsize=8)

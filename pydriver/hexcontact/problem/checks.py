@@ -16,12 +16,13 @@ from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MOST_STEPS
 from ..deck.surfaces import SurfaceSum
 from ..errors import DeckError
-from ..text import did_you_mean, listed, shown
+from ..text import did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
 
+_ALL_TOUCH = 1 - 1e-9  # approach over mean gap, from which no pressure belongs to it
 _THINNEST = 0.1  # layer over spacing, from which the sums of a periodic window end
 _ALONG = 1e-8  # sine of an angle between directions that are one
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
@@ -61,8 +62,8 @@ def checked(
             period = repeating.period if repeating else _SOME_PERIOD
             steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
             found += against
-            if {"grid", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
-                found += _mistakes(tables, _period_problems(tables, steps))
+            if {"grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
+                found += _mistakes(tables, _period_problems(tables, steps, period))
                 found += _mistakes(tables | {"solver": solver}, _rolling_problems(tables, solver))
         if {"output", "wear"} <= tables.keys():
             found += _mistakes(tables, _field_problems(tables, algorithm))
@@ -123,7 +124,7 @@ def _repeating(
     return Repeating(lattice, period, surfaces), []
 
 
-def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Found:
+def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep], period: Period) -> Found:
     """Yield tables and loads that a periodic window refuses, and means in a free window."""
     if not tables["grid"].periodic:
         for place, load in enumerate(tables["load"]):
@@ -143,6 +144,16 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fo
         yield from ((key, turned) for key in named)
     elif any(step.twist.value or step.twist.control == "force" for step in steps):
         yield ("load",), turned
+    # a mean pressure moves no mean plane of a half-space
+    bodies = tables["body"].body_1, tables["body"].body_2
+    closes = not (tables["interface"] or all(body.rigid for body in bodies))
+    for key, segment in _segments(tables["load"]) if closes else ():
+        if segment.approach is not None and segment.approach >= _ALL_TOUCH * period.mean_height:
+            height = quantity(period.mean_height, "m")
+            sentence = (
+                f"expected less than {height}, the mean gap before loading: there all of the window touches"
+            )
+            yield (*key, "approach"), f"{sentence}, and mean_pressure goes on"
     if tables.get("bulk"):
         yield ("bulk",), f"expected nothing {whole}: a strain of the plane does not repeat"
     if tables["solver"].method == "direct":

@@ -254,7 +254,8 @@ class Problem:
         NaN somewhere.
         """
         gap = self._gap_in(step).over(lattice)
-        return gap, np.isfinite(gap)
+        touching = np.isfinite(gap)
+        return gap, np.broadcast_to(True, gap.shape) if touching.all() else touching
 
     @property
     def plane_gap(self) -> PlaneField:

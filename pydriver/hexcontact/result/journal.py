@@ -30,12 +30,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .._version import __version__
-from ..arrays import Banded
+from ..arrays import BAND, Banded
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..files import beginning, made, names_a_run, reading, replacing, require_kinds
 from ..variables import VARIABLES
-from .layout import BAND, Metadata, assemble
+from .layout import Metadata, assemble
 from .step import Step
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import Banded, Dataset
+from ..arrays import Banded, Dataset, in_bands
 from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
@@ -31,7 +31,6 @@ COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
 _ATTRIBUTES_OF = {name: variable.attributes for name, variable in VARIABLES.items()}
 _STEPS = 64**2  # nodes of a chunk with several steps
-BAND = 512  # rows that are read and written at once, those of a chunk
 
 
 def now() -> str:
@@ -221,22 +220,6 @@ class Layout:
                 for other in others:
                     values = np.where(np.isnan(values), other, values)
             column[rows if steps is None else (steps, rows)] = values
-
-
-def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
-    """Join and cut bands so that each but the last has so many rows."""
-    left: list[NDArray[Any]] = []
-    for part in parts:
-        start = 0
-        while start < len(part):
-            missing = rows - sum(map(len, left))
-            left.append(part[start : start + missing])
-            start += missing
-            if sum(map(len, left)) == rows:
-                yield left[0] if len(left) == 1 else np.concatenate(left)
-                left = []
-    if left:
-        yield left[0] if len(left) == 1 else np.concatenate(left)
 
 
 def lattice_of(dataset: Dataset) -> Lattice:

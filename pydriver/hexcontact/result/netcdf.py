@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Dataset
+from ..arrays import BAND, Dataset
 from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.keys import BULK_STATES
@@ -40,7 +40,7 @@ from ..variables import (
     VARIABLES,
     names_where,
 )
-from .layout import BAND, COORDINATES, MISSING, Layout, history_of, lattice_of
+from .layout import COORDINATES, MISSING, Layout, history_of, lattice_of
 from .step import Step
 
 if TYPE_CHECKING:
@@ -243,7 +243,7 @@ def _faults_of_fields(
 NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
 TOPOLOGY, FACE_NODES = "mesh", "mesh_face_nodes"
 MESH = (TOPOLOGY, "mesh_node_x", "mesh_node_y", FACE_NODES)
-_TRIANGLES = 1 << 16  # triangles
+_TRIANGLES = 1 << 14  # triangles
 
 
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:

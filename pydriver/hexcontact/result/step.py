@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..analytic.hertz_gap import friction_of, is_compliant
-from ..arrays import Array, Banded, Dataset, Mask
+from ..arrays import Array, Banded, Dataset, Mask, in_bands
 from ..core.edges import ContactEdges, TractionField
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, crossings, linear, nearest, section_ends
@@ -73,12 +73,11 @@ class NodalStep:
         return self.index + 1
 
     def bands(self, name: str) -> Iterator[tuple[Lattice, NDArray[Any]]]:
-        """Yield a field in bands of rows, each with its window; one band if the field is in memory."""
-        if not isinstance(self.fields, Banded):
-            yield self.lattice, np.asarray(self.fields[name])
-            return
-        row = self.lattice.row_first
-        for band in self.fields.bands(name):
+        """Yield a field in bands of rows, each with its window."""
+        fields, row = self.fields, self.lattice.row_first
+        for band in in_bands(
+            fields.bands(name) if isinstance(fields, Banded) else [np.asarray(fields[name])]
+        ):
             yield dataclasses.replace(self.lattice, row_first=row, n_row=len(band)), band
             row += len(band)
 

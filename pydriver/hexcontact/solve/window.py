@@ -197,14 +197,11 @@ class Window:
 
     def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
         """Return the measures of a state, and whether the pressure rises to an end of the surface."""
-        gap = self.initial_gap if self.gap is None else self._where_touching(self.gap)
-        if self.worn is not None:
-            gap = self.initial_gap + self.worn
-        found = measures(self.lattice, self.friction, gap, self.candidate, solution)
+        found = measures(self.contact, solution)
         inside = self.candidate
         if self.case.chamfered:
             inside = before_ends(inside, self.lattice, self.case.chamfered)
-        return found, is_unbounded(inside, solution.pressure)
+        return found, not inside.all() and is_unbounded(inside, solution.pressure)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.

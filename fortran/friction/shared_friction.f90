@@ -164,16 +164,19 @@ contains
   subroutine deal_mask(self, field, own)
     class(shared_friction_t), intent(in) :: self
     !> Mask (n_col, n_row); on ranks but the first one absent
-    logical(lk), intent(in), contiguous, optional, target :: field(:, :)
+    logical(lk), intent(in), optional :: field(:, :)
     !> Rows of this rank (n_col, rows)
-    logical(lk), intent(out), contiguous, target :: own(:, :)
-    integer, target :: none(1)
+    logical(lk), intent(out) :: own(:, :)
+    real(wp), allocatable :: rows(:, :)
 
+    ! a row of bytes is no number of words, which ranks exchange
+    allocate (rows(size(own, 1), size(own, 2)))
     if (present(field)) then
-      call deal(self, size(own, 1), c_loc(field), c_loc(own))
+      call deal_real(self, merge(1.0_wp, 0.0_wp, field), rows)
     else
-      call deal(self, size(own, 1), c_loc(none), c_loc(own))
+      call deal_real(self, own=rows)
     end if
+    own = rows > 0.5_wp
   end subroutine deal_mask
 
   !> Deal zones of the first rank out.

@@ -86,7 +86,7 @@ contains
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(dsx, dsy, i, from, to, low, high)
-      do row = 1, now%problem%lattice%extent(2)
+      do row = 1, n/n_col
         to = row*n_col
         from = to - n_col + 1
         do i = from, to
@@ -111,7 +111,7 @@ contains
       if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, compliance, zone)
 
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, ahead, aside, i, from, to)
-      do row = 1, now%problem%lattice%extent(2)
+      do row = 1, n/n_col
         to = row*n_col
         from = to - n_col + 1
         do i = from, to
@@ -214,7 +214,7 @@ contains
         end do
       end do
       !$omp end parallel do
-      missing(k) = driven%load(k, now%problem, now%target) - sum(part)
+      missing(k) = driven%load(k, now%problem, now%target) - now%operators%space%total(part)
     end do
   end subroutine find_constraints
 
@@ -233,7 +233,7 @@ contains
     n_col = now%problem%lattice%extent(1)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, low, high, i, m)
-    do row = 1, now%problem%lattice%extent(2)
+    do row = 1, n/n_col
       from = (row - 1)*n_col
       call find_span(now%contact(from + 1:from + n_col), low, high)
       to = from + high

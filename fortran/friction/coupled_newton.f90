@@ -182,7 +182,7 @@ contains
     call new_active_set(step%pressed, now%contact, step%system%space)
     step%system%pressed => step%pressed
     step%system%sheared => step%sheared
-    step%sticks = any(shear_active(n + 1:))
+    step%sticks = step%system%space%count(shear_active(n + 1:)) > 0
     deallocate (shear_active)
   end subroutine find_nodes
 
@@ -268,7 +268,7 @@ contains
       if (step%determined()) deallocate (now%p, now%q)
       residual = min(residual, 1.0_wp)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
-                                options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
+                                options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
       call pack_unknowns(step, unknown, fixed, kept)

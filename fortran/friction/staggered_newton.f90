@@ -356,7 +356,7 @@ contains
     call classify(now, fixing, active)
     call new_active_set(nodes, active, now%shear%space)
     call nodes%pair(2*n)
-    found%sticks = any(active(n + 1:))
+    found%sticks = now%shear%space%count(active(n + 1:)) > 0
     deallocate (active)
     associate (constraints => found%constraints)
       call find_constraints(now, nodes, found%driven, constraints%columns, found%missing)

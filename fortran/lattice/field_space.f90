@@ -47,7 +47,7 @@ module hc_field_space
     generic :: count => count_nodes, count_window
     procedure :: count_positive
     !> Sum of values by row; largest values, in place
-    procedure :: total, most
+    procedure :: total, most, largest, number
     !> First and last row of this rank, and the size of its part of a field
     procedure :: own_rows, own_extent
     !> Rows of a field over the window, wherever they lie
@@ -113,7 +113,7 @@ contains
 
   !> Return the largest of a value of all ranks.
   real(wp) function largest(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     real(wp), intent(in) :: value
     real(wp) :: values(1)
 
@@ -124,7 +124,7 @@ contains
 
   !> Return the sum of a count of all ranks.
   integer function number(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     integer, intent(in) :: value
     integer :: values(1)
 

@@ -384,13 +384,15 @@ contains
     end do
   end subroutine number_nodes
 
-  !> Return whether the active nodes are those of a set.
+  !> Return whether the active nodes of this rank are those of a set.
   logical function is_set(self, active)
     class(active_set_t), intent(in) :: self
     !> The set
     logical(lk), intent(in), contiguous :: active(:)
+    type(field_space_t) :: own
     integer :: k, within
 
+    own%threads = self%space%threads
     within = 0
     !$omp parallel do schedule(static) num_threads(self%space%threads) reduction(+: within)
     do k = 1, size(self%first)
@@ -398,7 +400,7 @@ contains
     end do
     !$omp end parallel do
     is_set = within == self%n_active
-    if (is_set) is_set = self%space%count(active) == within
+    if (is_set) is_set = own%count(active) == within
   end function is_set
 
 end module hc_active_set

@@ -366,7 +366,7 @@ contains
     resultants = 0.0_wp
     if (allocated(self%rows)) n = size(self%rows, 1)
     do m = 1, size(self%columns, 2)
-      if (n < size(x)) resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:))
+      resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:))
       if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
     end do
     if (allocated(self%of_sum)) resultants(size(resultants)) = space%sum(x(:self%n_before))

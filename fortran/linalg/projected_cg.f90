@@ -190,7 +190,9 @@ contains
       end do
     end do
     !$omp end parallel do
-    along = sum(part, dim=2)
+    do m = 1, size(along)
+      along(m) = space%total(part(m, :))
+    end do
   end subroutine advance_residual
 
   !> Compute r <- r + B change, and its largest element.
@@ -217,6 +219,7 @@ contains
       end do
     end do
     !$omp end parallel do
+    largest = space%largest(largest)
   end subroutine add_constraints
 
   !> Project z <- z + M B share, and compute r^T z.
@@ -245,7 +248,7 @@ contains
       part(k) = ddot(to - from + 1, r(from:to), 1, z(from:to), 1)
     end do
     !$omp end parallel do
-    rz = sum(part)
+    rz = space%total(part)
   end subroutine project
 
   !> Compute y <- alpha x + beta y; where beta is 0, y need not be a number.

@@ -264,26 +264,22 @@ contains
     class(friction_problem_t), intent(in) :: self
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-    real(wp) :: load(n_motion), part(n_load, size(pressure, 2)), x(size(pressure, 1)), y(size(pressure, 1))
-    integer :: row
+    real(wp) :: load(n_motion), part(size(pressure, 2), n_load), x(size(pressure, 1)), y(size(pressure, 1))
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(x, y)
     do row = 1, size(pressure, 2)
-      part(normal, row) = sum(pressure(:, row))
-      part(along_x, row) = sum(traction(:, row, 1))
-      part(along_y, row) = sum(traction(:, row, 2))
+      part(row, normal) = sum(pressure(:, row))
+      part(row, along_x) = sum(traction(:, row, 1))
+      part(row, along_y) = sum(traction(:, row, 2))
       call self%lattice%row_coordinates(row + self%rows_before(), x, y)
-      part(about_z, row) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
+      part(row, about_z) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
     end do
     !$omp end parallel do
     load = 0.0_wp
-    if (self%space%ranks%size == 1) then
-      load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
-    else
-      do row = 1, n_load
-        load(row) = self%lattice%cell_area()*self%space%total(part(row, :))
-      end do
-    end if
+    do k = 1, n_load
+      load(k) = self%lattice%cell_area()*self%space%total(part(:, k))
+    end do
     if (self%lattice%is_periodic()) load(about_z) = 0.0_wp                     ! a torque does not repeat
   end function resultants
 

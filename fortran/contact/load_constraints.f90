@@ -10,7 +10,7 @@ module hc_load_constraints
   use hc_precision, only: wp, pi, lk
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
-  use hc_active_set, only: find_span
+  use hc_active_set, only: active_set_t, new_active_set, find_span
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
@@ -73,13 +73,8 @@ contains
       self%motion = pack([along_x, along_y, about_z], control(along_x:about_z) == force_control .and. &
                          [.true., .true., n_contact > 1])
       if (touching > 0.0_wp) then
-        if (space%ranks%size == 1) then
-          middle = [sum(columns), dot_product(nodes, [(real(row, wp), row=1, size(nodes))])]/n_contact + lattice%first - 1
-        else
-          middle(1) = space%total(columns)/n_contact + lattice%first(1) - 1
-          middle(2) = space%total(nodes*[(real(row + problem%rows_before(), wp), row=1, size(nodes))])/n_contact &
-                      + lattice%first(2) - 1
-        end if
+        middle = [space%total(columns), space%total(nodes*[(real(row + problem%rows_before(), wp), row=1, size(nodes))])]
+        middle = middle/n_contact + lattice%first - 1
         middle = lattice%origin + matmul(lattice%basis, middle)
         if (control(along_y) == force_control) self%center(1) = middle(1)
         if (control(along_x) == force_control) self%center(2) = middle(2)
@@ -208,19 +203,19 @@ contains
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
     real(wp) :: carried, error, factor, before, bounds(size(pressure))
     logical(lk), allocatable :: contact(:, :)
-    integer :: k, try, n_contact
+    type(active_set_t) :: nodes
+    integer :: k, try
 
     overloads = .false.
-    n_contact = problem%space%count_positive(pressure)
-    if (.not. problem%friction%is_bounded() .or. n_contact == 0) return
+    if (.not. problem%friction%is_bounded() .or. problem%space%count_positive(pressure) == 0) return
     contact = pressure > 0.0_wp
     call new_driven_motions(driven, problem, target, contact)
     associate (n => size(driven%motion), options => problem%options%contact)
       load = [(driven%load(k, problem, target), k=1, n)]
       overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
       if (overloads .or. n == 0) return
-      n_contact = count(contact)
-      allocate (u(n_contact, 2, n))
+      call new_active_set(nodes, reshape(contact, [size(contact)]), problem%space, shape(contact))
+      allocate (u(nodes%n_active, 2, n))
       error = residual_normal
       carried = problem%lattice%cell_area()*problem%space%sum(pressure, contact)
       if (target%control(normal) == force_control) then
@@ -239,11 +234,11 @@ contains
         ! where it has a direction, friction takes b(p) |A u| of a slip u
         if (.not. problem%friction%is_isotropic()) u(:, :, k) = matmul(u(:, :, k), problem%friction%stretch())
       end do
-      allocate (length(n_contact), source=1.0_wp)
+      allocate (length(nodes%n_active), source=1.0_wp)
       factor = huge(1.0_wp)
       do try = 1, options%max_limit_motions
         before = factor
-        call improve_motion(problem%space, u, bound, load, options%least_limit_gain, length, factor)
+        call improve_motion(nodes%space, u, bound, load, options%least_limit_gain, length, factor)
         if (.not. factor < (1.0_wp - options%least_limit_gain)*before) exit
       end do
       overloads = factor*(1.0_wp + error) < 1.0_wp - options%load_rounding
@@ -269,7 +264,7 @@ contains
 
     do k = 1, size(load)
       do i = 1, size(load)
-        stiffness(i, k) = space%total([sum(spread(bound/length, 2, 2)*u(:, :, i)*u(:, :, k))])
+        stiffness(i, k) = space%dot(bound/length, sum(u(:, :, i)*u(:, :, k), dim=2))
       end do
     end do
     motion(:, 1) = load
@@ -284,7 +279,7 @@ contains
       moved = moved + motion(k, 1)*u(:, :, k)
     end do
     length = norm2(moved, dim=2)
-    factor = min(factor, space%total([dot_product(bound, length)]))
+    factor = min(factor, space%dot(bound, length))
     length = max(length, least_length*space%largest(maxval(length)))
   end subroutine improve_motion
 

@@ -47,17 +47,18 @@ contains
   real(wp) function sliding_parameter(now) result(r)
     type(friction_iterate_t), intent(in) :: now
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: total(2, now%problem%lattice%extent(2)), mean(2), scale
+    real(wp) :: part(now%problem%own_rows(), 2), mean(2), scale
     integer :: row
 
     r = 0.0_wp
     if (.not. (now%problem%lattice%is_periodic() .and. now%problem%friction%is_bounded())) return
-    if (.not. all(now%contact)) return
-    do row = 1, size(total, 2)
+    if (now%operators%space%count(now%contact) < now%problem%lattice%size()) return
+    do row = 1, size(part, 1)
       call now%slip_row(row, 1, dsx, dsy)
-      total(:, row) = [sum(dsx), sum(dsy)]
+      part(row, :) = [sum(dsx), sum(dsy)]
     end do
-    mean = merge(0.0_wp, sum(total, dim=2)/size(now%p), now%target%control([along_x, along_y]) == force_control)
+    mean = [now%operators%space%total(part(:, 1)), now%operators%space%total(part(:, 2))]/now%problem%lattice%size()
+    mean = merge(0.0_wp, mean, now%target%control([along_x, along_y]) == force_control)
     scale = now%traction_scale()
     if (norm2(mean) > now%tolerance*now%problem%tangential_compliance*scale) r = 2.0_wp*scale/norm2(mean)
   end function sliding_parameter
@@ -184,25 +185,21 @@ contains
     !> Loads less those of the present traction, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
-    real(wp) :: part(size(nodes%pairs%first))
-    integer :: n, n_t, n_col, k, run, from, to, m, at
+    integer :: n_t, n_col, k, run, from, to, m, at
 
-    n = size(now%p)
     n_t = nodes%pairs%n_first
     n_col = now%problem%lattice%extent(1)
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, to, m, at)
-      do run = 1, size(part)
-        part(run) = 0.0_wp
+      do run = 1, size(nodes%pairs%first)
         from = nodes%pairs%first(run)
         ! a run goes on in the next row where the contact reaches the rim
         do while (from <= nodes%pairs%last(run))
           to = min(nodes%pairs%last(run), from + n_col - 1 - modulo(from - 1, n_col))
           m = to - from + 1
           call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
-          part(run) = part(run) + dot_product(ux(:m), now%q(from:to)) + dot_product(uy(:m), now%q(n + from:n + to))
           at = nodes%pairs%place(run) + from - nodes%pairs%first(run)
           ! into the frames, which takes the same reflection as out of them
           call plane_row(m, now%shear%direction(:, from:to), ux, uy, constraint(at:at + m - 1, k), across)
@@ -214,9 +211,33 @@ contains
         end do
       end do
       !$omp end parallel do
-      missing(k) = driven%load(k, now%problem, now%target) - now%operators%space%total(part)
+      missing(k) = driven%load(k, now%problem, now%target) - carried_load(now, driven, k)
     end do
   end subroutine find_constraints
+
+  !> Compute the load of the present shear traction along a motion, over the cell area [Pa].
+  real(wp) function carried_load(now, driven, k)
+    type(friction_iterate_t), intent(in) :: now
+    !> Motions that are driven by their loads, and which of them
+    type(driven_motions_t), intent(in) :: driven
+    integer, intent(in) :: k
+    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy
+    real(wp) :: part(now%problem%own_rows())
+    integer :: n, row, from, to, low, high
+
+    n = size(now%p)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, from, to, low, high)
+    do row = 1, size(part)
+      from = (row - 1)*size(ux)
+      call find_span(now%contact(from + 1:from + size(ux)), low, high)
+      to = from + high
+      from = from + low
+      call driven%direction_row(k, now%problem, from, ux(:to - from + 1), uy(:to - from + 1))
+      part(row) = dot_product(ux(:to - from + 1), now%q(from:to)) + dot_product(uy(:to - from + 1), now%q(n + from:n + to))
+    end do
+    !$omp end parallel do
+    carried_load = now%operators%space%total(part)
+  end function carried_load
 
   !> Find the prescribed part of the displacements of sticking nodes: their old position, and the motions that
   !> are prescribed.

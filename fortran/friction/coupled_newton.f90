@@ -76,7 +76,7 @@ contains
     call find_nodes(now, shear_active, step)
     call constrain(now, step, missing, error)
     if (allocated(error)) return
-    call step%constraints%satisfy(step%system%space, missing, step%x, step%iteration%independent, step%nodes)
+    call step%constraints%satisfy(step%nodes%space, missing, step%x, step%iteration%independent, step%nodes)
     ! 4.
     if (step%iteration%independent) call solve(now, step, error)
     if (allocated(error)) return
@@ -176,7 +176,7 @@ contains
     integer :: n
 
     n = size(now%p)
-    call new_active_set(step%nodes, [now%contact, shear_active], step%system%space)
+    call new_active_set(step%nodes, [now%contact, shear_active], step%system%space, now%problem%own_extent())
     call new_active_set(step%sheared, shear_active, step%system%space)
     call step%sheared%pair(2*n)
     call new_active_set(step%pressed, now%contact, step%system%space)
@@ -215,7 +215,7 @@ contains
         call step%pressed%pack(along, c%rows(:, k))
       end do
       if (now%target%control(normal) /= force_control) return
-      missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - step%system%space%sum(now%p)]
+      missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()]
       c%multiplier = [c%multiplier, now%motion(normal)]
       allocate (ones(step%pressed%n_active, 1), source=1.0_wp)
       call find_punch_pressure(now, step%pressed, ones, punch, error)

@@ -95,6 +95,8 @@ module hc_friction_iterate
     procedure :: is_finite
     !> Cut the classification parameter
     procedure :: cut_parameter
+    !> Sum of the pressure over the window
+    procedure :: pressure_sum
   end type friction_iterate_t
 
 contains
@@ -107,6 +109,25 @@ contains
 
     self%share_of_r = max(factor*self%share_of_r, self%problem%options%newton%least_share_of_r)
   end subroutine cut_parameter
+
+  !> Sum the pressure over the window, row by row.
+  real(wp) function pressure_sum(self)
+    class(friction_iterate_t), intent(in) :: self
+
+    pressure_sum = over_window(self%problem%own_extent(), self%p)
+
+  contains
+
+    !> Sum a vector over all nodes.
+    real(wp) function over_window(n, p)
+      !> Columns and own rows of the window
+      integer, intent(in) :: n(2)
+      real(wp), intent(in) :: p(n(1), n(2))
+
+      over_window = self%operators%space%sum(p)
+    end function over_window
+
+  end function pressure_sum
 
   !> Set tractions and motions from those of a state, and compute the displacements.
   subroutine set_start(self, problem, operators, start, step, error, estimate)

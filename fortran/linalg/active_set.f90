@@ -26,7 +26,8 @@ module hc_active_set
   type :: active_set_t
     !> Number of active nodes
     integer :: n_active = 0
-    type(field_space_t), private :: space
+    !> Space of vectors of the active nodes
+    type(field_space_t) :: space
     !> First and last node of each run
     integer, allocatable :: first(:), last(:)
     !> Where it begins among the active nodes
@@ -93,13 +94,15 @@ contains
   end subroutine positive_span
 
   !> Find the runs of active nodes; they end at the ends of blocks, too.
-  subroutine new_active_set(self, active, space)
+  subroutine new_active_set(self, active, space, extent)
     !> Set to be set up
     type(active_set_t), intent(out) :: self
     !> Active nodes
     logical(lk), intent(in), contiguous :: active(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Columns and own rows of the window, by whose rows vectors of the active nodes are summed; absent: in blocks
+    integer, intent(in), optional :: extent(2)
     !> Where the runs of each block begin in the list, less one
     integer :: before((size(active) + block_size - 1)/block_size + 1)
     integer :: k, n_block
@@ -126,6 +129,7 @@ contains
     !$omp end parallel do
     call number_nodes(self)
     self%space = space
+    if (present(extent)) call find_ends(self, active, extent)
 
   contains
 
@@ -136,6 +140,33 @@ contains
     end function start
 
   end subroutine new_active_set
+
+  !> Find where rows of the window end among the active nodes.
+  subroutine find_ends(self, active, extent)
+    type(active_set_t), intent(inout) :: self
+    !> Active nodes of all components
+    logical(lk), intent(in), contiguous :: active(:)
+    !> Columns and own rows of the window
+    integer, intent(in) :: extent(2)
+    integer, allocatable :: ends(:, :)
+    integer :: m, row, before
+
+    allocate (ends(0:extent(2), size(active)/product(extent)))
+    do m = 1, size(ends, 2)
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(before)
+      do row = 1, extent(2)
+        before = ((m - 1)*extent(2) + row - 1)*extent(1)
+        ends(row, m) = count(active(before + 1:before + extent(1)))
+      end do
+      !$omp end parallel do
+      ends(0, m) = 0
+      if (m > 1) ends(0, m) = ends(extent(2), m - 1)
+      do row = 1, extent(2)
+        ends(row, m) = ends(row - 1, m) + ends(row, m)
+      end do
+    end do
+    call move_alloc(ends, self%space%ends)
+  end subroutine find_ends
 
   !> Count the runs of active nodes.
   pure integer function count_runs(active)

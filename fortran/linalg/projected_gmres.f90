@@ -75,7 +75,7 @@ contains
     integer :: directions
     type(field_space_t) :: space
 
-    space = system%space
+    space = nodes%space
     iteration%made = 0
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp

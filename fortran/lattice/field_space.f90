@@ -31,7 +31,7 @@ module hc_field_space
     type(communicator_t) :: helpers = communicator_t()
     !> Memory that the transforms of a solver share; not there: each has its own
     type(scratch_t), pointer :: scratch => null()
-    !> Where each own row ends in vectors of some nodes (from 0 on, component); not there: they are summed in blocks
+    !> Where each pair of own rows ends in vectors of some nodes (from 0 on, component); not there: they are summed in blocks
     integer, allocatable :: ends(:, :)
   contains
     !> Assign and combine vectors
@@ -55,7 +55,7 @@ module hc_field_space
     !> Rows of a field over the window, wherever they lie
     generic :: fetch => fetch_window, fetch_single, fetch_mask
     procedure, private :: fetch_window, fetch_single, fetch_mask
-    !> Terms of a sum over a vector: the rows or blocks that are added up, the components of each, and their elements
+    !> Terms of a sum over a vector: the pairs of rows or blocks that are added up, the components of each, and their elements
     procedure :: n_term, n_component, term
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
@@ -422,7 +422,7 @@ contains
     count_nodes = number(self, count_nodes)
   end function count_nodes
 
-  !> Return the number of terms of a sum: own rows, or blocks.
+  !> Return the number of terms of a sum: pairs of own rows, or blocks.
   pure integer function n_term(self, n)
     class(field_space_t), intent(in) :: self
     !> Length of the vector
@@ -440,21 +440,24 @@ contains
     if (allocated(self%ends)) n_component = size(self%ends, 2)
   end function n_component
 
-  !> Return the first and the last element of a component of a term; there are none if the last is less.
-  pure function term(self, k, component, n, before)
+  !> Find the first and the last element of a component of a term; there are none if the last is less.
+  pure subroutine term(self, k, component, n, before, first, last)
     class(field_space_t), intent(in) :: self
     !> Term and component
     integer, intent(in) :: k, component
     !> Length of the vector, and elements that it lacks before its first one
     integer, intent(in) :: n, before
-    integer :: term(2)
+    !> The elements
+    integer, intent(out) :: first, last
 
     if (allocated(self%ends)) then
-      term = [max(self%ends(k - 1, component) - before, 0) + 1, min(self%ends(k, component) - before, n)]
+      first = max(self%ends(k - 1, component) - before, 0) + 1
+      last = min(self%ends(k, component) - before, n)
     else
-      term = [(k - 1)*sum_block + 1, min(k*sum_block, n)]
+      first = (k - 1)*sum_block + 1
+      last = min(k*sum_block, n)
     end if
-  end function term
+  end subroutine term
 
   !> Sum the elements.
   real(wp) function vector_sum(self, x)
@@ -462,14 +465,14 @@ contains
     !> Vector
     real(wp), intent(in), contiguous :: x(:)
     real(wp) :: part(self%n_term(size(x)))
-    integer :: k, m, at(2)
+    integer :: k, m, from, to
 
-    !$omp parallel do schedule(static) num_threads(self%threads) private(m, at)
+    !$omp parallel do schedule(static) num_threads(self%threads) private(m, from, to)
     do k = 1, size(part)
       part(k) = 0.0_wp
       do m = 1, self%n_component()
-        at = self%term(k, m, size(x), 0)
-        part(k) = part(k) + sum(x(at(1):at(2)))
+        call term(self, k, m, size(x), 0, from, to)
+        part(k) = part(k) + sum(x(from:to))
       end do
     end do
     !$omp end parallel do
@@ -564,7 +567,7 @@ contains
     end do
   end function dots
 
-  !> Compute a scalar product, summed by rows or in fixed blocks.
+  !> Compute a scalar product, summed by pairs of rows or in fixed blocks.
   real(wp) function dot(self, a, b, before)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length
@@ -572,16 +575,16 @@ contains
     !> Elements that they lack before their first ones; absent: none
     integer, intent(in), optional :: before
     real(wp) :: part(self%n_term(size(a)))
-    integer :: k, m, at(2), lacking
+    integer :: k, m, from, to, lacking
 
     lacking = 0
     if (present(before)) lacking = before
-    !$omp parallel do schedule(static) num_threads(self%threads) private(m, at)
+    !$omp parallel do schedule(static) num_threads(self%threads) private(m, from, to)
     do k = 1, size(part)
       part(k) = 0.0_wp
       do m = 1, self%n_component()
-        at = self%term(k, m, size(a), lacking)
-        if (at(2) >= at(1)) part(k) = part(k) + ddot(at(2) - at(1) + 1, a(at(1):at(2)), 1, b(at(1):at(2)), 1)
+        call term(self, k, m, size(a), lacking, from, to)
+        if (to >= from) part(k) = part(k) + ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
       end do
     end do
     !$omp end parallel do

@@ -101,7 +101,7 @@ contains
     logical(lk), intent(in), contiguous :: active(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    !> Columns and own rows of the window, by whose rows vectors of the active nodes are summed; absent: in blocks
+    !> Columns and own rows of the window, by pairs of whose rows vectors are summed; absent: in blocks
     integer, intent(in), optional :: extent(2)
     !> Where the runs of each block begin in the list, less one
     integer :: before((size(active) + block_size - 1)/block_size + 1)
@@ -141,7 +141,7 @@ contains
 
   end subroutine new_active_set
 
-  !> Find where rows of the window end among the active nodes.
+  !> Find where pairs of rows of the window end among the active nodes: the rows of a rank are whole pairs, but for the last.
   subroutine find_ends(self, active, extent)
     type(active_set_t), intent(inout) :: self
     !> Active nodes of all components
@@ -149,20 +149,21 @@ contains
     !> Columns and own rows of the window
     integer, intent(in) :: extent(2)
     integer, allocatable :: ends(:, :)
-    integer :: m, row, before
+    integer :: n, m, k, before
 
-    allocate (ends(0:extent(2), size(active)/product(extent)))
+    n = (extent(2) + 1)/2
+    allocate (ends(0:n, size(active)/product(extent)))
     do m = 1, size(ends, 2)
-      !$omp parallel do schedule(static) num_threads(self%space%threads) private(before)
-      do row = 1, extent(2)
-        before = ((m - 1)*extent(2) + row - 1)*extent(1)
-        ends(row, m) = count(active(before + 1:before + extent(1)))
+      before = (m - 1)*product(extent)
+      !$omp parallel do schedule(static) num_threads(self%space%threads)
+      do k = 1, n
+        ends(k, m) = count(active(before + 2*(k - 1)*extent(1) + 1:before + min(2*k, extent(2))*extent(1)))
       end do
       !$omp end parallel do
       ends(0, m) = 0
-      if (m > 1) ends(0, m) = ends(extent(2), m - 1)
-      do row = 1, extent(2)
-        ends(row, m) = ends(row - 1, m) + ends(row, m)
+      if (m > 1) ends(0, m) = ends(n, m - 1)
+      do k = 1, n
+        ends(k, m) = ends(k - 1, m) + ends(k, m)
       end do
     end do
     call move_alloc(ends, self%space%ends)

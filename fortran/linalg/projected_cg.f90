@@ -173,15 +173,15 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     real(wp) :: part(size(change), space%n_term(size(r))), column(block)
-    integer :: k, i, m, from, to, n, at(2)
+    integer :: k, i, m, first, last, from, to, n
 
     part = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, from, to, n, at, column)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, first, last, from, to, n, column)
     do k = 1, size(part, 2)
       do i = 1, space%n_component()
-        at = space%term(k, i, size(r), 0)
-        do from = at(1), at(2), block
-          to = min(from + block - 1, at(2))
+        call space%term(k, i, size(r), 0, first, last)
+        do from = first, last, block
+          to = min(from + block - 1, last)
           n = to - from + 1
           if (abs(step) > 0.0_wp) call add_multiple(n, step, ad(from:to), r(from:to))
           do m = 1, size(change)
@@ -240,15 +240,15 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     real(wp) :: part(space%n_term(size(r))), column(block)
-    integer :: k, i, m, from, to, n, at(2)
+    integer :: k, i, m, first, last, from, to, n
 
     part = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, from, to, n, at, column)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, first, last, from, to, n, column)
     do k = 1, size(part)
       do i = 1, space%n_component()
-        at = space%term(k, i, size(r), 0)
-        do from = at(1), at(2), block
-          to = min(from + block - 1, at(2))
+        call space%term(k, i, size(r), 0, first, last)
+        do from = first, last, block
+          to = min(from + block - 1, last)
           n = to - from + 1
           do m = 1, size(share)
             column(:n) = m_b(from:to, m)

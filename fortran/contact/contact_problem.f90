@@ -284,13 +284,19 @@ contains
   end function resultants
 
   !> Compute r = kappa/(2 pi lambda a) for a contact of n nodes, a its radius, (F8) [Pa/m].
+  !>
+  !> In a narrow window that repeats a contact goes on across: a is no less than half of its width along the longer period.
   pure real(wp) function classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
     integer, intent(in) :: n_contact
-    real(wp) :: radius
+    real(wp) :: radius, longest
 
     radius = sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi)
+    if (self%lattice%is_periodic()) then
+      longest = maxval(norm2(self%lattice%basis, dim=1)*self%lattice%extent)
+      radius = max(radius, 0.5_wp*longest*n_contact/self%lattice%size())
+    end if
     r = self%options%contact%classification_parameter(self%medium%shear_point(radius), radius)
     r = r/(1.0_wp + r*self%medium%spring_compliance())
   end function classification_parameter

@@ -68,6 +68,8 @@ module hc_elastic_medium
     procedure :: trace
     !> Displacement that springs between the bodies give way by under a unit shear traction [m/Pa]
     procedure :: spring_compliance
+    !> Mean displacement by a uniform shear traction in a window that repeats, from the planes that motions refer to [m/Pa]
+    procedure :: mean_compliance
     !> Return whether pressure and shear traction move each other
     procedure :: couples
     !> Displacement by any point load times the distance: a bound [1/Pa]
@@ -206,6 +208,13 @@ contains
     class(elastic_medium_t), intent(in) :: self
     spring_compliance = 0.0_wp
   end function spring_compliance
+
+  !> Return the mean displacement by a uniform shear traction of one: that of the springs, from the mean planes of half-spaces
+  !> [m/Pa].
+  pure real(wp) function mean_compliance(self)
+    class(elastic_medium_t), intent(in) :: self
+    mean_compliance = self%spring_compliance()
+  end function mean_compliance
 
   !> Return whether pressure and shear traction move each other.
   pure logical function couples(self)

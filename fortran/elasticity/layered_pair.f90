@@ -69,7 +69,7 @@ module hc_layered_pair
     procedure :: n_image
     procedure :: reduce, new_influence, find_symbols, new_block_symbols, key_words
     procedure :: coupling => coupling_of_layers
-    procedure :: normal_point, shear_point, largest_point, trace
+    procedure :: normal_point, shear_point, largest_point, trace, mean_compliance
   end type layered_pair_t
 
   !> Displacements by a pyramid.
@@ -517,11 +517,28 @@ contains
       block(g, :) = block(g, :) + change(:size(block, 2))
     end do
     if (f > 0) return
-    ! the mean displacement is finite on rigid bases
-    if (any(self%pair%body%base%shear_modulus > 0.0_wp)) return
-    compliance = self%pair%body(1)%uniform() + self%pair%body(2)%uniform()
+    compliance = uniform_compliance(self%pair)
     block(0, 1) = compliance(1)
     if (size(block, 2) > 1) block(0, [2, 4]) = compliance(2)
   end subroutine column
+
+  !> Return the displacements by uniform tractions of one, normal and shear: finite on rigid bases, else none from mean planes
+  !> [m/Pa].
+  pure function uniform_compliance(pair) result(compliance)
+    class(layered_pair_t), intent(in) :: pair
+    real(wp) :: compliance(2)
+
+    compliance = 0.0_wp
+    if (.not. any(pair%body%base%shear_modulus > 0.0_wp)) compliance = pair%body(1)%uniform() + pair%body(2)%uniform()
+  end function uniform_compliance
+
+  !> Return the mean displacement by a uniform shear traction of one: that of the springs and of layers on rigid bases [m/Pa].
+  pure real(wp) function mean_compliance(self)
+    class(layered_pair_t), intent(in) :: self
+
+    associate (uniform => uniform_compliance(self))
+      mean_compliance = self%spring_compliance() + uniform(2)
+    end associate
+  end function mean_compliance
 
 end module hc_layered_pair

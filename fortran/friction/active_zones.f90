@@ -42,25 +42,39 @@ contains
     if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
   end function shear_parameter
 
-  !> Compute a parameter under which all nodes slip by a shift that no traction takes up: that of a window that repeats and is in
-  !> contact everywhere, whose mean displacement is zero; else zero [Pa/m].
+  !> Compute r of (F8), or a parameter under which all nodes slip where all would stick against a shift that no traction takes up:
+  !> that of a complete contact of a window that repeats, whose mean displacement is zero [Pa/m].
   real(wp) function sliding_parameter(now) result(r)
     type(friction_iterate_t), intent(in) :: now
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: part(now%problem%own_rows(), 2), mean(2), scale
-    integer :: row
+    real(wp) :: total(3, now%problem%own_rows()), sums(3), unit, scale
+    integer :: zone(now%problem%lattice%extent(1)), n, n_col, row, from, to, k
 
-    r = 0.0_wp
+    r = shear_parameter(now)
     if (.not. (now%problem%lattice%is_periodic() .and. now%problem%friction%is_bounded())) return
-    if (now%operators%space%count(now%contact) < now%problem%lattice%size()) return
-    do row = 1, size(part, 1)
-      call now%slip_row(row, 1, dsx, dsy)
-      part(row, :) = [sum(dsx), sum(dsy)]
-    end do
-    mean = [now%operators%space%total(part(:, 1)), now%operators%space%total(part(:, 2))]/now%problem%lattice%size()
-    mean = merge(0.0_wp, mean, now%target%control([along_x, along_y]) == force_control)
-    scale = now%traction_scale()
-    if (norm2(mean) > now%tolerance*now%problem%tangential_compliance*scale) r = 2.0_wp*scale/norm2(mean)
+    if (now%problem%medium%mean_compliance() > 0.0_wp) return
+    associate (space => now%operators%space)
+      if (space%count(logical(.not. now%contact, lk)) > 0) return
+      n = size(now%p)
+      n_col = size(dsx)
+      unit = 1.0_wp/space%max(now%p)
+      !$omp parallel do schedule(static) num_threads(space%threads) private(dsx, dsy, zone, from, to)
+      do row = 1, size(total, 2)
+        to = row*n_col
+        from = to - n_col + 1
+        call now%slip_row(row, 1, dsx, dsy)
+        call now%problem%friction%find_zones(from, unit, r, now%p(from:to), now%q(from:to), now%q(n + from:n + to), dsx, dsy, zone)
+        total(:, row) = [sum(dsx), sum(dsy), real(count(zone == slip), wp)]
+      end do
+      !$omp end parallel do
+      sums = [(space%total(total(k, :)), k=1, 3)]
+      where (now%target%control([along_x, along_y]) == force_control) sums(:2) = 0.0_wp
+      associate (mean => norm2(sums(:2))/space%count(now%contact))
+        scale = now%traction_scale()
+        ! from any traction of the disc to its other side
+        if (.not. sums(3) > 0.0_wp .and. mean > now%tolerance*now%problem%tangential_compliance*scale) r = 4.0_wp*scale/mean
+      end associate
+    end associate
   end function sliding_parameter
 
   !> Find stick, slip and frames that the present tractions call for.
@@ -82,7 +96,7 @@ contains
     n = size(now%p)
     n_col = now%problem%lattice%extent(1)
     allocate (zone(n), active(2*n))
-    r = max(shear_parameter(now), sliding_parameter(now))
+    r = sliding_parameter(now)
     soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)

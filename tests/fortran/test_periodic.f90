@@ -3,7 +3,8 @@ module test_periodic
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, stick
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
+    stick
   use hc_coulomb, only: coulomb_t
   use hc_field_space, only: field_space_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
@@ -42,6 +43,8 @@ contains
       new_test('across_the_end', test_across), &
       new_test('bad_windows', test_bad), &
       new_test('superposition', test_superposition), &
+      new_test('shifts', test_shifts), &
+      new_test('narrow_window', test_narrow), &
       new_test('flat', test_flat), &
       new_test('unlike', test_unlike), &
       new_test('waves_below', test_below), &
@@ -405,6 +408,98 @@ contains
     call check(error, largest(after%traction(:, :, 2)), 0.0_wp, 1.0e-8_wp*maxval(pressed%pressure), 'across')
     call check(error, after%motion(2), mu*(pressed%motion(1) - less%motion(1)), 1.0e-8_wp, 'shift')
   end subroutine test_superposition
+
+  !> Press a contact by a load, and shift it: each shift takes few sweeps.
+  subroutine press_and_shift(contact, lattice, load, shift, state, error)
+    type(frictional_contact_t), intent(inout) :: contact
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: load, shift(:)
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: control(4) = [force_control, displacement_control, force_control, displacement_control]
+    type(contact_state_t) :: before
+    real(wp), allocatable :: reference(:, :, :)
+    type(load_target_t) :: target
+    integer :: k
+
+    call new_friction_state(state, lattice, field_space_t())
+    do k = 0, size(shift)
+      before = state
+      reference = before%relative_displacement
+      target = load_target_t(control, [load, merge(shift(max(k, 1)), 0.0_wp, k > 0), 0.0_wp, 0.0_wp])
+      call contact%solve_step(before, reference, target, 1.0e-10_wp, 500, state, error)
+      if (allocated(error)) return
+      call check_true(error, state%converged .and. state%sweeps <= 12, 'few sweeps')
+      if (allocated(error)) return
+    end do
+  end subroutine press_and_shift
+
+  !> A rough surface in complete contact of bodies with nu = 0 under a shift, which then goes back in part: mu times the
+  !> difference to the pressure whose mean gap is the shift over mu, less twice that of half of the way back. Some nodes slip under
+  !> the least shift, since no traction in stick has a mean displacement.
+  subroutine test_shifts(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 32
+    type(lattice_t) :: lattice
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: pressed, ahead, back, after
+    real(wp) :: gap(n, n), load
+    real(wp), parameter :: mu = 0.4_wp, p = 12.0_wp, shift(2) = [0.1_wp, 0.04_wp]
+
+    call waves(lattice, gap, error)
+    if (allocated(error)) return
+    gap = gap - sum(gap)/size(gap)
+    load = p*lattice%cell_area()*lattice%size()
+    call solve(lattice, gap, force_control, p, pressed, error)
+    if (allocated(error)) return
+    call check_true(error, all(pressed%pressure > 0.0_wp), 'complete contact')
+    if (allocated(error)) return
+    call solve(lattice, gap, displacement_control, -shift(1)/mu, ahead, error)
+    if (allocated(error)) return
+    call solve(lattice, gap, displacement_control, -0.5_wp*(shift(1) - shift(2))/mu, back, error)
+    if (allocated(error)) return
+    call new_contact(lattice, 0.0_wp, 0.0_wp, mu, gap, contact, error)
+    if (allocated(error)) return
+    call press_and_shift(contact, lattice, load, shift(:1), after, error)
+    if (allocated(error)) return
+    call check(error, largest(after%traction(:, :, 1) - mu*(pressed%pressure - ahead%pressure)), 0.0_wp, &
+               1.0e-8_wp*maxval(pressed%pressure), 'ahead')
+    call press_and_shift(contact, lattice, load, shift, after, error)
+    if (allocated(error)) return
+    call check(error, largest(after%traction(:, :, 1) - mu*(2.0_wp*back%pressure - pressed%pressure - ahead%pressure)), 0.0_wp, &
+               1.0e-8_wp*maxval(pressed%pressure), 'back')
+  end subroutine test_shifts
+
+  !> A wave along a window of 512 columns and one row, in incomplete and in complete contact under a shift, nu = 0: zones of
+  !> contacts that go on across do not alternate.
+  subroutine test_narrow(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 512
+    type(lattice_t) :: lattice
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: pressed, less, after
+    real(wp), dimension(n, 1) :: gap, x, y
+    real(wp), parameter :: mu = 0.4_wp, shift = 0.03_wp, p(2) = [0.1_wp, 1.5_wp]*pi
+    integer :: k
+
+    call new_lattice(lattice, oblique_basis(1.0_wp/n, 1.0_wp, 0.5_wp*pi), [0, 0], [n, 1], error)
+    if (allocated(error)) return
+    lattice%periodic = .true.
+    call lattice%coordinates(x, y)
+    gap = -cos(2.0_wp*pi*x)
+    call new_contact(lattice, 0.0_wp, 0.0_wp, mu, gap, contact, error)
+    do k = 1, 2
+      if (allocated(error)) return
+      call solve(lattice, gap, force_control, p(k), pressed, error)
+      if (allocated(error)) return
+      call solve(lattice, gap, displacement_control, pressed%motion(1) - shift/mu, less, error)
+      if (allocated(error)) return
+      call press_and_shift(contact, lattice, p(k)*lattice%cell_area()*lattice%size(), [shift], after, error)
+      if (allocated(error)) return
+      call check(error, largest(after%traction(:, :, 1) - mu*(pressed%pressure - less%pressure)), 0.0_wp, &
+                 1.0e-8_wp*maxval(pressed%pressure), 'shear traction')
+    end do
+  end subroutine test_narrow
 
   !> Flat on flat: no shear traction and no shift until all of it slides, whatever the bodies.
   subroutine test_flat(error)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, DeckError, Lattice, open_result, plotting
+from hexcontact import Case, ConvergenceError, DeckError, Lattice, open_result, plotting
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import hertz_rows
 from hexcontact.plotting.report_data import charts_of
@@ -474,6 +474,77 @@ def test_no_traction_takes_up_the_shift_of_a_complete_contact(other: dict) -> No
     result = Case(body_1=STEEL, body_2=other, friction_coefficient=0.3, loads=loads, **grid).run()
     np.testing.assert_allclose(result.dataset.traction_x[-1], 9e7, rtol=1e-9)
     assert float(result.dissipated_energy[-1]) == pytest.approx(0.3 * 3e8 * 100e-6 * 50e-6 * 1e-9, rel=1e-9)
+
+
+def strip(loads: list[dict], **arguments) -> xarray.Dataset:
+    """A wave along x of 0.5 um on 128 nodes, alike bodies with mu = 0.3 where nothing else is given."""
+    wave = {"shape": "formula", "expression": f"{AMPLITUDE}*(1 - cos(2*pi*x/{LENGTH}))"}
+    grid = {"extent": [LENGTH, LENGTH / 32], "spacing": LENGTH / 128, "boundary": "periodic"}
+    given = {"body_1": {**STEEL, "surface": wave}, "body_2": STEEL, "friction_coefficient": 0.3}
+    return Case(**(given | grid | {"loads": loads} | arguments)).run().dataset
+
+
+AMPLITUDE, LENGTH = 0.5e-6, 100e-6
+FLAT_WAVE = math.pi * E_STAR * AMPLITUDE / LENGTH  # mean pressure of complete contact, 1.81 GPa
+
+
+def gap_of(pressure: float) -> float:
+    """Mean gap of Westergaard's wave: the integral over the load of the approach of a row of flat punches."""
+    share = min(pressure / FLAT_WAVE, 1.0)
+    return AMPLITUDE * (1.0 - share + share * math.log(share))
+
+
+@pytest.mark.parametrize("share", [0.5, 1.4])
+@pytest.mark.parametrize("slip", [0.2, 0.6])
+def test_sheared_waves(share: float, slip: float) -> None:
+    """Of Jaeger and Ciavarella, q = mu (p(P) - p(P*)) and shift = mu (gap(P*) - gap(P)), in both directions.
+
+    In complete contact all nodes stick until P* leaves it.
+    """
+    pressure, mu = share * FLAT_WAVE, 0.3
+    traction = mu * slip * pressure
+    shift = mu * (gap_of((1.0 - slip) * pressure) - gap_of(pressure))
+    pulled = strip([{"mean_pressure": pressure}, {"mean_traction_x": traction}]).isel(step=-1)
+    assert float(pulled["shift_x"]) == pytest.approx(shift, rel=2e-3, abs=1e-15)
+    less = strip([{"mean_pressure": (1.0 - slip) * pressure}], friction_coefficient=None)["pressure"][-1]
+    superposed = mu * (pulled["pressure"] - less).values
+    assert abs(pulled["traction_x"].values - superposed).max() < 2e-8 * mu * pressure
+    assert (float(pulled["stick_area"] / pulled["contact_area"]) > 0.999) == (shift == 0.0)
+    if not shift > 0.0:
+        return
+    pushed = strip([{"mean_pressure": pressure}, {"shift_x": shift}]).isel(step=-1)
+    assert float(pushed["traction_x"].mean()) == pytest.approx(traction, rel=2e-3)
+    assert float(pushed["operator_applications"]) < 40
+
+
+def test_the_least_shift_of_a_complete_contact_slips() -> None:
+    """The mean traction is mu (P - P*) at once, with P* that of complete contact, and back as much."""
+    shifts = [{"shift_x": 1e-12}, {"shift_x": 0.0}]
+    found = strip([{"mean_pressure": 2.5e9}, *shifts])["traction_x"].mean(("row", "col"))
+    assert found.values[1:] == pytest.approx(
+        [0.3 * (2.5e9 - FLAT_WAVE), -0.3 * (2.5e9 - FLAT_WAVE)], rel=0.05
+    )
+
+
+def test_layers_take_up_the_shift_of_a_complete_contact() -> None:
+    """Springs, and a layer between rigid bodies: all sticks, the mean traction is stiffness x shift."""
+    loads = [{"mean_pressure": 2.5e9}, {"shift_x": 4e-9, "steps": 2}]
+    springs = {"coefficient": "1e18 Pa/m", "tangential_stiffness": "1e16 Pa/m"}
+    layer = {"thickness": "5 um", "young_modulus": "300 GPa", "poisson_ratio": 0.2}
+    wave = {"shape": "formula", "expression": f"1e-8*(1 - cos(2*pi*x/{LENGTH}))"}
+    rigid = {"body_1": {"rigid": True, "surface": wave, "coating": [layer]}, "body_2": {"rigid": True}}
+    for bodies, stiffness in (({"interface": springs}, 1e16), (rigid, 125e9 / 5e-6)):
+        last = strip(loads, **bodies).isel(step=-1)
+        assert float(last["stick_area"]) == pytest.approx(LENGTH**2 / 32)
+        assert float(last["traction_x"].mean()) == pytest.approx(4e-9 * stiffness, rel=1e-7)
+
+
+def test_no_slip_holds_a_complete_contact() -> None:
+    loads = [{"mean_pressure": 2.5e9}, {"mean_traction_x": 1e8}]
+    held = strip(loads, friction_coefficient=math.inf).isel(step=-1)
+    assert (float(held["shift_x"]), float(held["traction_x"].min())) == pytest.approx((0.0, 1e8), abs=1e-6)
+    with pytest.raises(ConvergenceError, match="without slip takes up a shift .*: expected mean_traction_x"):
+        strip([loads[0], {"shift_x": 1e-9}], friction_coefficient=math.inf)
 
 
 def test_no_approach_of_hertz_stands_beside_mean_planes() -> None:

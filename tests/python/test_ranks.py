@@ -151,6 +151,10 @@ mean_traction_x = "20 MPa"
 tolerance = 1e-12
 """
 )
+# All touches, and no traction in stick takes up a shift.
+SHIFTED_WAVES = (
+    SHEARED_WAVES.replace("200 MPa", "6 GPa").replace("mean_traction_x", "shift_x").replace("20 MPa", "20 nm")
+)
 # The sphere ends within the window.
 ENDING = (
     '[{ shape = "sphere", radius = "1 mm" }, { shape = "punch", radius = "20 um", offset = ["8 um", 0] }]'
@@ -175,12 +179,19 @@ cycles = 1_000
         (2, SHEARED.replace("steps = 2", "") + WORN),
         (3, ADAPTIVE),
         (2, SHEARED_WAVES),
+        (2, SHIFTED_WAVES),
         (2, SHEARED.replace('{ shape = "sphere", radius = "1 mm" }', ENDING)),
         (2, VARYING),
         (3, DIRECTED),
         (2, ROLLING),
     ],
-    ids=["unlike", "alike", "worn", "adaptive", "waves", "ends", "varying", "directed", "rolling"],
+        (2, SHIFTED_WAVES),
+        (2, SHEARED.replace('{ shape = "sphere", radius = "1 mm" }', ENDING)),
+        (2, VARYING),
+        (3, DIRECTED),
+        (2, ROLLING),
+    ],
+    ids=["unlike", "alike", "worn", "adaptive", "waves", "shifted", "ends", "varying", "directed", "rolling"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)

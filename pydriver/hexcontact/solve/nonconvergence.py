@@ -78,7 +78,13 @@ def error(
         lines.append(f"the last attempt ended since {solution.stopped}")
     if target.ramp is not None:
         lines.append(f"it is {LEAST:.1%} of its segment, the least of adaptive steps")
-    lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful, target.ramp is not None))}")
+    if _holds_a_shift(case, lattice, solution, target):
+        lines.append(
+            "no traction of a complete contact without slip takes up a shift of the mean planes: expected "
+            "mean_traction_x or mean_traction_y in its place, or a finite friction.coefficient"
+        )
+    else:
+        lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful, target.ramp is not None))}")
     return ConvergenceError("\n".join(lines), details)
 
 
@@ -89,6 +95,13 @@ def _residuals(case: Problem, solution: Any, target: LoadStep) -> dict[str, floa
     if not case.frictional:
         wanted = {"R_n": True, "R_P": z}
     return {sign: float(getattr(solution, RESIDUALS[sign])) for sign, shown in wanted.items() if shown}
+
+
+def _holds_a_shift(case: Problem, lattice: Lattice, solution: Any, target: LoadStep) -> bool:
+    """Return whether a window that repeats is to be shifted, touches everywhere, and cannot slip."""
+    shifted = any(motion.control != "force" for motion in (target.x, target.y))
+    stuck = case.frictional and math.isinf(case.friction_coefficient) and lattice.periodic and shifted
+    return stuck and not isinstance(solution, SharedSolution) and bool((solution.pressure > 0.0).all())
 
 
 def _number(value: float) -> str:

@@ -185,12 +185,6 @@ cycles = 1_000
         (3, DIRECTED),
         (2, ROLLING),
     ],
-        (2, SHIFTED_WAVES),
-        (2, SHEARED.replace('{ shape = "sphere", radius = "1 mm" }', ENDING)),
-        (2, VARYING),
-        (3, DIRECTED),
-        (2, ROLLING),
-    ],
     ids=["unlike", "alike", "worn", "adaptive", "waves", "shifted", "ends", "varying", "directed", "rolling"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:

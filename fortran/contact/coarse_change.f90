@@ -13,13 +13,25 @@
 !> Equations: docs/theory/multilevel.md, (M1).
 module hc_coarse_change
   use hc_precision, only: wp
+  use hc_lattice, only: lattice_t, floor_half
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
-  use hc_transfer, only: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector
+  use hc_transfer, only: prolong, prolong_edge, prolong_shear
   implicit none
   private
 
-  public :: restrict_state, balance, add_change, add_displacement, find_displacements, prolong_state, prolong_displacement
+  public :: restrict_state, restricted, balance, add_change, add_displacement, find_displacements, &
+            prolong_state, prolong_displacement
+
+  !> Rows of a coarse lattice that the nodes of finer ones between them take their values from.
+  type :: coarse_rows_t
+    !> Lattices of these rows, and of own rows of the finer lattice
+    type(lattice_t) :: rows, fine
+    !> First and last of them
+    integer :: wanted(2) = 0
+    !> The coarse lattice is all there, since one rank has both
+    logical :: whole = .true.
+  end type coarse_rows_t
 
 contains
 
@@ -30,17 +42,90 @@ contains
     type(contact_state_t), intent(in) :: fine
     type(contact_state_t), intent(out) :: coarse
 
-    associate (from => problem%lattice, to => coarse_problem%lattice)
-      coarse%pressure = restrict_field(from, fine%pressure, to)
-      coarse%gap = restrict_field(from, fine%gap, to)
-      coarse%zone = nint(restrict_field(from, real(fine%zone, wp), to))
-      coarse%traction = restrict_vector(from, fine%traction, to)
-      coarse%relative_displacement = restrict_vector(from, fine%relative_displacement, to)
-    end associate
+    real(wp), allocatable :: zone(:, :)
+
+    call problem%restrict(fine%pressure, coarse_problem, coarse%pressure)
+    call problem%restrict(fine%gap, coarse_problem, coarse%gap)
+    call problem%restrict(real(fine%zone, wp), coarse_problem, zone)
+    coarse%zone = nint(zone)
+    coarse%traction = restricted(problem, fine%traction, coarse_problem)
+    coarse%relative_displacement = restricted(problem, fine%relative_displacement, coarse_problem)
     call coarse_problem%friction%begin_step(coarse%zone)
     coarse%motion = fine%motion
     coarse%load = coarse_problem%resultants(coarse%pressure, coarse%traction)
   end subroutine restrict_state
+
+  !> Return the values of all components of a field at the coarse nodes.
+  function restricted(problem, field, coarse_problem) result(values)
+    type(friction_problem_t), intent(in) :: problem, coarse_problem
+    !> Field (n_col, own rows, number of components)
+    real(wp), intent(in), contiguous :: field(:, :, :)
+    !> Field of the coarse lattice
+    real(wp), allocatable :: values(:, :, :)
+    real(wp), allocatable :: component(:, :)
+    integer :: m
+
+    allocate (values(coarse_problem%lattice%extent(1), coarse_problem%own_rows(), size(field, 3)))
+    do m = 1, size(field, 3)
+      call problem%restrict(field(:, :, m), coarse_problem, component)
+      values(:, :, m) = component
+    end do
+  end function restricted
+
+  !> Find the rows of a coarse lattice that those of this rank of the finer one take their values from, with the neighbors of
+  !> neighbors.
+  type(coarse_rows_t) function rows_below(coarse_problem, problem) result(below)
+    type(friction_problem_t), intent(in) :: coarse_problem, problem
+    integer, parameter :: neighbors_of_neighbors = 2
+    integer :: own(2)
+
+    below%rows = coarse_problem%lattice
+    below%fine = problem%lattice
+    below%whole = problem%space%ranks%size == 1
+    if (below%whole) return
+    own = problem%space%own_rows(problem%lattice%extent(2))
+    below%fine = problem%rows_of(own(1), own(2))
+    own = problem%lattice%first(2) + own - 1
+    associate (wanted => below%wanted)
+      wanted = [floor_half(own(1)), floor_half(own(2) + 1)] - coarse_problem%lattice%first(2) + 1
+      wanted = wanted + [-neighbors_of_neighbors, neighbors_of_neighbors]
+      if (.not. coarse_problem%lattice%periodic(2)) wanted = min(max(wanted, 1), coarse_problem%lattice%extent(2))
+      below%rows = coarse_problem%rows_of(wanted(1), wanted(2))
+    end associate
+  end function rows_below
+
+  !> Take the rows of a coarse field that those of this rank of the finer lattice take their values from.
+  subroutine take_below(coarse_problem, below, field, rows)
+    type(friction_problem_t), intent(in) :: coarse_problem
+    type(coarse_rows_t), intent(in) :: below
+    !> Field (n_col, own rows of the coarse lattice)
+    real(wp), intent(in), contiguous :: field(:, :)
+    !> Those rows
+    real(wp), allocatable, intent(out) :: rows(:, :)
+
+    allocate (rows(size(field, 1), below%wanted(2) - below%wanted(1) + 1))
+    call coarse_problem%take_rows(field, below%wanted(1), rows)
+  end subroutine take_below
+
+  !> Interpolate a field to the nodes of the finer lattice on this rank.
+  subroutine prolong_field(coarse_problem, coarse, problem, fine, beyond)
+    type(friction_problem_t), intent(in) :: coarse_problem, problem
+    !> Field (n_col, own rows of the coarse lattice), and that of the finer one
+    real(wp), intent(in), contiguous :: coarse(:, :)
+    real(wp), intent(out), contiguous :: fine(:, :)
+    !> Beyond the coarse window there are the values at its rim; default: zero
+    logical, intent(in), optional :: beyond
+    type(coarse_rows_t) :: below
+    real(wp), allocatable :: rows(:, :)
+
+    below = rows_below(coarse_problem, problem)
+    if (below%whole) then
+      call prolong(coarse_problem%lattice, coarse, problem%lattice, fine, problem%space, beyond)
+    else
+      call take_below(coarse_problem, below, coarse, rows)
+      call prolong(below%rows, rows, below%fine, fine, problem%space, beyond)
+    end if
+  end subroutine prolong_field
 
   !> Set the coarse problem up so that the present state solves it under the present loads.
   subroutine balance(problem, start, step, before, displacement, model, origin, coarse_target)
@@ -62,7 +147,7 @@ contains
 
     model%initial_gap = merge(before%gap + before%motion(normal) - displacement(:, :, 1), model%initial_gap, model%candidate)
     origin = displacement(:, :, 2:) - model%rigid_displacement(before%motion) &
-             - (before%relative_displacement - restrict_vector(problem%lattice, step%reference, model%lattice))
+             - (before%relative_displacement - restricted(problem, step%reference, model))
     coarse_target = step%target
     where (coarse_target%control == force_control) coarse_target%value = before%load + (coarse_target%value - start%load)
   end subroutine balance
@@ -77,16 +162,16 @@ contains
     type(contact_state_t), intent(inout) :: state
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
     real(wp), dimension(size(state%pressure, 1)) :: bound, length
-    integer :: col, row
+    integer :: col, row, m
 
     allocate (change, mold=state%pressure)
     allocate (change_of_traction, mold=state%traction)
-    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change, problem%space)
-    call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction, &
-                        problem%space)
+    call prolong_field(coarse_problem, after%pressure - before%pressure, problem, change)
+    do m = 1, size(change_of_traction, 3)
+      call prolong_field(coarse_problem, after%traction(:, :, m) - before%traction(:, :, m), problem, change_of_traction(:, :, m))
+    end do
     allocate (slipping, mold=state%pressure)
-    call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping, &
-                 problem%space)
+    call prolong_field(coarse_problem, merge(1.0_wp, 0.0_wp, after%zone == slip), problem, slipping)
     !$omp parallel do schedule(static) num_threads(problem%space%threads) private(col, bound, length)
     do row = 1, size(slipping, 2)
       do col = 1, size(slipping, 1)
@@ -118,7 +203,7 @@ contains
   subroutine add_displacement(coarse_problem, moved, problem, displacement)
     type(friction_problem_t), intent(in) :: coarse_problem, problem
     !> Change of w, u_x, u_y at the coarse nodes (n_col, n_row, 3) [m]
-    real(wp), intent(in) :: moved(:, :, :)
+    real(wp), intent(in), contiguous :: moved(:, :, :)
     !> Fine ones
     real(wp), intent(inout) :: displacement(:, :, :)
     real(wp), allocatable :: change(:, :, :)
@@ -136,12 +221,12 @@ contains
   subroutine prolong_displacement(coarse_problem, coarse, problem, fine)
     type(friction_problem_t), intent(in) :: coarse_problem, problem
     !> w, u_x, u_y (n_col, n_row, 3) [m]
-    real(wp), intent(in) :: coarse(:, :, :)
-    real(wp), intent(out) :: fine(:, :, :)
+    real(wp), intent(in), contiguous :: coarse(:, :, :)
+    real(wp), intent(out), contiguous :: fine(:, :, :)
     integer :: m
 
     do m = 1, size(fine, 3)
-      call prolong(coarse_problem%lattice, coarse(:, :, m), problem%lattice, fine(:, :, m), problem%space, beyond=.true.)
+      call prolong_field(coarse_problem, coarse(:, :, m), problem, fine(:, :, m), beyond=.true.)
     end do
   end subroutine prolong_displacement
 
@@ -154,7 +239,7 @@ contains
     real(wp) :: remote(problem%lattice%extent(1), 2)
     integer :: row
 
-    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+    allocate (displacement(problem%lattice%extent(1), problem%own_rows(), 3))
     !$omp parallel do schedule(static) num_threads(problem%space%threads) private(remote)
     do row = 1, size(displacement, 2)
       call problem%rigid_displacement_row(state%motion, row, remote(:, 1), remote(:, 2))
@@ -172,11 +257,27 @@ contains
     type(contact_state_t), intent(in) :: coarse
     type(friction_problem_t), intent(in) :: problem
     type(contact_state_t), intent(inout) :: state
-    if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
+    type(coarse_rows_t) :: below
+    real(wp), allocatable :: pressure(:, :), traction(:, :, :), rows(:, :)
+    integer :: m
+
+    if (any(shape(coarse%pressure) /= coarse_problem%own_extent())) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
-    call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
-                       state%traction, problem%space)
+    below = rows_below(coarse_problem, problem)
+    if (below%whole) then
+      call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
+      call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
+                         state%traction, problem%space)
+    else
+      call take_below(coarse_problem, below, coarse%pressure, pressure)
+      allocate (traction(size(pressure, 1), size(pressure, 2), 2))
+      do m = 1, 2
+        call take_below(coarse_problem, below, coarse%traction(:, :, m), rows)
+        traction(:, :, m) = rows
+      end do
+      call prolong_edge(below%rows, pressure, below%fine, state%pressure, problem%space)
+      call prolong_shear(below%rows, pressure, traction, below%fine, state%pressure, state%traction, problem%space)
+    end if
     state%motion = coarse%motion
   end subroutine prolong_state
 

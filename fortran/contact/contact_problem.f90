@@ -17,7 +17,7 @@ module hc_contact_problem
   use hc_hierarchy, only: level_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, separated, stick, &
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, separated, stick, &
     slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
     sweeps_used_up, loads_not_carried, out_of_range
   use hc_contact_residuals, only: tangential_compliances, largest_compliance, normal_residual, &
@@ -109,6 +109,7 @@ contains
     type is (friction_problem_t)
       call from%friction%on_lattice(from%lattice, self%lattice, self%friction)
       self%goodman = from%goodman
+      call self%friction%begin_rows(self%rows_before()*self%lattice%extent(1))
     end select
     call set_geometry(self)
   end subroutine inherit
@@ -217,7 +218,7 @@ contains
     end if
   end subroutine displace
 
-  !> Compute the displacement by the motions of the remote parts at every node (n_col, n_row, 2) [m].
+  !> Compute the displacement by the motions of the remote parts at every node (n_col, own rows, 2) [m].
   pure function rigid_displacement(self, motion) result(displacement)
     class(friction_problem_t), intent(in) :: self
     !> Motions
@@ -225,7 +226,7 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
     integer :: row
 
-    allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 2))
+    allocate (displacement(self%lattice%extent(1), self%own_rows(), 2))
     do row = 1, size(displacement, 2)
       call self%rigid_displacement_row(motion, row, displacement(:, row, 1), displacement(:, row, 2))
     end do
@@ -236,7 +237,7 @@ contains
     class(friction_problem_t), intent(in) :: self
     !> Motions
     real(wp), intent(in) :: motion(n_motion)
-    !> Row of the window, from 1 on
+    !> Own row of the window, from 1 on
     integer, intent(in) :: row
     !> Components along x and y (number of nodes) [m]
     real(wp), intent(out), contiguous :: along(:), across(:)
@@ -245,7 +246,7 @@ contains
     real(wp) :: first(2), step(2), x(1), y(1), no_shift(n_motion)
     integer :: i, col
 
-    call self%lattice%row_coordinates(row, x, y)
+    call self%lattice%row_coordinates(row + self%rows_before(), x, y)
     first = remote_displacement(motion, x(1), y(1))
     no_shift = motion
     no_shift([along_x, along_y]) = 0.0_wp
@@ -263,20 +264,22 @@ contains
     class(friction_problem_t), intent(in) :: self
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-    real(wp) :: load(n_motion), part(n_load, size(pressure, 2)), x(size(pressure, 1)), y(size(pressure, 1))
-    integer :: row
+    real(wp) :: load(n_motion), part(size(pressure, 2), n_load), x(size(pressure, 1)), y(size(pressure, 1))
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(x, y)
     do row = 1, size(pressure, 2)
-      part(normal, row) = sum(pressure(:, row))
-      part(along_x, row) = sum(traction(:, row, 1))
-      part(along_y, row) = sum(traction(:, row, 2))
-      call self%lattice%row_coordinates(row, x, y)
-      part(about_z, row) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
+      part(row, normal) = sum(pressure(:, row))
+      part(row, along_x) = sum(traction(:, row, 1))
+      part(row, along_y) = sum(traction(:, row, 2))
+      call self%lattice%row_coordinates(row + self%rows_before(), x, y)
+      part(row, about_z) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
     end do
     !$omp end parallel do
     load = 0.0_wp
-    load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
+    do k = 1, n_load
+      load(k) = self%lattice%cell_area()*self%space%total(part(:, k))
+    end do
     if (self%lattice%is_periodic()) load(about_z) = 0.0_wp                     ! a torque does not repeat
   end function resultants
 
@@ -350,6 +353,7 @@ contains
                all(ieee_is_finite(state%relative_displacement(:, row, :)))
     end do
     !$omp end parallel do
+    finite = self%space%number(merge(0, 1, finite)) == 0
 
     state%load = self%resultants(state%pressure, state%traction)
     state%residual_normal = normal_residual(state%pressure, state%gap, logical(self%candidate), self%normal_compliance, &
@@ -361,7 +365,7 @@ contains
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
                            state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
-    state%clipped = touches_rim(state) .and. .not. self%lattice%is_periodic()
+    state%clipped = self%reaches_rim(state) .and. .not. self%lattice%is_periodic()
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
   end subroutine complete_state

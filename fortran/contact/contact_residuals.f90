@@ -170,7 +170,7 @@ contains
     real(wp), intent(in) :: compliance
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: p_max, largest, worst
+    real(wp) :: p_max, largest, worst, most(2)
     integer :: row
 
     tangential_residual = 0.0_wp
@@ -185,7 +185,9 @@ contains
                               largest, worst)
     end do
     !$omp end parallel do
-    tangential_residual = sqrt(worst)/tangential_scale(friction, p_max, largest)
+    most = [largest, worst]
+    call space%most(most)
+    tangential_residual = sqrt(most(2))/tangential_scale(friction, p_max, most(1))
   end function tangential_residual
 
   !> Compute the scale tau of R_t over p_max.

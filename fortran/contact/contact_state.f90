@@ -182,12 +182,12 @@ contains
     type(field_space_t), intent(in) :: space
     integer :: row
 
-    associate (n => lattice%extent)
+    associate (n => space%own_extent(lattice%extent))
       allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)), state%traction(n(1), n(2), 2), &
                 state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2))
     end associate
     !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, lattice%extent(2)
+    do row = 1, size(state%pressure, 2)
       state%pressure(:, row) = 0.0_wp
       state%gap(:, row) = 0.0_wp
       state%zone(:, row) = separated

@@ -56,6 +56,8 @@ module hc_friction_law
     procedure :: find_lengths, find_boundary
     !> The same law on another lattice: a coarser one, or a part
     procedure :: on_lattice
+    !> Count the nodes of rows from one row of the window on
+    procedure :: begin_rows
     !> Take the zones at the beginning of a step
     procedure :: begin_step
   end type friction_law_t
@@ -272,6 +274,13 @@ contains
     !> Zone of each node (n_col, n_row)
     integer, intent(in) :: zone(:, :)
   end subroutine begin_step
+
+  !> Set the number of nodes before those that are counted from one on; a law whose numbers differ from node to node overrides this.
+  pure subroutine begin_rows(self, before)
+    class(friction_law_t), intent(inout) :: self
+    !> Nodes of the window in the rows before
+    integer, intent(in) :: before
+  end subroutine begin_rows
 
   !> Copy the law to another lattice; a law whose numbers differ from node to node overrides this.
   subroutine on_lattice(self, from, onto, law)

@@ -10,7 +10,7 @@ module hc_load_constraints
   use hc_precision, only: wp, pi, lk
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
-  use hc_active_set, only: find_span
+  use hc_active_set, only: active_set_t, new_active_set, find_span
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
@@ -45,11 +45,11 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> Nodes in contact (n_col, n_row)
-    logical(lk), intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
+    !> Nodes in contact (n_col, own rows)
+    logical(lk), intent(in) :: contact(size(problem%initial_gap, 1), size(problem%initial_gap, 2))
     !> Nodes of each row, and the sum of their columns
     real(wp), dimension(size(contact, 2)) :: nodes, columns
-    real(wp) :: middle(2), n_row, in_row
+    real(wp) :: middle(2), n_row, in_row, touching
     integer :: n_contact, row, col, low, high
 
     associate (control => target%control, space => problem%space, lattice => problem%lattice)
@@ -67,12 +67,14 @@ contains
         columns(row) = in_row
       end do
       !$omp end parallel do
-      n_contact = max(nint(sum(nodes)), 1)
+      touching = space%total(nodes)
+      n_contact = max(nint(touching), 1)
       ! nothing turns a single node
       self%motion = pack([along_x, along_y, about_z], control(along_x:about_z) == force_control .and. &
                          [.true., .true., n_contact > 1])
-      if (sum(nodes) > 0.0_wp) then
-        middle = [sum(columns), dot_product(nodes, [(real(row, wp), row=1, size(nodes))])]/n_contact + lattice%first - 1
+      if (touching > 0.0_wp) then
+        middle = [space%total(columns), space%total(nodes*[(real(row + problem%rows_before(), wp), row=1, size(nodes))])]
+        middle = middle/n_contact + lattice%first - 1
         middle = lattice%origin + matmul(lattice%basis, middle)
         if (control(along_y) == force_control) self%center(1) = middle(1)
         if (control(along_x) == force_control) self%center(2) = middle(2)
@@ -81,7 +83,7 @@ contains
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
 
-  !> Compute the tangential displacement of a unit motion (n_col, n_row, 2).
+  !> Compute the tangential displacement of a unit motion (n_col, own rows, 2).
   function direction(self, k, problem)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
@@ -91,7 +93,7 @@ contains
     real(wp), allocatable :: direction(:, :, :)
     integer :: row
 
-    allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
+    allocate (direction(problem%lattice%extent(1), problem%own_rows(), 2))
     !$omp parallel do schedule(static) num_threads(problem%space%threads)
     do row = 1, size(direction, 2)
       call self%direction_row(k, problem, (row - 1)*size(direction, 1) + 1, direction(:, row, 1), direction(:, row, 2))
@@ -106,7 +108,7 @@ contains
     integer, intent(in) :: k
     !> The problem
     type(friction_problem_t), intent(in) :: problem
-    !> Number of the first node
+    !> Number of the first node, from the first own row on
     integer, intent(in) :: first
     !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: ux(:), uy(:)
@@ -122,7 +124,7 @@ contains
       uy = 1.0_wp
     case default
       associate (lattice => problem%lattice)
-        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1)]
+        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1) + problem%rows_before()]
         start = lattice%origin + matmul(lattice%basis, real(lattice%first + index, wp)) - self%center
         do i = 1, size(ux)
           ux(i) = -(start(2) + (i - 1)*lattice%basis(2, 1))/self%arm
@@ -195,24 +197,25 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> Pressure (n_col, n_row) [Pa], and its residual R_n
-    real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
+    !> Pressure (n_col, own rows) [Pa], and its residual R_n
+    real(wp), intent(in) :: pressure(size(problem%initial_gap, 1), size(problem%initial_gap, 2)), residual_normal
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
     real(wp) :: carried, error, factor, before, bounds(size(pressure))
     logical(lk), allocatable :: contact(:, :)
-    integer :: k, try, n_contact
+    type(active_set_t) :: nodes
+    integer :: k, try
 
     overloads = .false.
-    n_contact = problem%space%count_positive(pressure)
-    if (.not. problem%friction%is_bounded() .or. n_contact == 0) return
+    if (.not. problem%friction%is_bounded() .or. problem%space%count_positive(pressure) == 0) return
     contact = pressure > 0.0_wp
     call new_driven_motions(driven, problem, target, contact)
     associate (n => size(driven%motion), options => problem%options%contact)
       load = [(driven%load(k, problem, target), k=1, n)]
       overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
       if (overloads .or. n == 0) return
-      allocate (u(n_contact, 2, n))
+      call new_active_set(nodes, reshape(contact, [size(contact)]), problem%space, shape(contact))
+      allocate (u(nodes%n_active, 2, n))
       error = residual_normal
       carried = problem%lattice%cell_area()*problem%space%sum(pressure, contact)
       if (target%control(normal) == force_control) then
@@ -231,11 +234,11 @@ contains
         ! where it has a direction, friction takes b(p) |A u| of a slip u
         if (.not. problem%friction%is_isotropic()) u(:, :, k) = matmul(u(:, :, k), problem%friction%stretch())
       end do
-      allocate (length(n_contact), source=1.0_wp)
+      allocate (length(nodes%n_active), source=1.0_wp)
       factor = huge(1.0_wp)
       do try = 1, options%max_limit_motions
         before = factor
-        call improve_motion(u, bound, load, options%least_limit_gain, length, factor)
+        call improve_motion(nodes%space, u, bound, load, options%least_limit_gain, length, factor)
         if (.not. factor < (1.0_wp - options%least_limit_gain)*before) exit
       end do
       overloads = factor*(1.0_wp + error) < 1.0_wp - options%load_rounding
@@ -243,7 +246,9 @@ contains
   end function overloads
 
   !> Try the motion of nodes on springs of stiffness bound/length: large slip lowers the resistance.
-  pure subroutine improve_motion(u, bound, load, least_length, length, factor)
+  subroutine improve_motion(space, u, bound, load, least_length, length, factor)
+    !> Space of the nodes
+    type(field_space_t), intent(in) :: space
     !> Displacements of unit motions (n, 2, motion)
     real(wp), intent(in) :: u(:, :, :)
     !> Largest traction of each node, and load of each motion over the cell area [Pa]
@@ -259,7 +264,7 @@ contains
 
     do k = 1, size(load)
       do i = 1, size(load)
-        stiffness(i, k) = sum(spread(bound/length, 2, 2)*u(:, :, i)*u(:, :, k))
+        stiffness(i, k) = space%dot(bound/length, sum(u(:, :, i)*u(:, :, k), dim=2))
       end do
     end do
     motion(:, 1) = load
@@ -274,8 +279,8 @@ contains
       moved = moved + motion(k, 1)*u(:, :, k)
     end do
     length = norm2(moved, dim=2)
-    factor = min(factor, dot_product(bound, length))
-    length = max(length, least_length*maxval(length))
+    factor = min(factor, space%dot(bound, length))
+    length = max(length, least_length*space%largest(maxval(length)))
   end subroutine improve_motion
 
   !> Set the nodes that slip least to stick: without any, nothing resists a prescribed load.

@@ -29,8 +29,10 @@ module hc_nodal_coulomb
     real(wp) :: shear_limit = huge(1.0_wp)
     !> Power k of the pressure
     real(wp) :: power = 1.0_wp
+    !> Nodes before the first row of this rank, which has the coefficients of all rows
+    integer, private :: before = 0
   contains
-    procedure :: resists, is_bounded, check, strength_of_disc, find_bounds, find_slopes, find_disc, on_lattice
+    procedure :: resists, is_bounded, check, strength_of_disc, find_bounds, find_slopes, find_disc, on_lattice, begin_rows
     !> Return whether the bound is proportional to the pressure
     procedure, private :: is_linear
   end type nodal_coulomb_t
@@ -98,7 +100,9 @@ contains
 
     bound = max(p, 0.0_wp)
     if (.not. self%is_linear()) bound = bound**self%power
-    bound = min(self%coefficient(first:first + size(p) - 1)*bound, self%shear_limit)
+    associate (from => self%before + first)
+      bound = min(self%coefficient(from:from + size(p) - 1)*bound, self%shear_limit)
+    end associate
   end subroutine find_bounds
 
   !> Differentiate the bounds of a row by the pressure.
@@ -108,7 +112,7 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out), contiguous :: bound(:)
 
-    bound = self%coefficient(first:first + size(p) - 1)
+    bound = self%coefficient(self%before + first:self%before + first + size(p) - 1)
     if (.not. self%is_linear()) bound = bound*merge(max(p, tiny(1.0_wp))**(self%power - 1.0_wp), 0.0_wp, p > 0.0_wp)
     where (bound*p > self%shear_limit)
       bound = 0.0_wp
@@ -129,6 +133,14 @@ contains
     call self%find_bounds(first, p, pressed)
     pressed = merge(max(pressed, tiny(1.0_wp)), 0.0_wp, p > 0.0_wp)
   end subroutine find_disc
+
+  !> Set the number of nodes before the rows of this rank.
+  pure subroutine begin_rows(self, before)
+    class(nodal_coulomb_t), intent(inout) :: self
+    integer, intent(in) :: before
+
+    self%before = before
+  end subroutine begin_rows
 
   !> Restrict the coefficients to a coarser lattice, or take those of a part of the window.
   subroutine on_lattice(self, from, onto, law)

@@ -7,7 +7,6 @@ module hc_normal_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t, status, raise
-  use hc_communicator, only: rows_held
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_hierarchy, only: level_t
@@ -49,6 +48,8 @@ module hc_normal_problem
     procedure :: first_guess
     !> Zones, load and residuals of a state whose pressure and gap are known
     procedure :: complete_pressed
+    !> Return whether there is contact at the rim of the window
+    procedure :: reaches_rim
   end type normal_problem_t
 
 contains
@@ -174,11 +175,11 @@ contains
     !> Nodes in contact so far
     integer, intent(in) :: n_contact
     !> Pressure [Pa] and gap [m], row by row
-    real(wp), intent(in), dimension(self%lattice%extent(1), self%lattice%extent(2)) :: p, gap
+    real(wp), intent(in), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: p, gap
     !> Nodes that may come into contact
-    logical(lk), intent(in) :: candidate(self%lattice%extent(1), self%lattice%extent(2))
+    logical(lk), intent(in) :: candidate(size(self%initial_gap, 1), size(self%initial_gap, 2))
     !> The nodes; those of the smallest gap where the law calls for none
-    logical(lk), intent(out) :: contact(self%lattice%extent(1), self%lattice%extent(2))
+    logical(lk), intent(out) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
     logical :: touching(size(p, 1))
     real(wp) :: r, least
     integer :: row
@@ -201,12 +202,11 @@ contains
     !> Classification parameter r'; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
     !> Pressure [Pa] and gap [m], row by row
-    real(wp), intent(in), dimension(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2))) :: p, gap
+    real(wp), intent(in), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: p, gap
     !> Nodes in contact
-    logical(lk), intent(in) :: contact(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2)))
+    logical(lk), intent(in) :: contact(size(self%initial_gap, 1), size(self%initial_gap, 2))
     !> Compliance [m/Pa] and offset [m] of the spring of each node, 0 off the contact
-    real(wp), intent(out), dimension(self%lattice%extent(1), rows_held(self%space%ranks, self%lattice%extent(2))) :: &
-      compliance, offset
+    real(wp), intent(out), dimension(size(self%initial_gap, 1), size(self%initial_gap, 2)) :: compliance, offset
     type(tangent_t) :: tangent
     integer :: row
 
@@ -296,7 +296,7 @@ contains
     end if
     ! one by one: the largest of several numbers hides one that is not a number
     state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
-    state%clipped = reaches_rim(self, state) .and. .not. self%lattice%is_periodic()
+    state%clipped = self%reaches_rim(state) .and. .not. self%lattice%is_periodic()
     if (state%converged) state%stopped = within_tolerance
     if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
     ! penetration without any pressure is infinite as well, but a state that can be shown

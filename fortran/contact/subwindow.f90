@@ -9,6 +9,7 @@ module hc_subwindow
   use hc_error, only: error_t
   use hc_normal_problem, only: normal_problem_t
   use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_step_t
+  use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   implicit none
   private
@@ -84,26 +85,22 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t) :: before, after
     real(wp), allocatable :: displacement(:, :, :)
+    integer :: m
 
     solved = .false.
-    associate (lattice => part%problem%lattice, west => corners(1, 1), east => corners(1, 2), south => corners(2, 1), &
-               north => corners(2, 2))
-      call new_friction_state(before, lattice, whole%problem%space)
-      before%pressure = start%pressure(west:east, south:north)
-      before%gap = start%gap(west:east, south:north)
-      before%zone = start%zone(west:east, south:north)
-      before%traction = start%traction(west:east, south:north, :)
-      before%relative_displacement = start%relative_displacement(west:east, south:north, :)
+    associate (lattice => part%problem%lattice)
+      call new_friction_state(before, lattice, part%problem%space)
+      call cut_state(whole%problem, corners(:, 1), part%problem, start, before)
       before%motion = start%motion
       before%load = start%load
       if (.not. part%problem%is_pressed(step%target)) return
       if (allocated(whole%guess)) then
         allocate (part%guess)
-        part%guess%pressure = whole%guess%pressure(west:east, south:north)
-        part%guess%traction = whole%guess%traction(west:east, south:north, :)
+        call whole%problem%cut(whole%guess%pressure, corners(:, 1), part%problem, part%guess%pressure)
+        part%guess%traction = cut_vector(whole%problem, whole%guess%traction, corners(:, 1), part%problem)
         part%guess%motion = whole%guess%motion
       end if
-      call part%solve_step(before, step%reference(west:east, south:north, :), step%target, &
+      call part%solve_step(before, cut_vector(whole%problem, step%reference, corners(:, 1), part%problem), step%target, &
                            whole%problem%options%multilevel%part_tolerance*step%tolerance, step%max_sweeps, after, error)
       if (allocated(part%guess)) deallocate (part%guess)
       if (allocated(error)) return
@@ -112,8 +109,10 @@ contains
       solved = after%converged
       if (.not. solved) return
       call add_fields(state, whole%problem%lattice, whole%problem%space)
-      state%pressure(west:east, south:north) = after%pressure
-      state%traction(west:east, south:north, :) = after%traction
+      call whole%problem%paste(part%problem, corners(:, 1), after%pressure, state%pressure)
+      do m = 1, 2
+        call whole%problem%paste(part%problem, corners(:, 1), after%traction(:, :, m), state%traction(:, :, m))
+      end do
     end associate
     state%motion = after%motion
     allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
@@ -126,5 +125,48 @@ contains
     call add_history(state)
     state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part
+
+  !> Take the fields of a state on a part of the window.
+  subroutine cut_state(whole, low, part, state, values)
+    type(friction_problem_t), intent(in) :: whole, part
+    !> First column and row of the part
+    integer, intent(in) :: low(2)
+    !> State on the window, and on the part (columns and own rows)
+    type(contact_state_t), intent(in) :: state
+    type(contact_state_t), intent(inout) :: values
+    real(wp), allocatable :: zone(:, :)
+
+    call whole%cut(state%pressure, low, part, values%pressure)
+    call whole%cut(state%gap, low, part, values%gap)
+    if (whole%space%ranks%size == 1) then
+      associate (high => low + part%lattice%extent - 1)
+        values%zone = state%zone(low(1):high(1), low(2):high(2))
+      end associate
+    else
+      call whole%cut(real(state%zone, wp), low, part, zone)
+      values%zone = nint(zone)
+    end if
+    values%traction = cut_vector(whole, state%traction, low, part)
+    values%relative_displacement = cut_vector(whole, state%relative_displacement, low, part)
+  end subroutine cut_state
+
+  !> Return the components of a field on a part of the window.
+  function cut_vector(whole, field, low, part) result(values)
+    type(friction_problem_t), intent(in) :: whole, part
+    !> Field (n_col, own rows, 2)
+    real(wp), intent(in), contiguous :: field(:, :, :)
+    !> First column and row of the part
+    integer, intent(in) :: low(2)
+    !> Field there (columns and own rows of the part, 2)
+    real(wp), allocatable :: values(:, :, :)
+    real(wp), allocatable :: component(:, :)
+    integer :: m
+
+    allocate (values(part%lattice%extent(1), part%own_rows(), size(field, 3)))
+    do m = 1, size(field, 3)
+      call whole%cut(field(:, :, m), low, part, component)
+      values(:, :, m) = component
+    end do
+  end function cut_vector
 
 end module hc_subwindow

@@ -47,7 +47,7 @@ contains
   real(wp) function sliding_parameter(now) result(r)
     type(friction_iterate_t), intent(in) :: now
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: total(3, now%problem%lattice%extent(2)), sums(3), unit, scale
+    real(wp) :: total(3, now%problem%own_rows()), sums(3), unit, scale
     integer :: zone(now%problem%lattice%extent(1)), n, n_col, row, from, to, k
 
     r = shear_parameter(now)
@@ -101,7 +101,7 @@ contains
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(dsx, dsy, i, from, to, low, high)
-      do row = 1, now%problem%lattice%extent(2)
+      do row = 1, n/n_col
         to = row*n_col
         from = to - n_col + 1
         do i = from, to
@@ -126,7 +126,7 @@ contains
       if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, compliance, zone)
 
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, ahead, aside, i, from, to)
-      do row = 1, now%problem%lattice%extent(2)
+      do row = 1, n/n_col
         to = row*n_col
         from = to - n_col + 1
         do i = from, to
@@ -199,25 +199,21 @@ contains
     !> Loads less those of the present traction, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
-    real(wp) :: part(size(nodes%pairs%first))
-    integer :: n, n_t, n_col, k, run, from, to, m, at
+    integer :: n_t, n_col, k, run, from, to, m, at
 
-    n = size(now%p)
     n_t = nodes%pairs%n_first
     n_col = now%problem%lattice%extent(1)
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, to, m, at)
-      do run = 1, size(part)
-        part(run) = 0.0_wp
+      do run = 1, size(nodes%pairs%first)
         from = nodes%pairs%first(run)
         ! a run goes on in the next row where the contact reaches the rim
         do while (from <= nodes%pairs%last(run))
           to = min(nodes%pairs%last(run), from + n_col - 1 - modulo(from - 1, n_col))
           m = to - from + 1
           call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
-          part(run) = part(run) + dot_product(ux(:m), now%q(from:to)) + dot_product(uy(:m), now%q(n + from:n + to))
           at = nodes%pairs%place(run) + from - nodes%pairs%first(run)
           ! into the frames, which takes the same reflection as out of them
           call plane_row(m, now%shear%direction(:, from:to), ux, uy, constraint(at:at + m - 1, k), across)
@@ -229,9 +225,33 @@ contains
         end do
       end do
       !$omp end parallel do
-      missing(k) = driven%load(k, now%problem, now%target) - sum(part)
+      missing(k) = driven%load(k, now%problem, now%target) - carried_load(now, driven, k)
     end do
   end subroutine find_constraints
+
+  !> Compute the load of the present shear traction along a motion, over the cell area [Pa].
+  real(wp) function carried_load(now, driven, k)
+    type(friction_iterate_t), intent(in) :: now
+    !> Motions that are driven by their loads, and which of them
+    type(driven_motions_t), intent(in) :: driven
+    integer, intent(in) :: k
+    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy
+    real(wp) :: part(now%problem%own_rows())
+    integer :: n, row, from, to, low, high
+
+    n = size(now%p)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, from, to, low, high)
+    do row = 1, size(part)
+      from = (row - 1)*size(ux)
+      call find_span(now%contact(from + 1:from + size(ux)), low, high)
+      to = from + high
+      from = from + low
+      call driven%direction_row(k, now%problem, from, ux(:to - from + 1), uy(:to - from + 1))
+      part(row) = dot_product(ux(:to - from + 1), now%q(from:to)) + dot_product(uy(:to - from + 1), now%q(n + from:n + to))
+    end do
+    !$omp end parallel do
+    carried_load = now%operators%space%total(part)
+  end function carried_load
 
   !> Find the prescribed part of the displacements of sticking nodes: their old position, and the motions that
   !> are prescribed.
@@ -248,7 +268,7 @@ contains
     n_col = now%problem%lattice%extent(1)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, low, high, i, m)
-    do row = 1, now%problem%lattice%extent(2)
+    do row = 1, n/n_col
       from = (row - 1)*n_col
       call find_span(now%contact(from + 1:from + n_col), low, high)
       to = from + high

@@ -76,7 +76,7 @@ contains
     call find_nodes(now, shear_active, step)
     call constrain(now, step, missing, error)
     if (allocated(error)) return
-    call step%constraints%satisfy(step%system%space, missing, step%x, step%iteration%independent, step%nodes)
+    call step%constraints%satisfy(step%nodes%space, missing, step%x, step%iteration%independent, step%nodes)
     ! 4.
     if (step%iteration%independent) call solve(now, step, error)
     if (allocated(error)) return
@@ -176,13 +176,13 @@ contains
     integer :: n
 
     n = size(now%p)
-    call new_active_set(step%nodes, [now%contact, shear_active], step%system%space)
+    call new_active_set(step%nodes, [now%contact, shear_active], step%system%space, now%problem%own_extent())
     call new_active_set(step%sheared, shear_active, step%system%space)
     call step%sheared%pair(2*n)
     call new_active_set(step%pressed, now%contact, step%system%space)
     step%system%pressed => step%pressed
     step%system%sheared => step%sheared
-    step%sticks = any(shear_active(n + 1:))
+    step%sticks = step%system%space%count(shear_active(n + 1:)) > 0
     deallocate (shear_active)
   end subroutine find_nodes
 
@@ -215,7 +215,7 @@ contains
         call step%pressed%pack(along, c%rows(:, k))
       end do
       if (now%target%control(normal) /= force_control) return
-      missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - step%system%space%sum(now%p)]
+      missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()]
       c%multiplier = [c%multiplier, now%motion(normal)]
       allocate (ones(step%pressed%n_active, 1), source=1.0_wp)
       call find_punch_pressure(now, step%pressed, ones, punch, error)
@@ -268,7 +268,7 @@ contains
       if (step%determined()) deallocate (now%p, now%q)
       residual = min(residual, 1.0_wp)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
-                                options%final_accuracy*now%tolerance)*real(step%nodes%n_active, wp)**0.25_wp
+                                options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
       call pack_unknowns(step, unknown, fixed, kept)

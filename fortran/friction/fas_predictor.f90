@@ -53,7 +53,7 @@ contains
     call restrict_state(problem, start, model, before)
     if (model%space%count_positive(before%pressure) < problem%options%multilevel%least_contact) return
 
-    allocate (displacement(model%lattice%extent(1), model%lattice%extent(2), 3))
+    allocate (displacement(model%lattice%extent(1), model%own_rows(), 3))
     operators(1)%flexibility%applications = 0.0_wp
     call model%displacements(operators(1)%flexibility, before%pressure, before%traction, displacement, error)
     if (allocated(error)) return

@@ -95,6 +95,8 @@ module hc_friction_iterate
     procedure :: is_finite
     !> Cut the classification parameter
     procedure :: cut_parameter
+    !> Sum of the pressure over the window
+    procedure :: pressure_sum
   end type friction_iterate_t
 
 contains
@@ -107,6 +109,25 @@ contains
 
     self%share_of_r = max(factor*self%share_of_r, self%problem%options%newton%least_share_of_r)
   end subroutine cut_parameter
+
+  !> Sum the pressure over the window, row by row.
+  real(wp) function pressure_sum(self)
+    class(friction_iterate_t), intent(in) :: self
+
+    pressure_sum = over_window(self%problem%own_extent(), self%p)
+
+  contains
+
+    !> Sum a vector over all nodes.
+    real(wp) function over_window(n, p)
+      !> Columns and own rows of the window
+      integer, intent(in) :: n(2)
+      real(wp), intent(in) :: p(n(1), n(2))
+
+      over_window = self%operators%space%sum(p)
+    end function over_window
+
+  end function pressure_sum
 
   !> Set tractions and motions from those of a state, and compute the displacements.
   subroutine set_start(self, problem, operators, start, step, error, estimate)
@@ -129,7 +150,7 @@ contains
     call set_problem(self, problem, operators, step)
     n = size(self%p)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
-    do row = 1, problem%lattice%extent(2)
+    do row = 1, size(start%pressure, 2)
       to = row*problem%lattice%extent(1)
       from = to - problem%lattice%extent(1) + 1
       self%p(from:to) = start%pressure(:, row)
@@ -176,7 +197,7 @@ contains
     type(load_step_t), intent(in) :: step
     integer :: n
 
-    n = problem%lattice%size()
+    n = problem%own_size()
     self%problem => problem
     self%operators => operators
     self%target = step%target
@@ -399,7 +420,7 @@ contains
   subroutine find_tangential_residual(self)
     class(friction_iterate_t), intent(inout) :: self
     real(wp), dimension(self%problem%lattice%extent(1)) :: dsx, dsy
-    real(wp) :: unit, largest, worst
+    real(wp) :: unit, largest, worst, most(2)
     integer :: n, n_col, row, from, to, low, high
 
     n = size(self%p)
@@ -420,7 +441,9 @@ contains
                                            self%q(from:to), self%q(n + from:n + to), dsx(low:high), dsy(low:high), largest, worst)
     end do
     !$omp end parallel do
-    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, 1.0_wp/unit, largest)
+    most = [largest, worst]
+    call self%operators%space%most(most)
+    self%residual_tangential = sqrt(most(2))/tangential_scale(self%problem%friction, 1.0_wp/unit, most(1))
   end subroutine find_tangential_residual
 
   !> Return whether all tractions and motions are finite numbers.
@@ -437,7 +460,7 @@ contains
       rest = rest + (self%p(i) - self%p(i)) + (self%q(i) - self%q(i)) + (self%q(n + i) - self%q(n + i))
     end do
     !$omp end parallel do simd
-    is_finite = all(ieee_is_finite(self%motion)) .and. abs(rest) <= 0.0_wp
+    is_finite = self%operators%space%number(merge(0, 1, abs(rest) <= 0.0_wp)) == 0 .and. all(ieee_is_finite(self%motion))
   end function is_finite
 
   !> Compute R_n of a gap under the present pressure.
@@ -447,7 +470,7 @@ contains
     real(wp), intent(in), contiguous, target :: gap(:)
     real(wp), pointer, contiguous :: p(:, :), g(:, :)
 
-    associate (n => self%problem%lattice%extent)
+    associate (n => self%problem%own_extent())
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate

@@ -10,7 +10,7 @@ module hc_frictional_contact
   use hc_error, only: error_t
   use hc_communicator, only: communicator_t
   use hc_options, only: newton_options_t
-  use hc_field_space, only: space_over
+  use hc_field_space, only: field_space_t, space_over
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
   use hc_flexibility, only: check_operator
@@ -19,10 +19,9 @@ module hc_frictional_contact
   use hc_contact_solver, only: friction_solver_t
   use hc_operator_set, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: prolong_state, prolong_displacement
+  use hc_coarse_change, only: prolong_state, prolong_displacement, restricted
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_transfer, only: restrict_vector
   implicit none
   private
 
@@ -57,7 +56,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Memory of the transforms of a solver that is never used at the same time, and freed later
     type(scratch_t), pointer, intent(in), optional :: shared
-    !> Ranks that share the products, each with all fields; absent: one
+    !> Ranks that share the products of a problem of which each has all rows; absent: one
     type(communicator_t), intent(in), optional :: ranks
     type(scratch_t), pointer :: scratch
     integer :: l, n_level
@@ -83,15 +82,18 @@ contains
 
   contains
 
-    !> Set up threads and operators of one lattice.
+    !> Set up threads and operators of one lattice, whose rows are shared as the problem says.
     subroutine prepare(level, operators)
       type(friction_problem_t), intent(inout) :: level
       type(operators_t), intent(out) :: operators
+      type(field_space_t) :: space
 
-      level%space = space_over(level%lattice%extent, n_threads)
-      level%space%scratch => scratch
-      if (present(ranks)) level%space%helpers = ranks%over(level%lattice%extent)
-      call new_operators(operators, level%lattice, level%medium, level%space, error, cache, level%options%preconditioner)
+      space = space_over(level%lattice%extent, n_threads)
+      space%scratch => scratch
+      space%ranks = level%space%ranks
+      level%space = space
+      if (present(ranks) .and. space%ranks%size == 1) space%helpers = ranks%over(level%lattice%extent)
+      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner)
     end subroutine prepare
 
   end subroutine new_frictional_contact
@@ -283,9 +285,9 @@ contains
 
     work = 0.0_wp
     target = step%target
-    origin(2)%value = restrict_vector(self%problem%lattice, step%reference, self%coarse(2)%lattice)
+    origin(2)%value = restricted(self%problem, step%reference, self%coarse(2))
     do l = 3, size(self%operators)
-      origin(l)%value = restrict_vector(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
+      origin(l)%value = restricted(self%coarse(l - 1), origin(l - 1)%value, self%coarse(l))
     end do
     do l = size(self%operators), 2, -1
       associate (problem => self%coarse(l))
@@ -322,8 +324,8 @@ contains
       call prolong_state(coarse_problem, coarse, problem, state)
       call move_alloc(known, moved)
       if (.not. allocated(moved)) return
-      if (any(shape(moved(:, :, 1)) /= coarse_problem%lattice%extent)) return
-      allocate (known(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+      if (any(shape(moved(:, :, 1)) /= coarse_problem%own_extent())) return
+      allocate (known(problem%lattice%extent(1), problem%own_rows(), 3))
       call prolong_displacement(coarse_problem, moved, problem, known)
     end subroutine continue_from
 

@@ -2,12 +2,12 @@
 !>
 !> A sweep with wrong zones leaves residuals in a few rings of nodes along the front. A few passes of nonlinear Gauss-Seidel over
 !> these, each of which changes the displacements of its neighborhood alone, bring traction and front into place, without a
-!> product over the window.
+!> product over the window. Each rank relaxes the nodes of its rows, then adds what those of the others displace there.
 !>
 !> Equations: docs/theory/friction.md, (F12).
 module hc_front_relaxation
   use, intrinsic :: iso_fortran_env, only: int8
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_lattice, only: neighbors
   use hc_options, only: newton_options_t
   use hc_contact_problem, only: friction_problem_t, near_reach
@@ -55,15 +55,19 @@ contains
     if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return
     if (now%operators%space%count(now%contact) < options%front_nodes) return
     call find_fronts(now, options%front_rings, fronts%node)
-    if (size(fronts%node, 2) == 0) return
+    if (now%operators%space%number(size(fronts%node, 2)) == 0) return
     call describe(now, fronts)
-    associate (extent => now%problem%lattice%extent)
+    associate (extent => now%problem%own_extent())
       q(1:extent(1), 1:extent(2), 1:2) => now%q
       u(1:extent(1), 1:extent(2), 1:2) => now%u
     end associate
     fronts%least = options%front_share*now%residual_tangential*now%traction_scale()
     do pass = 1, options%front_passes
-      call relax(now%problem, fronts, mod(pass, 2) == 0, q, u, changed)
+      if (now%operators%space%ranks%size == 1) then
+        call relax(now%problem, fronts, mod(pass, 2) == 0, q, u, changed)
+      else
+        call relax_rows(now%problem, fronts, mod(pass, 2) == 0, q, u, changed)
+      end if
       if (.not. changed) exit
     end do
   end subroutine relax_fronts
@@ -77,12 +81,14 @@ contains
     integer, allocatable, intent(out) :: node(:, :)
     integer(int8), allocatable :: mark(:, :)
     integer, allocatable :: found(:, :)
-    integer :: row, col, ring, k, i, first, last, at
+    integer :: row, col, ring, k, i, first, last, at, before
 
-    associate (extent => now%problem%lattice%extent)
+    associate (extent => now%problem%own_extent())
       allocate (mark(extent(1), extent(2)))
     end associate
     call mark_nodes(now, mark)
+    before = 0
+    if (now%operators%space%ranks%size > 1) call add_rows(now%problem, rings + 1, mark, before)
     allocate (found(2, count(mark /= is_off)))
     at = 0
     do row = 2, size(mark, 2) - 1
@@ -118,7 +124,33 @@ contains
       first = last + 1
     end do
     node = found(:, :at)
+    if (now%operators%space%ranks%size == 1) return
+    node(2, :) = node(2, :) - before
+    associate (own => node(2, :) > 0 .and. node(2, :) <= now%problem%own_rows())
+      node = reshape(pack(node, spread(own, 1, 2)), [2, count(own)])
+    end associate
   end subroutine find_fronts
+
+  !> Add the marks of some rows of other ranks on each side.
+  subroutine add_rows(problem, n, mark, before)
+    type(friction_problem_t), intent(in) :: problem
+    !> Number of rows
+    integer, intent(in) :: n
+    !> Marks of own rows, then of these rows, too (n_col, rows)
+    integer(int8), allocatable, intent(inout) :: mark(:, :)
+    !> Rows that were added before own rows
+    integer, intent(out) :: before
+    real(sp), allocatable :: around(:, :)
+    integer :: own(2)
+
+    own = problem%space%own_rows(problem%lattice%extent(2))
+    before = min(n, own(1) - 1)
+    allocate (around(size(mark, 1), before + size(mark, 2) + min(n, problem%lattice%extent(2) - own(2))))
+    call problem%space%fetch(problem%lattice%extent(2), real(mark, sp), own(1) - before, around)
+    mark = nint(around, int8)
+    ! rings end there: the nodes of own rows are further off
+    mark(:, [1, size(mark, 2)]) = is_off
+  end subroutine add_rows
 
   !> Find out which nodes in contact stick, and which slip, as their classification will.
   subroutine mark_nodes(now, mark)
@@ -134,7 +166,7 @@ contains
     do row = 1, size(mark, 2)
       mark(:, row) = is_off
       i = (row - 1)*size(bound)
-      if (row == 1 .or. row == size(mark, 2)) cycle
+      if (any(row + now%problem%rows_before() == [1, now%problem%lattice%extent(2)])) cycle
       call find_span(now%contact(i + 1:i + size(bound)), low, high)
       if (high < low) cycle
       call now%problem%friction%find_bounds(i + low, now%p(i + low:i + high), bound(low:high))
@@ -172,6 +204,63 @@ contains
       end do
     end associate
   end subroutine describe
+
+  !> Make one pass on own rows, and add what the nodes of other ranks displace there.
+  subroutine relax_rows(problem, fronts, backwards, q, u, changed)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Nodes near the fronts
+    type(fronts_t), intent(in) :: fronts
+    !> From the last node to the first
+    logical, intent(in) :: backwards
+    !> Shear traction [Pa] and tangential displacement [m] (n_col, own rows, 2)
+    real(wp), intent(inout), contiguous :: q(:, :, :), u(:, :, :)
+    !> A traction has changed on any rank
+    logical, intent(out) :: changed
+    real(wp), allocatable :: change(:, :), around(:, :, :)
+    integer :: own(2), wanted(2), n_row, row, col, m, there
+
+    n_row = problem%lattice%extent(2)
+    own = problem%space%own_rows(n_row)
+    wanted = [max(own(1) - near_reach, 1), min(own(2) + near_reach, n_row)]
+    allocate (around(size(q, 1), wanted(1):wanted(2), 2))
+    around(:, own(1):own(2), :) = q
+    call relax(problem, fronts, backwards, q, u, changed)
+    changed = problem%space%number(merge(1, 0, changed)) > 0
+    if (.not. changed) return
+    do m = 1, 2
+      change = q(:, :, m) - around(:, own(1):own(2), m)
+      call problem%space%fetch(n_row, change, wanted(1), around(:, :, m))
+    end do
+    do row = wanted(1), wanted(2)
+      if (row >= own(1) .and. row <= own(2)) cycle
+      do col = 1, size(q, 1)
+        if (max(abs(around(col, row, 1)), abs(around(col, row, 2))) <= 0.0_wp) cycle
+        do there = max(row - near_reach, own(1)), min(row + near_reach, own(2))
+          call add_near(problem, col, there - row, around(col, row, :), u(:, there - own(1) + 1, :))
+        end do
+      end do
+    end do
+  end subroutine relax_rows
+
+  !> Add what a change of the traction of a node displaces near it in a row.
+  pure subroutine add_near(problem, node, rows, change, u)
+    type(friction_problem_t), intent(in) :: problem
+    !> Column of the node, and rows from it to the row
+    integer, intent(in) :: node, rows
+    !> Change of its traction [Pa]
+    real(wp), intent(in) :: change(2)
+    !> Tangential displacement of the row (n_col, 2) [m]
+    real(wp), intent(inout) :: u(:, :)
+    integer :: col
+
+    associate (near => problem%near_compliance)
+      do col = max(node - near_reach, 1), min(node + near_reach, size(u, 1))
+        u(col, 1) = u(col, 1) + near(col - node, rows, 1)*change(1) + near(col - node, rows, 2)*change(2)
+        u(col, 2) = u(col, 2) + near(col - node, rows, 2)*change(1) + near(col - node, rows, 3)*change(2)
+      end do
+    end associate
+  end subroutine add_near
 
   !> Make one pass of nonlinear Gauss-Seidel, (F12).
   pure subroutine relax(problem, fronts, backwards, q, u, changed)

@@ -26,7 +26,7 @@ module hc_lattice_solver
 
 contains
 
-  !> Sweep on one lattice until the residuals are small.
+  !> Sweep on one lattice, on the rows of this rank, until the residuals are small.
   subroutine solve_on_lattice(problem, operators, start, step, state, error, estimate, as_start)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
@@ -67,7 +67,8 @@ contains
         if (allocated(error)) return
         if (now%fixed) then
           fixed = fixed + 1
-          state%sliding = overloads(problem, step%target, reshape(now%p, problem%lattice%extent), now%residual_normal)
+          state%sliding = overloads(problem, step%target, reshape(now%p, [problem%lattice%extent(1), problem%own_rows()]), &
+                                    now%residual_normal)
           if (state%sliding) fixed = options%max_fixed_sweeps
         end if
         state%sweeps = sweep
@@ -140,7 +141,7 @@ contains
       if (known) then
         call collect(now, state)
         if (present(estimate) .and. .not. judged) then
-          if (.not. allocated(estimate)) allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+          if (.not. allocated(estimate)) allocate (estimate(problem%lattice%extent(1), problem%own_rows(), 3))
           estimate(:, :, 1) = state%gap
           estimate(:, :, 2:) = state%relative_displacement
         end if
@@ -226,26 +227,26 @@ contains
   real(wp) function cut_off(now, state)
     type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(in) :: state
-    real(wp) :: largest, total, less, displaced
+    real(wp) :: part(size(state%pressure, 2)), largest, less, displaced
     integer :: n, row, col, i
 
     n = size(now%p)
     largest = 0.0_wp
-    total = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(col, i, less) &
-    !$omp& reduction(max: largest) reduction(+: total)
-    do row = 1, size(state%pressure, 2)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(col, i, less) reduction(max: largest)
+    do row = 1, size(part)
+      part(row) = 0.0_wp
       do col = 1, size(state%pressure, 1)
         i = (row - 1)*size(state%pressure, 1) + col
         less = abs(state%pressure(col, row) - now%p(i)) + abs(state%traction(col, row, 1) - now%q(i)) &
                + abs(state%traction(col, row, 2) - now%q(n + i))
         largest = max(largest, less)
-        total = total + less
+        part(row) = part(row) + less
       end do
     end do
     !$omp end parallel do
+    largest = now%operators%space%largest(largest)
     displaced = 2.0_wp*now%problem%medium%largest_point(now%problem%lattice%spacing()) &
-                *sqrt(pi*now%problem%lattice%cell_area()*total*largest) + now%rounding
+                *sqrt(pi*now%problem%lattice%cell_area()*now%operators%space%total(part)*largest) + now%rounding
     cut_off = displaced/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
     if (.not. now%problem%friction%resists()) return
     displaced = displaced + now%problem%medium%spring_compliance()*largest

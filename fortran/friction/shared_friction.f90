@@ -2,6 +2,9 @@
 !>
 !> Paths of loads, wear and growing windows call the procedures of the solver on the first rank alone. Each call wakes the other
 !> ranks, which take part in it by `follow`.
+!>
+!> Each rank solves on its rows of the window, which the first one deals out and gathers. In steady rolling from row to row each has
+!> all rows; then they share the transforms.
 module hc_shared_friction
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use, intrinsic :: iso_fortran_env, only: int32
@@ -10,7 +13,9 @@ module hc_shared_friction
   use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields
+  use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields, add_history
+  use hc_coulomb, only: coulomb_t
+  use hc_nodal_coulomb, only: nodal_coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
@@ -41,6 +46,11 @@ module hc_shared_friction
     type(communicator_t) :: ranks
     !> On the first rank: words that let the others call `follow`
     integer(int32), allocatable :: wake(:)
+    !> Each rank solves on its rows; else on all of them
+    logical :: by_rows = .false.
+    !> Threads to use, and cache of spectra
+    integer :: n_threads = 0
+    type(kernel_cache_t), pointer :: cache => null()
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -71,60 +81,199 @@ contains
     self%problem = problem
     self%ranks = ranks
     self%wake = wake
-    call spread_real(ranks, self%problem%initial_gap)
-    call spread_mask(ranks, self%problem%candidate)
-    call new_windowed_friction(self%part, self%problem, error, n_threads, cache, ranks)
-    call ranks%agree(error)
+    self%n_threads = n_threads
+    self%cache => cache
+    if (ranks%rank > 0) deallocate (self%problem%initial_gap, self%problem%candidate)
+    call prepare(self, can_be_shared(self), error)
     ! the computations of a path run on the first rank alone
     self%problem%space = space_over(self%problem%lattice%extent, n_threads)
   end subroutine new_shared_friction
 
-  !> Copy a field of the first rank to the other ranks.
-  subroutine spread_real(ranks, field)
-    type(communicator_t), intent(in) :: ranks
-    !> Field (n_col, n_row), of one shape on all ranks
-    real(wp), intent(in), contiguous, target :: field(:, :)
+  !> Return whether ranks can solve the problem by rows: if friction does not depend on the zones of all nodes.
+  logical function can_be_shared(self)
+    type(shared_friction_t), intent(in) :: self
+    type(communicator_t) :: sharing
 
-    call spread(ranks, [2*size(field, 1), size(field, 2)], c_loc(field))
-  end subroutine spread_real
+    sharing = self%ranks%over(self%problem%lattice%extent)
+    can_be_shared = .false.
+    select type (law => self%problem%friction)
+    type is (coulomb_t)
+      can_be_shared = sharing%size > 1
+    class is (nodal_coulomb_t)
+      can_be_shared = sharing%size > 1
+    end select
+  end function can_be_shared
 
-  !> Copy a mask of the first rank to the other ranks.
-  subroutine spread_mask(ranks, field)
-    type(communicator_t), intent(in) :: ranks
-    !> Mask (n_col, n_row), of one shape on all ranks
-    logical(lk), intent(inout) :: field(:, :)
-    integer, allocatable, target :: marks(:, :)
+  !> Set up the problem as each rank solves it.
+  subroutine prepare(self, by_rows, error)
+    class(shared_friction_t), intent(inout) :: self
+    !> Each on its rows; else on all of them
+    logical, intent(in) :: by_rows
+    !> Allocated on failure, on all ranks
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: own
 
-    ! a row of bytes is no number of words, which ranks exchange
-    allocate (marks, source=merge(1, 0, field))
-    call spread(ranks, shape(marks), c_loc(marks))
-    field = marks > 0
-  end subroutine spread_mask
+    self%by_rows = by_rows
+    own%lattice = self%problem%lattice
+    if (by_rows) own%space%ranks = self%ranks%over(own%lattice%extent)
+    call own%inherit(self%problem)
+    associate (n => own%own_extent())
+      allocate (own%initial_gap(n(1), n(2)), own%candidate(n(1), n(2)))
+    end associate
+    call deal_real(self, self%problem%initial_gap, own%initial_gap)
+    call deal_mask(self, self%problem%candidate, own%candidate)
+    call new_windowed_friction(self%part, own, error, self%n_threads, self%cache, self%ranks)
+    call self%ranks%agree(error)
+  end subroutine prepare
 
-  !> Copy zones of the first rank to the other ranks.
-  subroutine spread_zone(ranks, field)
-    type(communicator_t), intent(in) :: ranks
-    !> Zones (n_col, n_row), of one shape on all ranks
-    integer, intent(in), contiguous, target :: field(:, :)
-
-    call spread(ranks, shape(field), c_loc(field))
-  end subroutine spread_zone
-
-  !> Copy rows of the first rank to the other ranks.
-  subroutine spread(ranks, extent, field)
-    type(communicator_t), intent(in) :: ranks
-    !> Words in a row, and number of rows
-    integer, intent(in) :: extent(2)
-    !> The rows
-    type(c_ptr), intent(in) :: field
+  !> Deal a field of the first rank out: to each rank its rows, or all of them.
+  subroutine deal_real(self, field, own)
+    class(shared_friction_t), intent(in) :: self
+    !> Field (n_col, n_row); on ranks but the first one absent
+    real(wp), intent(in), contiguous, optional, target :: field(:, :)
+    !> Rows of this rank (n_col, rows)
+    real(wp), intent(out), contiguous, target :: own(:, :)
     integer, target :: none(1)
 
-    if (ranks%rank == 0) then
-      call ranks%fetch(extent(1), extent(2), field, [1, 0], c_loc(none), on_first=.true.)
+    if (present(field)) then
+      call deal(self, 2*size(own, 1), c_loc(field), c_loc(own))
     else
-      call ranks%fetch(extent(1), extent(2), c_loc(none), [1, extent(2)], field, on_first=.true.)
+      call deal(self, 2*size(own, 1), c_loc(none), c_loc(own))
     end if
-  end subroutine spread
+  end subroutine deal_real
+
+  !> Deal the components of a field of the first rank out.
+  subroutine deal_vector(self, field, own)
+    class(shared_friction_t), intent(in) :: self
+    !> Field (n_col, n_row, components); on ranks but the first one absent
+    real(wp), intent(in), contiguous, optional :: field(:, :, :)
+    !> Rows of this rank (n_col, rows, components)
+    real(wp), intent(out), contiguous :: own(:, :, :)
+    integer :: m
+
+    do m = 1, size(own, 3)
+      if (present(field)) then
+        call deal_real(self, field(:, :, m), own(:, :, m))
+      else
+        call deal_real(self, own=own(:, :, m))
+      end if
+    end do
+  end subroutine deal_vector
+
+  !> Deal a mask of the first rank out.
+  subroutine deal_mask(self, field, own)
+    class(shared_friction_t), intent(in) :: self
+    !> Mask (n_col, n_row); on ranks but the first one absent
+    logical(lk), intent(in), optional :: field(:, :)
+    !> Rows of this rank (n_col, rows)
+    logical(lk), intent(out) :: own(:, :)
+    real(wp), allocatable :: rows(:, :)
+
+    ! a row of bytes is no number of words, which ranks exchange
+    allocate (rows(size(own, 1), size(own, 2)))
+    if (present(field)) then
+      call deal_real(self, merge(1.0_wp, 0.0_wp, field), rows)
+    else
+      call deal_real(self, own=rows)
+    end if
+    own = rows > 0.5_wp
+  end subroutine deal_mask
+
+  !> Deal zones of the first rank out.
+  subroutine deal_zone(self, field, own)
+    class(shared_friction_t), intent(in) :: self
+    !> Zones (n_col, n_row); on ranks but the first one absent
+    integer, intent(in), contiguous, optional, target :: field(:, :)
+    !> Rows of this rank (n_col, rows)
+    integer, intent(out), contiguous, target :: own(:, :)
+    integer, target :: none(1)
+
+    if (present(field)) then
+      call deal(self, size(own, 1), c_loc(field), c_loc(own))
+    else
+      call deal(self, size(own, 1), c_loc(none), c_loc(own))
+    end if
+  end subroutine deal_zone
+
+  !> Deal rows of the first rank out.
+  subroutine deal(self, words, field, own)
+    class(shared_friction_t), intent(in) :: self
+    !> Words in a row
+    integer, intent(in) :: words
+    !> All rows, on the first rank; rows of this rank
+    type(c_ptr), intent(in) :: field, own
+    integer :: rows(2)
+
+    associate (n_row => self%problem%lattice%extent(2))
+      rows = [1, n_row]
+      if (self%by_rows) rows = [self%ranks%first_row(n_row), self%ranks%last_row(n_row)]
+      call self%ranks%fetch(words, n_row, field, rows, own, on_first=.true.)
+    end associate
+  end subroutine deal
+
+  !> Gather the rows of a field on the first rank; the others free them.
+  subroutine gather_real(self, field)
+    class(shared_friction_t), intent(in) :: self
+    !> Rows of this rank, then all of them (n_col, rows)
+    real(wp), allocatable, intent(inout), target :: field(:, :)
+    real(wp), allocatable, target :: all(:, :)
+
+    if (self%by_rows) then
+      allocate (all(size(field, 1), merge(self%problem%lattice%extent(2), 1, self%ranks%rank == 0)))
+      call gather(self, 2*size(field, 1), c_loc(field), c_loc(all))
+      deallocate (field)
+      call move_alloc(all, field)
+    end if
+    if (self%ranks%rank > 0) deallocate (field)
+  end subroutine gather_real
+
+  !> Gather the rows of zones on the first rank; the others free them.
+  subroutine gather_zone(self, field)
+    class(shared_friction_t), intent(in) :: self
+    !> Rows of this rank, then all of them (n_col, rows)
+    integer, allocatable, intent(inout), target :: field(:, :)
+    integer, allocatable, target :: all(:, :)
+
+    if (self%by_rows) then
+      allocate (all(size(field, 1), merge(self%problem%lattice%extent(2), 1, self%ranks%rank == 0)))
+      call gather(self, size(field, 1), c_loc(field), c_loc(all))
+      deallocate (field)
+      call move_alloc(all, field)
+    end if
+    if (self%ranks%rank > 0) deallocate (field)
+  end subroutine gather_zone
+
+  !> Gather the rows of all components of a field on the first rank; the others free them.
+  subroutine gather_vector(self, field)
+    class(shared_friction_t), intent(in) :: self
+    !> Rows of this rank, then all of them (n_col, rows, components)
+    real(wp), allocatable, intent(inout), target :: field(:, :, :)
+    real(wp), allocatable, target :: all(:, :, :)
+    integer :: m
+
+    if (self%by_rows) then
+      allocate (all(size(field, 1), merge(self%problem%lattice%extent(2), 1, self%ranks%rank == 0), size(field, 3)))
+      do m = 1, size(field, 3)
+        call gather(self, 2*size(field, 1), c_loc(field(:, :, m)), c_loc(all(:, :, m)))
+      end do
+      deallocate (field)
+      call move_alloc(all, field)
+    end if
+    if (self%ranks%rank > 0) deallocate (field)
+  end subroutine gather_vector
+
+  !> Gather rows on the first rank.
+  subroutine gather(self, words, own, all)
+    class(shared_friction_t), intent(in) :: self
+    !> Words in a row
+    integer, intent(in) :: words
+    !> Rows of this rank; all rows, on the first rank
+    type(c_ptr), intent(in) :: own, all
+
+    associate (n_row => self%problem%lattice%extent(2))
+      call self%ranks%fetch(words, n_row, own, [1, merge(n_row, 0, self%ranks%rank == 0)], all)
+    end associate
+  end subroutine gather
 
   !> Let the other ranks take part in a call.
   subroutine announce(self, order)
@@ -154,40 +303,92 @@ contains
     order%guessed = allocated(self%guess)
     if (order%guessed) order%guess_motion = self%guess%motion
     call announce(self, order)
-    if (order%guessed) self%part%guess = self%guess
-    call solve_together(self, order, start, reference, state, error)
+    call solve_together(self, order, state, error, start, reference)
   end subroutine solve_step
 
   !> Solve a load step on all ranks.
-  subroutine solve_together(self, order, start, reference, state, error)
+  subroutine solve_together(self, order, state, error, start, reference)
     class(shared_friction_t), intent(inout) :: self
     type(call_t), intent(in) :: order
-    !> State to start from, and displacement that slip counts from; on ranks but the first one fields without meaning
-    type(contact_state_t), intent(in) :: start
-    real(wp), intent(in), contiguous, target :: reference(:, :, :)
+    !> State at the end of the step; its fields are on the first rank
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
-    integer :: m
+    !> On the first rank: state to start from, and displacement that slip counts from
+    type(contact_state_t), intent(in), optional :: start
+    real(wp), intent(in), contiguous, optional :: reference(:, :, :)
+    type(contact_state_t) :: own
+    real(wp), allocatable, target :: origin(:, :, :)
 
-    call spread_real(self%ranks, start%pressure)
-    call spread_real(self%ranks, start%gap)
-    call spread_zone(self%ranks, start%zone)
-    do m = 1, 2
-      call spread_real(self%ranks, start%traction(:, :, m))
-      call spread_real(self%ranks, start%relative_displacement(:, :, m))
-      call spread_real(self%ranks, reference(:, :, m))
-    end do
+    if (self%by_rows .and. order%target%rolling%steady .and. order%target%rolling%ahead(2) /= 0) then
+      ! a node feels all nodes ahead of it, in rows of other ranks
+      call prepare(self, .false., error)
+      if (allocated(error)) return
+    end if
+    if (present(start)) then
+      call deal_state(self, order, own, start)
+    else
+      call deal_state(self, order, own)
+    end if
+    allocate (origin, mold=own%traction)
+    call deal_vector(self, reference, origin)
     if (order%guessed) then
-      call spread_real(self%ranks, self%part%guess%pressure)
-      do m = 1, 2
-        call spread_real(self%ranks, self%part%guess%traction(:, :, m))
-      end do
+      allocate (self%part%guess)
+      allocate (self%part%guess%pressure, mold=own%pressure)
+      allocate (self%part%guess%traction, mold=own%traction)
+      if (allocated(self%guess)) then
+        call deal_real(self, self%guess%pressure, self%part%guess%pressure)
+        call deal_vector(self, self%guess%traction, self%part%guess%traction)
+      else
+        call deal_real(self, own=self%part%guess%pressure)
+        call deal_vector(self, own=self%part%guess%traction)
+      end if
       self%part%guess%motion = order%guess_motion
     end if
-    call self%part%solve_step(start, reference, order%target, order%tolerance, order%max_sweeps, state, error)
+    call self%part%solve_step(own, origin, order%target, order%tolerance, order%max_sweeps, state, error)
     if (allocated(self%part%guess)) deallocate (self%part%guess)
     call self%ranks%agree(error)
+    if (allocated(error)) return
+    deallocate (origin)
+    own = contact_state_t()
+    deallocate (state%accumulated_slip, state%dissipation_density)
+    call gather_real(self, state%pressure)
+    call gather_real(self, state%gap)
+    call gather_zone(self, state%zone)
+    call gather_vector(self, state%traction)
+    call gather_vector(self, state%relative_displacement)
+    call gather_vector(self, state%slip_increment)
+    if (self%ranks%rank == 0) call add_history(state)
   end subroutine solve_together
+
+  !> Deal a state of the first rank out.
+  subroutine deal_state(self, order, own, state)
+    class(shared_friction_t), intent(in) :: self
+    type(call_t), intent(in) :: order
+    !> Rows of this rank
+    type(contact_state_t), intent(out) :: own
+    !> All rows, on the first rank
+    type(contact_state_t), intent(in), optional :: state
+
+    own%motion = order%motion
+    own%load = order%load
+    associate (n => self%part%problem%own_extent())
+      allocate (own%pressure(n(1), n(2)), own%gap(n(1), n(2)), own%zone(n(1), n(2)), own%traction(n(1), n(2), 2), &
+                own%relative_displacement(n(1), n(2), 2))
+    end associate
+    if (present(state)) then
+      call deal_real(self, state%pressure, own%pressure)
+      call deal_real(self, state%gap, own%gap)
+      call deal_zone(self, state%zone, own%zone)
+      call deal_vector(self, state%traction, own%traction)
+      call deal_vector(self, state%relative_displacement, own%relative_displacement)
+    else
+      call deal_real(self, own=own%pressure)
+      call deal_real(self, own=own%gap)
+      call deal_zone(self, own=own%zone)
+      call deal_vector(self, own=own%traction)
+      call deal_vector(self, own=own%relative_displacement)
+    end if
+  end subroutine deal_state
 
   !> Compute the displacements of given tractions; called on the first rank alone.
   subroutine displacements(self, pressure, traction, displacement, error)
@@ -195,7 +396,7 @@ contains
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: tractions(:, :, :)
+    real(wp), allocatable :: tractions(:, :, :), found(:, :, :)
     type(call_t) :: order
 
     allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
@@ -203,23 +404,34 @@ contains
     tractions(:, :, 2:) = traction
     order%what = to_displace
     call announce(self, order)
-    call displace_together(self, tractions, displacement, error)
+    call displace_together(self, found, error, tractions)
+    if (.not. allocated(error)) displacement = found
   end subroutine displacements
 
   !> Compute displacements on all ranks.
-  subroutine displace_together(self, tractions, displacement, error)
+  subroutine displace_together(self, displacement, error, tractions)
     class(shared_friction_t), intent(inout) :: self
-    !> Pressure and shear traction; set on the first rank
-    real(wp), intent(in), contiguous, target :: tractions(:, :, :)
-    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    !> w, u_x, u_y; on the first rank
+    real(wp), allocatable, intent(out) :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
-    integer :: m
+    !> Pressure and shear traction, on the first rank; freed
+    real(wp), allocatable, intent(inout), optional :: tractions(:, :, :)
+    real(wp), allocatable :: own(:, :, :)
 
-    do m = 1, 3
-      call spread_real(self%ranks, tractions(:, :, m))
-    end do
-    call self%part%displacements(tractions(:, :, 1), tractions(:, :, 2:), displacement, error)
+    associate (n => self%part%problem%own_extent())
+      allocate (own(n(1), n(2), 3), displacement(n(1), n(2), 3))
+    end associate
+    if (present(tractions)) then
+      call deal_vector(self, tractions, own)
+      deallocate (tractions)
+    else
+      call deal_vector(self, own=own)
+    end if
+    call self%part%displacements(own(:, :, 1), own(:, :, 2:), displacement, error)
     call self%ranks%agree(error)
+    if (allocated(error)) return
+    deallocate (own)
+    call gather_vector(self, displacement)
   end subroutine displace_together
 
   !> Set the gap before loading; called on the first rank alone.
@@ -231,9 +443,18 @@ contains
     self%problem%initial_gap = gap
     order%what = to_set_gap
     call announce(self, order)
-    call spread_real(self%ranks, self%problem%initial_gap)
-    call self%part%set_gap(self%problem%initial_gap)
+    call set_gap_together(self)
   end subroutine set_gap
+
+  !> Set the gap of the first rank on all ranks.
+  subroutine set_gap_together(self)
+    class(shared_friction_t), intent(inout) :: self
+    real(wp), allocatable :: own(:, :)
+
+    allocate (own, mold=self%part%problem%initial_gap)
+    call deal_real(self, self%problem%initial_gap, own)
+    call self%part%set_gap(own)
+  end subroutine set_gap_together
 
   !> Take part in a call of the first rank.
   subroutine follow(self, error)
@@ -241,8 +462,8 @@ contains
     !> Allocated on failure of any rank
     type(error_t), allocatable, intent(out) :: error
     type(call_t) :: order
-    type(contact_state_t) :: start, state
-    real(wp), allocatable :: fields(:, :, :), displacement(:, :, :)
+    type(contact_state_t) :: state
+    real(wp), allocatable :: displacement(:, :, :)
     integer(int32), allocatable :: words(:)
     integer :: n
 
@@ -250,29 +471,16 @@ contains
     allocate (words(n))
     call self%ranks%hear(words)
     order = transfer(words, order)
-    associate (lattice => self%problem%lattice)
-      select case (order%what)
-      case (to_solve)
-        call add_fields(start, lattice, self%problem%space)
-        start%motion = order%motion
-        start%load = order%load
-        allocate (fields(lattice%extent(1), lattice%extent(2), 2))
-        if (order%guessed) then
-          allocate (self%part%guess)
-          self%part%guess%pressure = start%pressure
-          self%part%guess%traction = start%traction
-        end if
-        call solve_together(self, order, start, fields, state, error)
-      case (to_displace)
-        allocate (fields(lattice%extent(1), lattice%extent(2), 3), displacement(lattice%extent(1), lattice%extent(2), 3))
-        call displace_together(self, fields, displacement, error)
-      case (to_set_gap)
-        call spread_real(self%ranks, self%problem%initial_gap)
-        call self%part%set_gap(self%problem%initial_gap)
-      case default
-        call raise(error, status%invalid_input, 'expected a call that the ranks know')
-      end select
-    end associate
+    select case (order%what)
+    case (to_solve)
+      call solve_together(self, order, state, error)
+    case (to_displace)
+      call displace_together(self, displacement, error)
+    case (to_set_gap)
+      call set_gap_together(self)
+    case default
+      call raise(error, status%invalid_input, 'expected a call that the ranks know')
+    end select
   end subroutine follow
 
 end module hc_shared_friction

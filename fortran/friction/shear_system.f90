@@ -86,7 +86,7 @@ contains
     class(shear_system_t), intent(inout) :: self
     integer :: n, i
 
-    n = self%operators%flexibility%lattice%size()
+    n = product(self%space%own_extent(self%operators%flexibility%lattice%extent))
     allocate (self%direction(2, n), self%compliance(n))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
@@ -211,7 +211,7 @@ contains
       call turn_row(to - from + 1, self%direction(:, from:to), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
-    rounding = epsilon(1.0_wp)*rounding
+    rounding = epsilon(1.0_wp)*self%space%largest(rounding)
   end subroutine leave_frames
 
   !> Turn components along x and y to those along t and e, or back, at the nodes in contact: a reflection, which is its own

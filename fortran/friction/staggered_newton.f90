@@ -153,7 +153,7 @@ contains
     bound = now%problem%options%newton%final_pressure*now%tolerance
     now%residual_normal = now%gap_residual(gap)
     missing = 0.0_wp
-    carried = now%pressure%space%sum(now%p)
+    carried = now%pressure_sum()
     if (now%target%control(normal) == force_control) then
       missing = now%target%value(normal)/now%problem%lattice%cell_area() - carried
     end if
@@ -195,7 +195,7 @@ contains
     unknown_gap = changed .and. is_first .and. by_load
     if (compliant .and. .not. unknown_gap) call linearize_law(now, gap, .false.)
     if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
-    call new_active_set(nodes, now%contact, now%pressure%space)
+    call new_active_set(nodes, now%contact, now%pressure%space, now%problem%own_extent())
     allocate (constraints%columns(nodes%n_active, merge(1, 0, by_load)), source=1.0_wp)
     allocate (given(size(gap)))
     !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
@@ -248,8 +248,8 @@ contains
     logical :: independent
 
     if (size(constraints%columns, 2) == 0) return
-    missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure%space%sum(now%p)
-    call constraints%satisfy(now%pressure%space, missing, now%p, independent, nodes)
+    missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()
+    call constraints%satisfy(nodes%space, missing, now%p, independent, nodes)
   end subroutine fit_load
 
   !> Solve for the shear traction under the present pressure, (F10).
@@ -354,9 +354,9 @@ contains
 
     n = size(now%p)
     call classify(now, fixing, active)
-    call new_active_set(nodes, active, now%shear%space)
+    call new_active_set(nodes, active, now%shear%space, now%problem%own_extent())
     call nodes%pair(2*n)
-    found%sticks = any(active(n + 1:))
+    found%sticks = now%shear%space%count(active(n + 1:)) > 0
     deallocate (active)
     associate (constraints => found%constraints)
       call find_constraints(now, nodes, found%driven, constraints%columns, found%missing)
@@ -367,7 +367,7 @@ contains
       do try = 1, 2
         call find_rigid_traction(now, nodes, constraints%columns, try == 2, constraints%mb, error)
         if (allocated(error)) return
-        call constraints%satisfy(now%shear%space, found%missing, found%x, found%independent, nodes)
+        call constraints%satisfy(nodes%space, found%missing, found%x, found%independent, nodes)
         if (found%independent) exit
       end do
     end associate

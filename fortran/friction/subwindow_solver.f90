@@ -51,7 +51,7 @@ contains
     integer, intent(in), optional :: n_threads
     !> Cache of spectra; it has to outlive the solver
     type(kernel_cache_t), pointer, intent(in), optional :: cache
-    !> Ranks that share the products, each with all fields; absent: one
+    !> Ranks that share the products of a problem of which each has all rows; absent: one
     type(communicator_t), intent(in), optional :: ranks
 
     if (present(ranks)) self%ranks = ranks

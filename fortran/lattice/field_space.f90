@@ -1,8 +1,8 @@
 !> Space of the fields over a window: ranks and threads that share the work, and operations on the values of many nodes.
 !>
 !> Fields are plain arrays: windows (n_col, n_row), or vectors of nodes. A rank holds its own rows of the window only. Sums are
-!> taken in fixed blocks or row by row, so that they do not depend on the number of threads; sums over windows, and largest
-!> values, do not depend on the number of ranks, either.
+!> taken in fixed blocks or row by row, so that they do not depend on the number of threads; sums row by row, and largest values,
+!> do not depend on the number of ranks, either.
 module hc_field_space
   use, intrinsic :: iso_c_binding, only: c_loc
   use hc_precision, only: wp, sp, lk
@@ -31,6 +31,8 @@ module hc_field_space
     type(communicator_t) :: helpers = communicator_t()
     !> Memory that the transforms of a solver share; not there: each has its own
     type(scratch_t), pointer :: scratch => null()
+    !> Where each pair of own rows ends in vectors of some nodes (from 0 on, component); not there: they are summed in blocks
+    integer, allocatable :: ends(:, :)
   contains
     !> Assign and combine vectors
     procedure :: fill, copy, add, add_columns
@@ -47,12 +49,14 @@ module hc_field_space
     generic :: count => count_nodes, count_window
     procedure :: count_positive
     !> Sum of values by row; largest values, in place
-    procedure :: total, most
+    procedure :: total, most, largest, number
     !> First and last row of this rank, and the size of its part of a field
     procedure :: own_rows, own_extent
     !> Rows of a field over the window, wherever they lie
     generic :: fetch => fetch_window, fetch_single, fetch_mask
     procedure, private :: fetch_window, fetch_single, fetch_mask
+    !> Terms of a sum over a vector: the pairs of rows or blocks that are added up, the components of each, and their elements
+    procedure :: n_term, n_component, term
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
     procedure, private :: vector_sum, window_sum, window_sum_on, window_sum_single, vector_max, vector_max_on, window_max, &
@@ -113,7 +117,7 @@ contains
 
   !> Return the largest of a value of all ranks.
   real(wp) function largest(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     real(wp), intent(in) :: value
     real(wp) :: values(1)
 
@@ -124,7 +128,7 @@ contains
 
   !> Return the sum of a count of all ranks.
   integer function number(self, value)
-    type(field_space_t), intent(in) :: self
+    class(field_space_t), intent(in) :: self
     integer, intent(in) :: value
     integer :: values(1)
 
@@ -418,17 +422,58 @@ contains
     count_nodes = number(self, count_nodes)
   end function count_nodes
 
+  !> Return the number of terms of a sum: pairs of own rows, or blocks.
+  pure integer function n_term(self, n)
+    class(field_space_t), intent(in) :: self
+    !> Length of the vector
+    integer, intent(in) :: n
+
+    n_term = (n + sum_block - 1)/sum_block
+    if (allocated(self%ends)) n_term = ubound(self%ends, 1)
+  end function n_term
+
+  !> Return the number of components of a term.
+  pure integer function n_component(self)
+    class(field_space_t), intent(in) :: self
+
+    n_component = 1
+    if (allocated(self%ends)) n_component = size(self%ends, 2)
+  end function n_component
+
+  !> Find the first and the last element of a component of a term; there are none if the last is less.
+  pure subroutine term(self, k, component, n, before, first, last)
+    class(field_space_t), intent(in) :: self
+    !> Term and component
+    integer, intent(in) :: k, component
+    !> Length of the vector, and elements that it lacks before its first one
+    integer, intent(in) :: n, before
+    !> The elements
+    integer, intent(out) :: first, last
+
+    if (allocated(self%ends)) then
+      first = max(self%ends(k - 1, component) - before, 0) + 1
+      last = min(self%ends(k, component) - before, n)
+    else
+      first = (k - 1)*sum_block + 1
+      last = min(k*sum_block, n)
+    end if
+  end subroutine term
+
   !> Sum the elements.
   real(wp) function vector_sum(self, x)
     class(field_space_t), intent(in) :: self
     !> Vector
     real(wp), intent(in), contiguous :: x(:)
-    real(wp) :: part((size(x) + sum_block - 1)/sum_block)
-    integer :: k
+    real(wp) :: part(self%n_term(size(x)))
+    integer :: k, m, from, to
 
-    !$omp parallel do schedule(static) num_threads(self%threads)
+    !$omp parallel do schedule(static) num_threads(self%threads) private(m, from, to)
     do k = 1, size(part)
-      part(k) = sum(x((k - 1)*sum_block + 1:min(k*sum_block, size(x))))
+      part(k) = 0.0_wp
+      do m = 1, self%n_component()
+        call term(self, k, m, size(x), 0, from, to)
+        part(k) = part(k) + sum(x(from:to))
+      end do
     end do
     !$omp end parallel do
     vector_sum = self%ranks%total(part)
@@ -522,19 +567,25 @@ contains
     end do
   end function dots
 
-  !> Compute a scalar product, summed in fixed blocks.
-  real(wp) function dot(self, a, b)
+  !> Compute a scalar product, summed by pairs of rows or in fixed blocks.
+  real(wp) function dot(self, a, b, before)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length
     real(wp), intent(in), contiguous :: a(:), b(:)
-    real(wp) :: part((size(a) + sum_block - 1)/sum_block)
-    integer :: k, from, to
+    !> Elements that they lack before their first ones; absent: none
+    integer, intent(in), optional :: before
+    real(wp) :: part(self%n_term(size(a)))
+    integer :: k, m, from, to, lacking
 
-    !$omp parallel do schedule(static) num_threads(self%threads) private(from, to)
+    lacking = 0
+    if (present(before)) lacking = before
+    !$omp parallel do schedule(static) num_threads(self%threads) private(m, from, to)
     do k = 1, size(part)
-      from = (k - 1)*sum_block + 1
-      to = min(k*sum_block, size(a))
-      part(k) = ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
+      part(k) = 0.0_wp
+      do m = 1, self%n_component()
+        call term(self, k, m, size(a), lacking, from, to)
+        if (to >= from) part(k) = part(k) + ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
+      end do
     end do
     !$omp end parallel do
     dot = self%ranks%total(part)

@@ -27,14 +27,16 @@ module hc_hierarchy
   contains
     !> Columns and rows of a field in the memory of this rank, and their product
     procedure :: own_extent, own_rows, own_size
+    !> Number of rows before them
+    procedure :: rows_before
     !> Lattice of some rows, and a field there
     procedure :: rows_of, take_rows
     !> Field on a part of the window, and back
     procedure :: cut, paste
     !> The same problem on the lattice of every second node
     procedure :: coarsen
-    !> Gap of the problem there, set again
-    procedure :: coarsen_gap
+    !> Gap of the problem there, set again; values of a field there
+    procedure :: coarsen_gap, restrict
     !> The same problem on a part of its window
     procedure :: extract_part
     !> Bodies, laws and tuning numbers, from the same problem on another lattice
@@ -103,18 +105,33 @@ contains
     class(level_t), intent(in) :: self
     !> The problem there
     class(level_t), intent(inout) :: coarse
+    real(wp), allocatable :: gap(:, :)
+
+    call self%restrict(self%initial_gap, coarse, gap)
+    call move_alloc(gap, coarse%initial_gap)
+  end subroutine coarsen_gap
+
+  !> Take the values of a field at the nodes of the coarser lattice.
+  subroutine restrict(self, field, coarse, values)
+    class(level_t), intent(in) :: self
+    !> Field (n_col, own rows)
+    real(wp), intent(in), contiguous :: field(:, :)
+    !> The problem there
+    class(level_t), intent(in) :: coarse
+    !> Field there (columns and own rows of the coarse lattice)
+    real(wp), allocatable, intent(out) :: values(:, :)
     real(wp), allocatable :: rows(:, :)
     integer :: first(2), n
 
     if (self%space%ranks%size == 1) then
-      coarse%initial_gap = restrict_field(self%lattice, self%initial_gap, coarse%lattice)
+      values = restrict_field(self%lattice, field, coarse%lattice)
     else
       call find_fine_rows(self, coarse, first, n)
       allocate (rows(self%lattice%extent(1), n))
-      call self%space%fetch(self%lattice%extent(2), self%initial_gap, first(2), rows)
-      coarse%initial_gap = rows(first(1)::2, ::2)
+      call self%space%fetch(self%lattice%extent(2), field, first(2), rows)
+      values = rows(first(1)::2, ::2)
     end if
-  end subroutine coarsen_gap
+  end subroutine restrict
 
   !> Find the first column and row of the fine nodes that the own rows of the coarse lattice consist of, and their rows.
   subroutine find_fine_rows(fine, coarse, first, n)
@@ -142,6 +159,13 @@ contains
 
     own_rows = rows_held(self%space%ranks, self%lattice%extent(2))
   end function own_rows
+
+  !> Return the number of rows of the window before those of this rank.
+  pure integer function rows_before(self)
+    class(level_t), intent(in) :: self
+
+    rows_before = self%space%ranks%first_row(self%lattice%extent(2)) - 1
+  end function rows_before
 
   !> Return the number of nodes in the memory of this rank.
   pure integer function own_size(self)

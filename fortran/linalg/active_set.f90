@@ -26,7 +26,8 @@ module hc_active_set
   type :: active_set_t
     !> Number of active nodes
     integer :: n_active = 0
-    type(field_space_t), private :: space
+    !> Space of vectors of the active nodes
+    type(field_space_t) :: space
     !> First and last node of each run
     integer, allocatable :: first(:), last(:)
     !> Where it begins among the active nodes
@@ -93,13 +94,15 @@ contains
   end subroutine positive_span
 
   !> Find the runs of active nodes; they end at the ends of blocks, too.
-  subroutine new_active_set(self, active, space)
+  subroutine new_active_set(self, active, space, extent)
     !> Set to be set up
     type(active_set_t), intent(out) :: self
     !> Active nodes
     logical(lk), intent(in), contiguous :: active(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Columns and own rows of the window, by pairs of whose rows vectors are summed; absent: in blocks
+    integer, intent(in), optional :: extent(2)
     !> Where the runs of each block begin in the list, less one
     integer :: before((size(active) + block_size - 1)/block_size + 1)
     integer :: k, n_block
@@ -126,6 +129,7 @@ contains
     !$omp end parallel do
     call number_nodes(self)
     self%space = space
+    if (present(extent)) call find_ends(self, active, extent)
 
   contains
 
@@ -136,6 +140,34 @@ contains
     end function start
 
   end subroutine new_active_set
+
+  !> Find where pairs of rows of the window end among the active nodes: the rows of a rank are whole pairs, but for the last.
+  subroutine find_ends(self, active, extent)
+    type(active_set_t), intent(inout) :: self
+    !> Active nodes of all components
+    logical(lk), intent(in), contiguous :: active(:)
+    !> Columns and own rows of the window
+    integer, intent(in) :: extent(2)
+    integer, allocatable :: ends(:, :)
+    integer :: n, m, k, before
+
+    n = (extent(2) + 1)/2
+    allocate (ends(0:n, size(active)/product(extent)))
+    do m = 1, size(ends, 2)
+      before = (m - 1)*product(extent)
+      !$omp parallel do schedule(static) num_threads(self%space%threads)
+      do k = 1, n
+        ends(k, m) = count(active(before + 2*(k - 1)*extent(1) + 1:before + min(2*k, extent(2))*extent(1)))
+      end do
+      !$omp end parallel do
+      ends(0, m) = 0
+      if (m > 1) ends(0, m) = ends(n, m - 1)
+      do k = 1, n
+        ends(k, m) = ends(k - 1, m) + ends(k, m)
+      end do
+    end do
+    call move_alloc(ends, self%space%ends)
+  end subroutine find_ends
 
   !> Count the runs of active nodes.
   pure integer function count_runs(active)
@@ -384,13 +416,15 @@ contains
     end do
   end subroutine number_nodes
 
-  !> Return whether the active nodes are those of a set.
+  !> Return whether the active nodes of this rank are those of a set.
   logical function is_set(self, active)
     class(active_set_t), intent(in) :: self
     !> The set
     logical(lk), intent(in), contiguous :: active(:)
+    type(field_space_t) :: own
     integer :: k, within
 
+    own%threads = self%space%threads
     within = 0
     !$omp parallel do schedule(static) num_threads(self%space%threads) reduction(+: within)
     do k = 1, size(self%first)
@@ -398,7 +432,7 @@ contains
     end do
     !$omp end parallel do
     is_set = within == self%n_active
-    if (is_set) is_set = self%space%count(active) == within
+    if (is_set) is_set = own%count(active) == within
   end function is_set
 
 end module hc_active_set

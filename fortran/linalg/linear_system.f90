@@ -189,7 +189,7 @@ contains
   !> M B is about the traction that a rigid motion of the active nodes causes.
   subroutine satisfy(self, space, missing, x, independent, nodes)
     class(constraints_t), intent(in) :: self
-    !> Space of the fields
+    !> Space of the nodes
     type(field_space_t), intent(in) :: space
     !> Defect of C^T x
     real(wp), intent(in) :: missing(:)
@@ -238,7 +238,7 @@ contains
     real(wp) :: inverse(size(share), size(share))
     logical :: independent
 
-    call constraints%invert(system%space, inverse, independent)
+    call constraints%invert(nodes%space, inverse, independent)
     if (.not. independent) return
     allocate (r(nodes%n_active), z(nodes%n_active))
     call nodes%pack(ax, z)
@@ -246,7 +246,7 @@ contains
     call constraints%add_columns(system%space, constraints%multiplier, r)
     call system%precondition_packed(nodes, size(x), r, z, error)
     if (allocated(error)) return
-    share = -matmul(inverse, constraints%resultants(system%space, z))
+    share = -matmul(inverse, constraints%resultants(nodes%space, z))
     call constraints%add_mb(system%space, share, z)
     call nodes%pack(x, r)
     r = r + length*z
@@ -366,7 +366,7 @@ contains
     resultants = 0.0_wp
     if (allocated(self%rows)) n = size(self%rows, 1)
     do m = 1, size(self%columns, 2)
-      if (n < size(x)) resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:))
+      resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
       if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
     end do
     if (allocated(self%of_sum)) resultants(size(resultants)) = space%sum(x(:self%n_before))

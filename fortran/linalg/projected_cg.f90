@@ -72,7 +72,7 @@ contains
     logical :: independent, anew
     integer :: stat
 
-    space = system%space
+    space = nodes%space
     ! before there are vectors
     call constraints%invert(space, inverse, independent)
     call find_residual(nodes, rhs, ax, space, r, z)
@@ -172,25 +172,32 @@ contains
     real(wp), intent(out) :: along(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: part(size(change), (size(r) + block - 1)/block), column(block)
-    integer :: k, m, from, to, n
+    real(wp) :: part(size(change), space%n_term(size(r))), column(block)
+    integer :: k, i, m, first, last, from, to, n
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, n, column)
+    part = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, first, last, from, to, n, column)
     do k = 1, size(part, 2)
-      from = (k - 1)*block + 1
-      to = min(k*block, size(r))
-      n = to - from + 1
-      if (abs(step) > 0.0_wp) call add_multiple(n, step, ad(from:to), r(from:to))
-      do m = 1, size(change)
-        if (abs(change(m)) > 0.0_wp) call add_multiple(n, change(m), b(from:to, m), r(from:to))
-      end do
-      do m = 1, size(change)
-        column(:n) = c(from:to, m)
-        part(m, k) = ddot(n, column, 1, r(from:to), 1)
+      do i = 1, space%n_component()
+        call space%term(k, i, size(r), 0, first, last)
+        do from = first, last, block
+          to = min(from + block - 1, last)
+          n = to - from + 1
+          if (abs(step) > 0.0_wp) call add_multiple(n, step, ad(from:to), r(from:to))
+          do m = 1, size(change)
+            if (abs(change(m)) > 0.0_wp) call add_multiple(n, change(m), b(from:to, m), r(from:to))
+          end do
+          do m = 1, size(change)
+            column(:n) = c(from:to, m)
+            part(m, k) = part(m, k) + ddot(n, column, 1, r(from:to), 1)
+          end do
+        end do
       end do
     end do
     !$omp end parallel do
-    along = sum(part, dim=2)
+    do m = 1, size(along)
+      along(m) = space%total(part(m, :))
+    end do
   end subroutine advance_residual
 
   !> Compute r <- r + B change, and its largest element.
@@ -217,6 +224,7 @@ contains
       end do
     end do
     !$omp end parallel do
+    largest = space%largest(largest)
   end subroutine add_constraints
 
   !> Project z <- z + M B share, and compute r^T z.
@@ -231,21 +239,27 @@ contains
     real(wp), intent(out) :: rz
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: part((size(r) + block - 1)/block), column(block)
-    integer :: k, m, from, to
+    real(wp) :: part(space%n_term(size(r))), column(block)
+    integer :: k, i, m, first, last, from, to, n
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, column)
+    part = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, first, last, from, to, n, column)
     do k = 1, size(part)
-      from = (k - 1)*block + 1
-      to = min(k*block, size(r))
-      do m = 1, size(share)
-        column(:to - from + 1) = m_b(from:to, m)
-        call add_multiple(to - from + 1, share(m), column, z(from:to))
+      do i = 1, space%n_component()
+        call space%term(k, i, size(r), 0, first, last)
+        do from = first, last, block
+          to = min(from + block - 1, last)
+          n = to - from + 1
+          do m = 1, size(share)
+            column(:n) = m_b(from:to, m)
+            call add_multiple(n, share(m), column, z(from:to))
+          end do
+          part(k) = part(k) + ddot(n, r(from:to), 1, z(from:to), 1)
+        end do
       end do
-      part(k) = ddot(to - from + 1, r(from:to), 1, z(from:to), 1)
     end do
     !$omp end parallel do
-    rz = sum(part)
+    rz = space%total(part)
   end subroutine project
 
   !> Compute y <- alpha x + beta y; where beta is 0, y need not be a number.

@@ -75,7 +75,7 @@ contains
     integer :: directions
     type(field_space_t) :: space
 
-    space = system%space
+    space = nodes%space
     iteration%made = 0
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
@@ -205,6 +205,7 @@ contains
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
       real(wp), allocatable :: packed(:)
+      real(wp) :: largest
       integer :: i
 
       if (allocated(own)) deallocate (own)
@@ -234,7 +235,8 @@ contains
       do i = 1, directions
         call add_direction(y(i), basis(i)%mr)
         call others%add(y(i), basis(i)%beyond, ax)
-        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*max(maxval(abs(basis(i)%beyond)), 0.0_sp)
+        largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
+        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*largest
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return

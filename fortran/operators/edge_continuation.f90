@@ -71,7 +71,7 @@ contains
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
-    !> Nodes beyond which there are no rings (n_col, n_row), on one rank; absent: all of the window
+    !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
     logical(lk), intent(in), contiguous, optional, target :: within(:, :)
     !> Neighbours that a ring consists of; absent: all
     logical, intent(in), optional :: near(6)
@@ -84,7 +84,7 @@ contains
     step = neighbor_steps(size(active, 1) + 2)
     if (present(near)) step = pack(step, near)
     if (space%ranks%size > 1) then
-      call share_rings(self, active, space, options, step)
+      call share_rings(self, active, space, options, step, within)
     else
       ! marks take memory: rows that no ring reaches have none
       self%rows = [1, size(active, 2)]
@@ -142,7 +142,7 @@ contains
 
   !> Find the rings in own rows and in those that their values depend on: smoothed rings further in or out, and the active nodes
   !> that these begin at.
-  subroutine share_rings(self, active, space, options, step)
+  subroutine share_rings(self, active, space, options, step, within)
     type(edge_extension_t), intent(inout) :: self
     !> Active nodes (n_col, own rows)
     logical(lk), intent(in), contiguous :: active(:, :)
@@ -150,7 +150,9 @@ contains
     type(preconditioner_options_t), intent(in) :: options
     !> Steps to the neighbors of a node
     integer, intent(in), contiguous :: step(:)
-    logical(lk), allocatable :: wider(:, :)
+    !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
+    logical(lk), intent(in), contiguous, optional :: within(:, :)
+    logical(lk), allocatable :: wider(:, :), around(:, :)
     integer, allocatable :: mark(:), frontier(:)
     integer :: counts(3), n_ring
 
@@ -161,13 +163,15 @@ contains
     self%n_row = counts(1)
     self%own = space%own_rows(self%n_row)
     call take_rows(self, active, 1, wider)
-    call mark_window(wider, space, mark)
+    if (present(within)) call take_rows(self, within, 1, around)
+    call mark_window(wider, space, mark, around)
     call find_edge(wider, mark, step, space, frontier)
     counts = [count(active), count(is_own(self, size(active, 1), frontier)), 0]
     call space%ranks%add_counts(counts)
     n_ring = number_of_rings(options, counts(1), counts(2))
     call take_rows(self, active, n_ring*(options%smoothings + 2) + 1, wider)
-    call mark_window(wider, space, mark)
+    if (present(within)) call take_rows(self, within, n_ring*(options%smoothings + 2) + 1, around)
+    call mark_window(wider, space, mark, around)
     call find_edge(wider, mark, step, space, frontier)
     call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
   end subroutine share_rings

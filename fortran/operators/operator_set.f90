@@ -117,7 +117,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
 
-    associate (n => self%flexibility%lattice%extent)
+    associate (n => self%space%own_extent(self%flexibility%lattice%extent))
       acting(1:n(1), 1:n(2), 1:size(from)) => traction
       wanted(1:n(1), 1:n(2), 1:size(onto)) => displacement
     end associate
@@ -134,7 +134,7 @@ contains
     integer :: m, n
 
     if (.not. self%rolling%steady) return
-    n = self%flexibility%lattice%size()
+    n = product(self%space%own_extent(self%flexibility%lattice%extent))
     do m = 1, size(components)
       if (components(m) == normal) cycle
       call self%rolling%subtract_ahead(self%flexibility%lattice%extent(1), displacement((m - 1)*n + 1:m*n))
@@ -152,7 +152,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), pointer, contiguous :: fields(:, :, :)
 
-    associate (n => self%flexibility%lattice%extent)
+    associate (n => self%space%own_extent(self%flexibility%lattice%extent))
       fields(1:n(1), 1:n(2), 1:size(components)) => values
     end associate
     call self%flexibility%replace(components, fields, error)
@@ -174,7 +174,7 @@ contains
     stat = 0
     image => self%flexibility%in_place(n_component)
     if (associated(image)) return
-    if (.not. allocated(own)) allocate (own(n_component*self%flexibility%lattice%size()), stat=stat)
+    if (.not. allocated(own)) allocate (own(n_component*product(self%space%own_extent(self%flexibility%lattice%extent))), stat=stat)
     if (stat /= 0) return
     image => own
   end subroutine take_image

@@ -77,7 +77,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, &
-                                   more=4*(lattice%size() + 2*margin_of(options, lattice%extent)))
+                                   more=4*(product(space%own_extent(lattice%extent)) + 2*margin_of(options, lattice%extent)))
     self%elastic_compliance = node_compliance(lattice, medium)
   end subroutine new_shear_preconditioner
 
@@ -94,6 +94,7 @@ contains
     self%direction => direction
     known = allocated(self%own)
     if (known) known = self%nodes%is_set(active)
+    known = all_know(self, known)
     if (.not. known) then
       call self%continue_beyond(self%extent, active)
       call new_active_set(self%nodes, active, self%space)
@@ -116,16 +117,24 @@ contains
       slips(i) = active(i) .and. compliance(i) > 0.0_wp
     end do
     !$omp end parallel do
-    self%slips = any(slips)
+    self%slips = self%space%count(slips) > 0
     if (.not. self%slips) return
     known = known .and. allocated(self%slipping%first)
     if (known) known = self%slipping%is_set(slips)
-    if (known) return
+    if (all_know(self, known)) return
     call new_active_set(self%slipping, slips, self%space)
     call find_near(self, self%extent, active, slips)
     if (.not. allocated(self%front)) allocate (self%front)
     call new_front(self, self%extent, active, slips)
   end subroutine set_sheared
+
+  !> Return whether something is known on all ranks.
+  logical function all_know(self, known)
+    class(shear_preconditioner_t), intent(in) :: self
+    logical, intent(in) :: known
+
+    all_know = self%space%number(merge(0, 1, known)) == 0
+  end function all_know
 
   !> Set up the continuation from stick into slip.
   subroutine new_front(self, extent, active, slips)
@@ -149,17 +158,17 @@ contains
     !> 1 at nodes near slip along their rows; of one row at those that slip, and at those near slip
     integer(int8), allocatable :: along(:, :)
     integer(int8) :: slip(extent(1)), beside(extent(1))
-    logical(lk), allocatable :: near(:)
-    integer :: row, other, first, last, k
+    logical(lk), allocatable :: near(:), around(:, :)
+    integer :: row, other, first, last, k, before
 
-    allocate (along(extent(1), extent(2)), near(size(active)))
+    allocate (near(size(active)))
     associate (reach => self%options%smoothing_reach, n => extent(1))
+      call take_slipping(self, extent, slips, reach, before, around)
+      allocate (along(n, size(around, 2)))
       !$omp parallel num_threads(self%space%threads) private(other, first, last, k, slip, beside)
       !$omp do schedule(static)
-      do row = 1, extent(2)
-        first = (row - 1)*n + 1
-        last = row*n
-        slip = merge(1_int8, 0_int8, slips(first:last))
+      do row = 1, size(around, 2)
+        slip = merge(1_int8, 0_int8, around(:, row))
         along(:, row) = slip
         if (all(slip == 0_int8)) cycle
         do k = 1, min(reach, n - 1)
@@ -173,7 +182,7 @@ contains
         first = (row - 1)*n + 1
         last = row*n
         beside = 0_int8
-        do other = max(row - reach, 1), min(row + reach, extent(2))
+        do other = max(before + row - reach, 1), min(before + row + reach, size(around, 2))
           beside = ior(beside, along(:, other))
         end do
         near(first:last) = beside /= 0_int8 .and. active(first:last)
@@ -185,6 +194,28 @@ contains
     call new_active_set(self%sticking, near .and. .not. slips, self%space)
     call new_active_set(self%apart, active .and. .not. near, self%space)
   end subroutine find_near
+
+  !> Take the slipping nodes of own rows and of some more on each side.
+  subroutine take_slipping(self, extent, slips, reach, before, around)
+    class(shear_preconditioner_t), intent(in) :: self
+    !> Columns and own rows of the window
+    integer, intent(in) :: extent(2)
+    !> Slipping nodes
+    logical(lk), intent(in) :: slips(extent(1), extent(2))
+    !> Rows on each side, and how many of them there are before own rows
+    integer, intent(in) :: reach
+    integer, intent(out) :: before
+    !> The nodes of all of these rows
+    logical(lk), allocatable, intent(out) :: around(:, :)
+    integer :: n_row, own(2), last
+
+    n_row = self%space%number(extent(2))
+    own = self%space%own_rows(n_row)
+    before = own(1) - max(own(1) - reach, 1)
+    last = min(own(2) + reach, n_row)
+    allocate (around(extent(1), last - own(1) + before + 1))
+    call self%space%fetch(n_row, slips, own(1) - before, around)
+  end subroutine take_slipping
 
   !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there: the component along t at all
   !> nodes in contact, that along e at some.
@@ -298,6 +329,11 @@ contains
     integer :: k, m, shift(6)
 
     shift = step*neighbor_steps(self%extent(1))
+    if (self%space%ranks%size > 1) then
+      do m = 1, 2
+        call take_beside(self, self%extent, step, lbound(self%field, 1), self%field(:, m))
+      end do
+    end if
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m)
     do k = 1, size(self%near%first)
       do m = 1, 2
@@ -309,6 +345,30 @@ contains
     self%field => self%mean
     self%mean => swap
   end subroutine average
+
+  !> Take the rows of other ranks beside own ones into the margins of a field.
+  subroutine take_beside(self, extent, step, low, field)
+    class(shear_preconditioner_t), intent(in) :: self
+    !> Columns and own rows of the window
+    integer, intent(in) :: extent(2)
+    !> Number of rows on each side, and lower bound of the field
+    integer, intent(in) :: step, low
+    !> Field
+    real(sp), intent(inout), contiguous, target :: field(low:)
+    real(sp), pointer, contiguous :: own(:, :)
+    real(sp), allocatable :: around(:, :)
+    integer :: n_row, rows(2), before, after
+
+    n_row = self%space%number(extent(2))
+    rows = self%space%own_rows(n_row)
+    before = rows(1) - max(rows(1) - step, 1)
+    after = min(rows(2) + step, n_row) - rows(2)
+    own(1:extent(1), 1:extent(2)) => field(1:product(extent))
+    allocate (around(extent(1), before + extent(2) + after))
+    call self%space%fetch(n_row, own, rows(1) - before, around)
+    field(1 - before*extent(1):0) = reshape(around(:, :before), [before*extent(1)])
+    field(product(extent) + 1:product(extent) + after*extent(1)) = reshape(around(:, before + extent(2) + 1:), [after*extent(1)])
+  end subroutine take_beside
 
   !> Average a row of nodes.
   pure subroutine average_row(first, last, shift, low, field, mean)

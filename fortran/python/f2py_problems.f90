@@ -6,6 +6,7 @@ module hc_f2py_problems
   use hc_error, only: error_t, status, raise
   use hc_memory, only: require_memory
   use hc_f2py_handles, only: slot_t, take_slot, free_object, hold, kernel_cache, ranks
+  use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_elastic_medium, only: elastic_medium_t
@@ -192,6 +193,7 @@ contains
     type(shared_friction_t), pointer :: shared
     type(direct_friction_t), pointer :: dense
     real(wp), allocatable :: own_gap(:, :)
+    type(communicator_t) :: sharing
     integer(c_int64_t) :: bytes
     logical :: is_shared
 
@@ -201,7 +203,8 @@ contains
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
                                                               space%threads, spectra_of(bodies), lattice%is_periodic())
-    if (is_shared) bytes = bytes*ranks%on_node
+    sharing = ranks%over(lattice%extent)
+    if (is_shared) bytes = bytes/sharing%size*ranks%on_node
     call take_window(lattice, bytes, threads, slot, handle, error)
     if (.not. allocated(error) .and. is_shared .and. ranks%rank > 0) then
       allocate (own_gap(lattice%extent(1), lattice%extent(2)), source=0.0_wp)

@@ -19,8 +19,13 @@ module ranks_tests
   use hc_state_measures, only: state_measures_t, measure_contact, rises_to_end
   use hc_window_growth, only: grown_window, shared_grown_window
   use hc_coulomb, only: coulomb_t
+  use hc_orthotropic_coulomb, only: orthotropic_coulomb_t
+  use hc_friction_law, only: friction_law_t
+  use hc_rolling, only: rolling_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
+  use hc_shared_friction, only: shared_friction_t, new_shared_friction
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_load_path, only: advance, step_settings_t
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   use testing, only: test_t, new_test, check, check_true
@@ -31,6 +36,8 @@ module ranks_tests
 
   real(wp), parameter :: two_pi = 2.0_wp*pi
 
+  !> Words of the first rank: to take part in a call, or that there is none any more
+  integer(int32), parameter :: to_follow = 1, to_end = 2
   !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
 
@@ -54,6 +61,7 @@ contains
       new_test('approach', test_approach), &
       new_test('rough', test_rough), &
       new_test('friction', test_friction), &
+      new_test('varying_friction', test_varying_friction), &
       new_test('waves', test_waves), &
       new_test('complete_contact', test_complete), &
       new_test('mean_gap', test_mean_gap), &
@@ -428,52 +436,106 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
+    if (ranks%size == 1) return
     do k = 0, 5
-      call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, error)
+      call shear_sphere(merge(83, 40, k == 2 .or. k == 3), modulo(k, 2) == 1, k > 3, coulomb_t(0.3_wp), error)
       if (allocated(error)) return
     end do
   end subroutine test_friction
 
+  !> Friction that differs from node to node, and with its direction.
+  subroutine test_varying_friction(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 40
+    type(orthotropic_coulomb_t) :: law
+    integer :: i, k
+
+    if (ranks%size == 1) return
+    law%coefficient = [(0.3_wp + 0.1_wp*sin(0.01_wp*i), i=1, n*(n - 3))]
+    do k = 0, 2
+      if (k > 0) law%ratio = 1.3_wp
+      law%angle = 0.4_wp
+      call shear_sphere(n, k > 1, .false., law, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_varying_friction
+
   !> Compare the ends of two load steps with those of one rank.
-  subroutine shear_sphere(n, unlike, periodic, error)
+  subroutine shear_sphere(n, unlike, periodic, law, error)
     integer, intent(in) :: n
     logical, intent(in) :: unlike, periodic
+    class(friction_law_t), intent(in) :: law
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(elastic_pair_t) :: pair
     type(friction_problem_t) :: problem
-    type(windowed_friction_t) :: alone, shared
+    type(windowed_friction_t) :: alone
+    type(shared_friction_t) :: shared
+    type(kernel_cache_t), target :: spectra
+    type(kernel_cache_t), pointer :: cache
     type(contact_state_t) :: start, expected, found
     type(load_target_t) :: target
-    real(wp) :: gap(n, n - 3)
-    integer :: step
+    real(wp) :: gap(n, n - 3), p_max
+    integer :: step, n_step
 
     call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
     if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
     if (allocated(error)) return
     lattice%periodic = periodic
     call sphere(lattice, gap)
-    call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), coulomb_t(0.3_wp), .false., error)
+    call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), law, .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
-    if (.not. allocated(error)) call new_windowed_friction(shared, problem, error, 1, ranks=ranks)
+    cache => spectra
+    if (.not. allocated(error)) call new_shared_friction(shared, problem, error, 1, cache, ranks, [to_follow])
     if (allocated(error)) return
+    if (ranks%rank > 0) then
+      call follow_first(shared, error)
+      return
+    end if
     call new_friction_state(start, lattice)
-    do step = 1, 2
+    ! bodies of like materials also roll along rows
+    n_step = merge(3, 2, n == 40 .and. .not. (unlike .or. periodic))
+    do step = 1, n_step
       target%value(:2) = [30.0_wp, merge(0.0_wp, 4.0_wp, step == 1)]
-      call advance(alone, start, target, step_settings_t(1.0e-10_wp), expected, error)
-      if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-10_wp), found, error)
+      if (step == 3) target%rolling = rolling_t([1, 0], .true.)
+      call advance(alone, start, target, step_settings_t(1.0e-12_wp), expected, error)
+      if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-12_wp), found, error)
+      if (step == n_step .or. allocated(error)) call ranks%tell([to_end])
       if (allocated(error)) return
-      call compare_states(expected, found, [1, n - 3], error)
+      call check_true(error, expected%converged .and. found%converged, 'converged')
       if (allocated(error)) return
-      call check(error, maxval(abs(found%traction - expected%traction)), 0.0_wp, 0.0_wp, 'traction')
+      p_max = maxval(expected%pressure)
+      call check(error, maxval(abs(found%pressure - expected%pressure))/p_max, 0.0_wp, 1.0e-10_wp, 'pressure')
       if (allocated(error)) return
-      call check(error, maxval(abs(found%slip_increment - expected%slip_increment)), 0.0_wp, 0.0_wp, 'slip')
+      call check(error, maxval(abs(found%traction - expected%traction))/p_max, 0.0_wp, 1.0e-10_wp, 'traction')
+      if (allocated(error)) return
+      call check_true(error, all(found%zone == expected%zone), 'zones')
+      if (allocated(error)) return
+      call check(error, found%load(:3), expected%load(:3), 1.0e-9_wp, 'loads')
       if (allocated(error)) return
       call check_true(error, any(expected%zone == 1) .or. step == 1, 'stick')
       if (allocated(error)) return
       start = expected
     end do
   end subroutine shear_sphere
+
+  !> Take part in the calls of the first rank.
+  subroutine follow_first(shared, error)
+    type(shared_friction_t), intent(inout) :: shared
+    type(error_t), allocatable, intent(out) :: error
+    integer(int32), allocatable :: words(:)
+    integer :: n
+
+    do
+      call ranks%wait_for_words(n)
+      if (allocated(words)) deallocate (words)
+      allocate (words(n))
+      call ranks%hear(words)
+      if (words(1) == to_end) return
+      call shared%follow(error)
+      if (allocated(error)) return
+    end do
+  end subroutine follow_first
 
   !> Waves that repeat, on even and odd numbers of rows; even ones have a coarser lattice, too.
   subroutine test_waves(error)

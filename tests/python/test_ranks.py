@@ -128,13 +128,18 @@ def launched(
     [(2, PRESSED), (3, PRESSED), (2, WAVES), (3, ODD_WAVES), (2, REFINED), (3, ROLLER), (2, CHAMFER)],
 )
 def test_several_processes_write_the_file_of_one(ranks: int, deck: str, tmp_path: Path) -> None:
+    assert_same(*run_twice(ranks, deck, tmp_path))
+
+
+def run_twice(ranks: int, deck: str, tmp_path: Path) -> tuple[Path, Path]:
+    """Run a deck in one process and in several."""
     (tmp_path / "sphere.toml").write_text(deck)
     assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
     process = launched(tmp_path, ranks, "run", "sphere.toml", "--output", "all.nc")
     out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, out + err
     assert out.count("written: all.nc") == 1
-    assert_same(tmp_path / "one.nc", tmp_path / "all.nc")
+    return tmp_path / "one.nc", tmp_path / "all.nc"
 
 
 def assert_same(first: Path, second: Path) -> None:
@@ -146,10 +151,18 @@ def assert_same(first: Path, second: Path) -> None:
 
 
 SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [261, 300]") + (
-    '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n'
+    '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n[solver]\ntolerance = 1e-12\n'
 )
+ALIKE = SHEARED.replace('"72 GPa"', '"432 GPa"')
 ADAPTIVE = SHEARED.replace("steps = 2\n[[load]]", "[[load]]").replace("steps = 2", 'steps = "auto"') + (
-    "[solver]\nstep_tolerance = 0.3\n"
+    "step_tolerance = 0.3\n"
+)
+VARYING = SHEARED.replace("coefficient = 0.2", 'coefficient = "0.2 + 0.1*tanh(x/20e-6)"')
+DIRECTED = SHEARED.replace(
+    "coefficient = 0.2", 'coefficient = { along = 0.2, across = 0.3, angle = "30 deg" }'
+)
+ROLLING = SHEARED.partition("[[load]]\ntangential")[0] + (
+    '[[load]]\nrolling = "steady"\ncreepage_x = -1e-3\n[solver]\ntolerance = 1e-10\n'
 )
 SHEARED_WAVES = (
     WAVES.partition("[[load]]")[0]
@@ -160,6 +173,8 @@ coefficient = 0.3
 mean_pressure = "200 MPa"
 [[load]]
 mean_traction_x = "20 MPa"
+[solver]
+tolerance = 1e-12
 """
 )
 # All touches, and no traction in stick takes up a shift.
@@ -186,17 +201,36 @@ cycles = 1_000
     ("ranks", "deck"),
     [
         (2, SHEARED),
-        (3, SHEARED.replace('"72 GPa"', '"432 GPa"').replace("in_radius = 20", "in_radius = 95")),
+        (3, ALIKE),
         (2, SHEARED.replace("steps = 2", "") + WORN),
         (3, ADAPTIVE),
         (2, SHEARED_WAVES),
         (2, SHIFTED_WAVES),
         (2, SHEARED.replace('{ shape = "sphere", radius = "1 mm" }', ENDING)),
+        (2, VARYING),
+        (3, DIRECTED),
+        (2, ROLLING),
     ],
-    ids=["unlike", "alike", "worn", "adaptive", "waves", "shifted", "ends"],
+    ids=["unlike", "alike", "worn", "adaptive", "waves", "shifted", "ends", "varying", "directed", "rolling"],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)
+
+
+@with_mpi
+def test_fronts_are_relaxed_by_rows(tmp_path: Path) -> None:
+    assert_near(*run_twice(3, ALIKE.replace("in_radius = 20", "in_radius = 95"), tmp_path))
+
+
+def assert_near(first: Path, second: Path) -> None:
+    """Compare two results in which each rank has relaxed the fronts on its rows."""
+    with netCDF4.Dataset(first) as one, netCDF4.Dataset(second) as several:
+        np.testing.assert_array_equal(one["zone"][:], several["zone"][:])
+        p_max = one["pressure"][:].max()
+        for name in ("pressure", "traction_x", "traction_y"):
+            np.testing.assert_allclose(several[name][:] / p_max, one[name][:] / p_max, rtol=0.0, atol=1e-10)
+        for name in ("approach", "shift_x", "stick_area", "dissipated_energy"):
+            np.testing.assert_allclose(several[name][:], one[name][:], rtol=1e-9, atol=0.0)
 
 
 # On a window beside the contact, which grows in the first step.

@@ -332,6 +332,7 @@ contains
     type(edge_options_t) :: options
     real(wp), allocatable :: x(:, :), y(:, :), square(:, :), nodal(:, :, :), corrected(:, :, :)
     logical, allocatable :: contact(:, :), stick(:, :)
+    type(field_space_t) :: space
     integer, parameter :: n = 50
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)
@@ -344,7 +345,7 @@ contains
     allocate (nodal(2*n + 1, 2*n + 1, 3), source=0.0_wp)
     nodal(:, :, 1) = sqrt(max(square, 0.0_wp))
     call new_contact_edges(edges, lattice, nodal(:, :, 1), max(-square, 0.0_wp)**1.5_wp, contact, square < huge(1.0_wp))
-    associate (pair => elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), space => field_space_t(1))
+    associate (pair => elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp))
       corrected = nodal
       call correct_at_edges(lattice, edges, pair, contact, stick, coulomb_t(0.0_wp), corrected, space, error)
       if (allocated(error)) return

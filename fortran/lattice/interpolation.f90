@@ -33,7 +33,7 @@ module hc_interpolation
 
 contains
 
-  !> Find the place of a point.
+  !> Find the place of a point; a window that repeats has places for all points.
   pure type(place_t) function place_of(lattice, point) result(place)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -43,7 +43,8 @@ contains
     integer :: k
 
     at = anint(coordinates_of(lattice, point)*places)/places
-    place%near = all(at > -1.0_wp .and. at < lattice%extent)
+    where (lattice%periodic) at = modulo(at, real(lattice%extent, wp))
+    place%near = all(lattice%periodic .or. (at > -1.0_wp .and. at < lattice%extent))
     if (.not. place%near) return
     associate (u => at(1) - floor(at(1)), v => at(2) - floor(at(2)))
       if (u + v <= 1.0_wp) then
@@ -54,6 +55,7 @@ contains
     end associate
     do k = 1, size(cell, 2)
       place%node(:, k) = floor(at) + cell(:, k) + 1
+      where (lattice%periodic) place%node(:, k) = modulo(place%node(:, k) - 1, lattice%extent) + 1
     end do
   end function place_of
 
@@ -151,13 +153,14 @@ contains
     integer :: k
 
     ! beyond the rim all nodes are outside, and far ones have no index
-    at = min(max(coordinates_of(lattice, point), -2.0_wp), lattice%extent + 1.0_wp)
+    at = coordinates_of(lattice, point)
+    at = merge(modulo(at, real(lattice%extent, wp)), min(max(at, -2.0_wp), lattice%extent + 1.0_wp), lattice%periodic)
     do k = 1, size(distance)
       distance(k) = norm2(matmul(lattice%basis, floor(at) + cell(:, k) - at))
     end do
     associate (next => floor(at) + cell(:, minloc(distance, dim=1)))
-      node = min(max(next, 0), lattice%extent - 1)
-      inside = all(node == next)
+      node = merge(modulo(next, lattice%extent), min(max(next, 0), lattice%extent - 1), lattice%periodic)
+      inside = all(lattice%periodic .or. node == next)
     end associate
   end subroutine nearest_node
 

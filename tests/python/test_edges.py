@@ -174,7 +174,7 @@ def test_pressure_between_the_nodes(nodes: int, nodal: float, between: float) ->
         solution = NormalContact(lattice, RIGID_PARTNER, gap).solve(normal_load=hertz.normal_load)
         start = (float(lattice.x[0, 0]), float(lattice.y[0, 0]))
         field = PressureField(solution.pressure, solution.gap, lattice.basis, start)
-        joined = linear(solution.pressure, lattice.basis, start, x, y)
+        joined = linear(lattice, solution.pressure, x, y)
 
         def error(found: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
             exact = hertz.pressure(np.hypot(x, y))

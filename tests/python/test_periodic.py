@@ -653,3 +653,18 @@ def test_no_approach_of_hertz_stands_beside_mean_planes() -> None:
     compared = against_hertz(result.deck, result.dataset.attrs, last)
     assert [name for name, *_ in compared] == ["max_pressure", "contact_radius"]
     assert "plane" not in hertz_rows(compared, last)[0][0]
+
+
+def test_fields_go_on_beyond_the_sides_of_a_window_that_repeats() -> None:
+    """A point, and those a period away, have one value; so has its image beyond the middle of the wave."""
+    case = waves(mean_pressure=0.7 * FULL)
+    result, (dy, dx), lattice = case.run(), case.lattice.shape * case.lattice.basis.diagonal(), case.lattice
+    x, y = lattice.x.max() + 0.4 * dx / lattice.n_col, lattice.start[1] + np.array([0.0, 0.3, 0.996]) * dy
+    for name in ("pressure", "gap", "zone"):
+        here = result.at(name, x, y)
+        assert np.isfinite(here).all()
+        for a, b in ((1, 0), (-1, 0), (0, 1), (3, -2)):
+            beyond = result.at(name, x + a * dx, y + b * dy)
+            np.testing.assert_allclose(beyond, here, rtol=1e-6, atol=1e-6 * HEIGHT)
+    assert result.at("pressure", x, y)[1] > 0.0
+    np.testing.assert_allclose(result.at("pressure", -x, -y), result.at("pressure", x, y), rtol=1e-6)

@@ -53,7 +53,7 @@ def errors(spacings: int, ratio: float, rng: np.random.Generator) -> list[float]
 
     plane = np.meshgrid(*2 * [np.linspace(-1.1, 1.1, 401)])
     nodes, between = exact(lattice.x, lattice.y), exact(*plane)
-    joined = TractionField.of_nodes(solved, *where)(*plane)
+    joined = TractionField.of_nodes(solved, lattice)(*plane)
     pairs = ((solved, nodes), (field.at_nodes(), nodes), (joined, between), (field(*plane), between))
     return [
         float(np.linalg.norm((found - true)[part]) / np.linalg.norm(true[part]))

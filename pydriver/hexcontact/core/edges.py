@@ -15,7 +15,7 @@ from ..arrays import Array, Mask
 from . import flat, memory
 from .contact import ElasticPair
 from .friction import FrictionLaw
-from .lattice import Nodes
+from .lattice import Lattice, Nodes
 from .measures import Ellipse
 
 _UNLIMITED, _LIMITED = 5, 11  # arrays of a traction field
@@ -83,7 +83,7 @@ class TractionField:
     def __init__(
         self,
         parts: Array,
-        nodes: Nodes,
+        nodes: Lattice | Nodes,
         friction: FrictionLaw = _FRICTIONLESS,
         source: Source = "edges",
         whole: tuple[tuple[int, ...], _Part] | None = None,
@@ -92,13 +92,13 @@ class TractionField:
         self.source, self.sheared = source, len(parts) == _LIMITED
 
     @classmethod
-    def of_nodes(cls, tractions: Array, basis: Array, start: tuple[float, float]) -> Self:
+    def of_nodes(cls, tractions: Array, nodes: Lattice | Nodes) -> Self:
         """Return the field of p, q_x and q_y at the nodes, joined linearly; see `ContactEdges`."""
         parts = np.stack([*tractions, tractions[0], np.full_like(tractions[0], np.nan)])
-        return cls(parts, Nodes(basis, start, parts.shape[1:]), source="nodes")
+        return cls(parts, nodes, source="nodes")
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside the window."""
+        """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside a window that ends."""
         found = flat.tractions_at_points(self._nodes, self._parts, self._friction, x, y)
         return np.ascontiguousarray(np.moveaxis(found, -1, 0)) + 0.0  # no sign on zero
 

@@ -23,6 +23,7 @@ class Nodes(NamedTuple):
     basis: Array
     start: tuple[float, float]
     shape: tuple[int, ...]
+    periodic: bool = False  # the window repeats
 
 
 class Pattern(NamedTuple):
@@ -233,23 +234,19 @@ class Lattice:
 Point = tuple[float, float]
 
 
-def linear(
-    values: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float = 0.0
-) -> Array:
+def linear(nodes: Lattice | Nodes, values: Array, x: ArrayLike, y: ArrayLike, outside: float = 0.0) -> Array:
     """Interpolate values at the nodes of a lattice linearly on its triangles.
 
-    `basis` has the basis vectors of the lattice as rows (m), `start` is the position of node [0, 0] (m), and
-    `outside` the value at nodes outside the window. The result has the shape of the points x, y (m).
+    `outside` is the value at nodes outside the window. The result has the shape of the points x, y (m).
     """
-    nodes = Nodes(np.asarray(basis), start, np.shape(values))
     return np.asarray(flat.field_between_nodes(nodes, values, outside, x, y))
 
 
 def nearest(
-    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
+    nodes: Lattice | Nodes, values: NDArray[Any], x: ArrayLike, y: ArrayLike, outside: float
 ) -> Array:
     """Return the values at the nodes next to points; parameters as of `linear`."""
-    col, row, inside = flat.nodes_next_to(Nodes(basis, start, values.shape), x, y)
+    col, row, inside = flat.nodes_next_to(nodes, x, y)
     return np.where(inside, values[row, col], outside).astype(float)
 
 

@@ -276,7 +276,7 @@ def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]
     fine, owner = UniformTriRefiner(coarse).refine_triangulation(return_tri_index=True, subdiv=depth)
     values = field(fine.x, fine.y)
     cannot = 1.0 - np.isfinite(view.field("gap"))
-    beside = linear(cannot, view.basis, view.start, fine.x, fine.y, 1.0) > 0.0
+    beside = linear(view.lattice, cannot, fine.x, fine.y, 1.0) > 0.0
     if beside.any():
         values[beside] = _on_triangles(mesh, owner[beside], fine.x[beside], fine.y[beside])
     return ZoneMesh(fine.x, fine.y, values, fine.triangles)

@@ -196,7 +196,7 @@ class Result:
         """Return a field (SI), such as "pressure", at points of the plane x, y (m, broadcast) in a load step.
 
         Tractions go to the edges, others are linear on the triangles; the zone is that of the nearest node.
-        Outside the window tractions and slip are 0, other fields NaN. Step and source are as of
+        Outside a window that ends tractions and slip are 0, other fields NaN. Step and source are as of
         `traction_field`. DeckError or IndexError if there is no such field in the output, or no such step.
         """
         return self._nodal(step).at(name, x, y, source)

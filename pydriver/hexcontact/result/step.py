@@ -45,15 +45,15 @@ def interpolate(
 ) -> Array:
     """Return a field at points of the plane (m): tractions to the edges, others linear on the triangles.
 
-    A zone is that of the nearest node. Without `tractions` pressure and shear are linear, too. Outside the
-    window tractions and slip are 0, other fields NaN.
+    A zone is that of the nearest node. Without `tractions` pressure and shear are linear, too. Outside a
+    window that ends tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     if tractions is not None and name in TRACTIONS:
         return np.asarray(tractions(x, y)[TRACTIONS.index(name)])
     variable = VARIABLES[name]
     between = nearest if variable.flags else linear
-    return between(values, lattice.basis, lattice.start, x, y, variable.padding)
+    return between(lattice, values, x, y, variable.padding)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,12 +108,13 @@ class NodalStep:
                 "source = 'edges': expected nodes; the edges need the gap, and there are none with a "
                 "compliant interface or in a window that repeats"
             )
-        zero, at = np.zeros(self.lattice.shape), (self.lattice.basis, self.lattice.start)
+        zero = np.zeros(self.lattice.shape)
         tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
         if source == "nodes" or not (self.sharp and "gap" in kept):
-            return TractionField.of_nodes(tractions, *at)
+            return TractionField.of_nodes(tractions, self.lattice)
         zone, gap = kept.get("zone"), kept["gap"]
         contact = tractions[0] > 0.0 if zone is None else zone > 0
+        at = self.lattice.basis, self.lattice.start
         edges = ContactEdges(tractions[0], gap, contact, np.isfinite(gap), *at)
         if zone is None or not kept.keys() >= {*TRACTIONS} or not (law := self.law):
             return edges.field(tractions[1:])

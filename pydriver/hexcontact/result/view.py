@@ -152,7 +152,7 @@ class StepView:
         return self._at_nodes[name] if name in TRACTIONS else values
 
     def at(self, x: Array, y: Array, field: str | Array = "pressure") -> Array:
-        """Return a field at points of the plane (m), 0 outside the window.
+        """Return a field at points of the plane (m), 0 outside a window that ends.
 
         Tractions come from the source; other fields, and those given by nodal values, are linear on the
         triangles of the lattice.
@@ -160,7 +160,7 @@ class StepView:
         if isinstance(field, str) and field in TRACTIONS:
             return np.asarray(self.tractions(x, y)[TRACTIONS.index(field)])
         values = self.field(field) if isinstance(field, str) else field
-        return linear(values, self.basis, self.start, x, y)
+        return linear(self.lattice, values, x, y)
 
     def touches(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) are in contact, to the edge between the nodes."""

@@ -18,7 +18,7 @@ from hexcontact.deck import map_file
 from hexcontact.deck.map_file import read_map
 from hexcontact.plotting import surface
 from hexcontact.problem import plausibility
-from hexcontact.problem.preview import case_rows
+from hexcontact.problem.preview import case_rows, surfaces_in_words
 from hexcontact.surfaces import Map, Profile
 
 ROOT = Path(__file__).parents[2]
@@ -476,6 +476,23 @@ def test_a_map_of_one_period_repeats_with_or_without_its_last_point(file: Any) -
         np.testing.assert_allclose(heights, exact, atol=1e-11)
         moved = {**surface, "offset": ["0.13 mm", "0.07 mm"]}
         assert largest(moved, load=load, **CELL) == pytest.approx(formula, rel=1e-2)
+
+
+def test_a_tapered_map_is_told_and_drawn_as_it_is_solved(file: Any) -> None:
+    keys = {"units": "um", "height_units": "um", "spacing": ["10 um", "10 um"], "taper": "100 um"}
+    path = file("tilted.csv", rows_of(waves(WAVE + 1) + np.arange(WAVE + 1) / WAVE))
+    tapered = case(of_file(path, **keys), {"mean_pressure": "100 MPa"}, **CELL)
+    [told] = surfaces_in_words(tapered)
+    assert any("tapered over 100.0 µm at its ends" in line for line in told["lines"])
+    axes, bar = surface(tapered).axes
+    drawn = np.asarray(axes.collections[0].get_array()).reshape(-1)
+    x, y, gap = tapered.lattice.x, tapered.lattice.y, tapered.plane_gap.over(tapered.lattice)
+    units = {"(mm)": 1e-3, "(µm)": 1e-6, "(nm)": 1e-9}
+    scale, rise = (units[words.split()[-1]] for words in (axes.get_xlabel(), bar.get_ylabel()))
+    assert np.ptp(drawn) * rise == pytest.approx(np.ptp(gap), rel=0.02)
+    lowest = np.unravel_index(gap.argmin(), gap.shape)
+    cross = axes.lines[-1].get_xydata()[0] * scale
+    np.testing.assert_allclose(cross, [x[lowest], y[lowest]], atol=tapered.lattice.spacing)
 
 
 def test_a_map_that_does_not_repeat_is_refused_levelled_or_tapered(file: Any) -> None:

@@ -276,7 +276,7 @@ class Measured(Surface):
         """Describe the heights but for the place of the lowest point."""
         z = self.points.z
         rise = quantity(float(np.nanmax(z) - np.nanmin(z)), "m")
-        return f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}"
+        return f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}{self._tapered}"
 
     def placed(self, name: str) -> Placed:
         """Return the map at its place in the plane; `name` stands for it in messages."""
@@ -353,6 +353,11 @@ class Measured(Surface):
         along, across = (round(slope, 9) + 0.0 for slope in (along, across))  # without noise, and without -0
         slopes = f" and slopes of {along:.3g} along x, {across:.3g} along y" * (self.level == "plane")
         return f"levelled: mean of {quantity(mean, 'm', 3)}{slopes} subtracted"
+
+    @property
+    def _tapered(self) -> str:
+        """Describe the taper."""
+        return f"; tapered over {quantity(self.taper, 'm')} at its ends" if self.taper and self._period else ""
 
     @property
     def holes_in_words(self) -> str:

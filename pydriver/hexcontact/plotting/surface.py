@@ -29,12 +29,8 @@ def surface(case: Any) -> Figure:
     case : hexcontact.Case
         A case.
     """
-    body = case.deck.body
-    maps = [
-        (number, one)
-        for number, part in ((1, body.body_1), (2, body.body_2))
-        for one in (part.surface.measured if part.surface else ())
-    ]
+    both = enumerate((case.surfaces.surface_1, case.surfaces.surface_2), 1)
+    maps = [(number, one) for number, part in both for one in part.measured]
     canvas = new_figure(_WIDTH * max(len(maps), 1), _HEIGHT)
     canvas.set_layout_engine("compressed")
     panels = canvas.subplots(1, max(len(maps), 1), squeeze=False)[0]
@@ -49,7 +45,7 @@ def surface(case: Any) -> Figure:
 
 def _map(axes: Axes, one: Measured, case: Any) -> None:
     """Draw the heights of a map as far as it is measured; points without one are gray."""
-    found, touch = one.placed("").map, case.deck.body.separation.first_touch
+    found, touch = one.placed("").map, case.surfaces.first_touch
     (x, y), height = (found.x + one.offset[0], found.y + one.offset[1]), -found.gap  # type: ignore[operator]
     _colored(axes, x, y, height if one.upwards else -height, "height" if one.upwards else "gap", case, touch)
 

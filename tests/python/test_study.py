@@ -25,7 +25,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, DeckError
+from hexcontact import Case, DeckError, plotting
 from hexcontact.cli.app import app
 from hexcontact.deck.kinds import Whole
 from hexcontact.deck.table_base import extended, meaning
@@ -869,6 +869,37 @@ def test_area_of_rough_surfaces_over_the_load(folder: Path) -> None:
     study = Study.from_toml(CASES / "study_rough.toml")
     assert len(study) == 27
     assert {axis.name for axis in study.plan.axes} == {"p", "seed", "spacing", "steps"}
+
+
+def test_a_study_of_a_window_that_repeats_is_drawn(folder: Path) -> None:
+    """Areas in place of radii, and a logarithmic axis for values that are spread so."""
+    (folder / "waves.toml").write_text(WAVES)
+    keys = 'key = "load.1.mean_pressure"\nname = "p"\nrange = ["10 MPa", "1 GPa"]\ncount = 3\nscale = "log"\n'
+    (folder / "waves_study.toml").write_text(f'deck = "waves.toml"\n[[parameter]]\n{keys}')
+    found = Study.from_toml(folder / "waves_study.toml").run()
+    panels = plotting.study(found).axes
+    names = [axes.get_ylabel() for axes in panels]
+    assert [axes.get_xscale() for axes in panels] == ["log"] * len(panels)
+    assert any(name.startswith("contact area") for name in names)
+    assert any(name.startswith("mean gap") for name in names)
+    assert not any("radius" in name for name in names)
+
+
+WAVES = """
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = { shape = "waviness", amplitude = "0.2 um", wavelength = "100 um" }
+[body.2]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+[grid]
+boundary = "periodic"
+extent = ["100 um", "100 um"]
+nodes_across = 16
+[[load]]
+mean_pressure = "10 MPa"
+"""
 
 
 def test_example_is_a_good_study(folder: Path) -> None:

@@ -446,8 +446,10 @@ def _varying(study: Dataset) -> list[str]:
     """Return the quantities of a summary, or of rolling, that differ between cases and are no parameter."""
     power = "creep_power" if "creep_power_error" in study else "slip_power"
     creep = (*(load for load, _ in ROLLED.values()), *CREEPAGES, power)
-    found = []
-    for name in creep if CREEPAGES[0] in study else ("approach", *SUMMARY):
+    known, found = ("approach", *SUMMARY), []
+    if "mean_gap" in study:  # of many spots there is no radius
+        known = tuple("contact_area" if name == "contact_radius" else name for name in SUMMARY)
+    for name in creep if CREEPAGES[0] in study else known:
         values = study[name].values if name in study else np.array([])
         finite = values[np.isfinite(values)]
         least = 1e-6 * np.abs(finite).max(initial=0.0)
@@ -506,6 +508,9 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
             axes.plot(place[order], values[order], label=label, color=colors[k], **look)
         named = _spelled(name) if name in VARIABLES else name
         axes.set(xlabel=style.titled(over, length), ylabel=style.titled(named, unit))
+        steps = np.diff(np.log(place[order])) if place[order[0]] > 0.0 else np.array([])
+        if steps.size > 1 and np.ptp(steps) < 1e-3 * steps.mean():  # evenly spread by their logarithms
+            axes.set_xscale("log")
         axes.grid(color="0.9", lw=0.5)
     if 1 < len(labels) <= _LEGEND:
         style.legend_under(canvas, panels[0].get_lines())

@@ -25,11 +25,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, DeckError, plotting
+from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck.kinds import Whole
 from hexcontact.deck.table_base import extended, meaning
 from hexcontact.deck.toml import starter, with_overrides
+from hexcontact.plotting.history import study as draw_study
 from hexcontact.problem.problem import Problem
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback, Listener
@@ -877,7 +878,7 @@ def test_a_study_of_a_window_that_repeats_is_drawn(folder: Path) -> None:
     keys = 'key = "load.1.mean_pressure"\nname = "p"\nrange = ["10 MPa", "1 GPa"]\ncount = 3\nscale = "log"\n'
     (folder / "waves_study.toml").write_text(f'deck = "waves.toml"\n[[parameter]]\n{keys}')
     found = Study.from_toml(folder / "waves_study.toml").run()
-    panels = plotting.study(found).axes
+    panels = draw_study(found).axes
     names = [axes.get_ylabel() for axes in panels]
     assert [axes.get_xscale() for axes in panels] == ["log"] * len(panels)
     assert any(name.startswith("contact area") for name in names)

@@ -276,7 +276,10 @@ class Measured(Surface):
         """Describe the heights but for the place of the lowest point."""
         z = self.points.z
         rise = quantity(float(np.nanmax(z) - np.nanmin(z)), "m")
-        return f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}{self._tapered}"
+        words = (
+            f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}"
+        )
+        return words + self._tapered
 
     def placed(self, name: str) -> Placed:
         """Return the map at its place in the plane; `name` stands for it in messages."""
@@ -357,7 +360,9 @@ class Measured(Surface):
     @property
     def _tapered(self) -> str:
         """Describe the taper."""
-        return f"; tapered over {quantity(self.taper, 'm')} at its ends" if self.taper and self._period else ""
+        if not (self.taper and self._period):
+            return ""
+        return f"; tapered over {quantity(self.taper, 'm')} at its ends"
 
     @property
     def holes_in_words(self) -> str:

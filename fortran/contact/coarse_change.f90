@@ -28,7 +28,7 @@ module hc_coarse_change
     !> Lattices of these rows, and of own rows of the finer lattice
     type(lattice_t) :: rows, fine
     !> First and last of them
-    integer :: wanted(2) = 0
+    integer :: needed(2) = 0
     !> The coarse lattice is all there, since one rank has both
     logical :: whole = .true.
   end type coarse_rows_t
@@ -86,11 +86,11 @@ contains
     own = problem%space%own_rows(problem%lattice%extent(2))
     below%fine = problem%rows_of(own(1), own(2))
     own = problem%lattice%first(2) + own - 1
-    associate (wanted => below%wanted)
-      wanted = [floor_half(own(1)), floor_half(own(2) + 1)] - coarse_problem%lattice%first(2) + 1
-      wanted = wanted + [-neighbors_of_neighbors, neighbors_of_neighbors]
-      if (.not. coarse_problem%lattice%periodic(2)) wanted = min(max(wanted, 1), coarse_problem%lattice%extent(2))
-      below%rows = coarse_problem%rows_of(wanted(1), wanted(2))
+    associate (needed => below%needed)
+      needed = [floor_half(own(1)), floor_half(own(2) + 1)] - coarse_problem%lattice%first(2) + 1
+      needed = needed + [-neighbors_of_neighbors, neighbors_of_neighbors]
+      if (.not. coarse_problem%lattice%periodic(2)) needed = min(max(needed, 1), coarse_problem%lattice%extent(2))
+      below%rows = coarse_problem%rows_of(needed(1), needed(2))
     end associate
   end function rows_below
 
@@ -103,8 +103,8 @@ contains
     !> Those rows
     real(wp), allocatable, intent(out) :: rows(:, :)
 
-    allocate (rows(size(field, 1), below%wanted(2) - below%wanted(1) + 1))
-    call coarse_problem%take_rows(field, below%wanted(1), rows)
+    allocate (rows(size(field, 1), below%needed(2) - below%needed(1) + 1))
+    call coarse_problem%take_rows(field, below%needed(1), rows)
   end subroutine take_below
 
   !> Interpolate a field to the nodes of the finer lattice on this rank.

@@ -113,7 +113,7 @@ contains
     !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: ux(:), uy(:)
     real(wp) :: start(2)
-    integer :: i, index(2)
+    integer :: i, col, row
 
     ux = 0.0_wp
     uy = 0.0_wp
@@ -124,11 +124,13 @@ contains
       uy = 1.0_wp
     case default
       associate (lattice => problem%lattice)
-        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1) + problem%rows_before()]
-        start = lattice%origin + matmul(lattice%basis, real(lattice%first + index, wp)) - self%center
+        ! from the beginning of the row: a node has one value, wherever the nodes begin
+        col = modulo(first - 1, lattice%extent(1))
+        row = (first - 1)/lattice%extent(1) + problem%rows_before()
+        start = lattice%origin + matmul(lattice%basis, real(lattice%first + [0, row], wp)) - self%center
         do i = 1, size(ux)
-          ux(i) = -(start(2) + (i - 1)*lattice%basis(2, 1))/self%arm
-          uy(i) = (start(1) + (i - 1)*lattice%basis(1, 1))/self%arm
+          ux(i) = -(start(2) + (col + i - 1)*lattice%basis(2, 1))/self%arm
+          uy(i) = (start(1) + (col + i - 1)*lattice%basis(1, 1))/self%arm
         end do
       end associate
     end select

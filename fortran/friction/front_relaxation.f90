@@ -237,27 +237,28 @@ contains
       do col = 1, size(q, 1)
         if (max(abs(around(col, row, 1)), abs(around(col, row, 2))) <= 0.0_wp) cycle
         do there = max(row - near_reach, own(1)), min(row + near_reach, own(2))
-          call add_near(problem, col, there - row, around(col, row, :), u(:, there - own(1) + 1, :))
+          call add_near(problem, col, there - row, around(col, row, :), u(:, there - own(1) + 1, 1), u(:, there - own(1) + 1, 2))
         end do
       end do
     end do
   end subroutine relax_rows
 
   !> Add what a change of the traction of a node displaces near it in a row.
-  pure subroutine add_near(problem, node, rows, change, u)
+  pure subroutine add_near(problem, node, rows, change, ux, uy)
     type(friction_problem_t), intent(in) :: problem
     !> Column of the node, and rows from it to the row
     integer, intent(in) :: node, rows
     !> Change of its traction [Pa]
     real(wp), intent(in) :: change(2)
-    !> Tangential displacement of the row (n_col, 2) [m]
-    real(wp), intent(inout) :: u(:, :)
+    !> Tangential displacement of the row along x and y (n_col) [m]
+    real(wp), intent(inout), contiguous :: ux(:), uy(:)
     integer :: col
 
     associate (near => problem%near_compliance)
-      do col = max(node - near_reach, 1), min(node + near_reach, size(u, 1))
-        u(col, 1) = u(col, 1) + near(col - node, rows, 1)*change(1) + near(col - node, rows, 2)*change(2)
-        u(col, 2) = u(col, 2) + near(col - node, rows, 2)*change(1) + near(col - node, rows, 3)*change(2)
+      !$omp simd
+      do col = max(node - near_reach, 1), min(node + near_reach, size(ux))
+        ux(col) = ux(col) + near(col - node, rows, 1)*change(1) + near(col - node, rows, 2)*change(2)
+        uy(col) = uy(col) + near(col - node, rows, 2)*change(1) + near(col - node, rows, 3)*change(2)
       end do
     end associate
   end subroutine add_near
@@ -275,10 +276,10 @@ contains
     !> A traction has changed
     logical, intent(out) :: changed
     real(wp) :: trial(2), change(2), length
-    integer :: m, k, i, j, row, col, low(2), high(2)
+    integer :: m, k, i, j, row
 
     changed = .false.
-    associate (node => fronts%node, bound => fronts%bound, rest => fronts%rest, near => problem%near_compliance, &
+    associate (node => fronts%node, bound => fronts%bound, rest => fronts%rest, &
                compliance => problem%tangential_compliance)
       do m = 1, size(node, 2)
         k = merge(size(node, 2) + 1 - m, m, backwards)
@@ -294,14 +295,8 @@ contains
         changed = .true.
         q(i, j, 1) = trial(1)
         q(i, j, 2) = trial(2)
-        low = max([i, j] - near_reach, 1)
-        high = min([i, j] + near_reach, [size(u, 1), size(u, 2)])
-        do row = low(2), high(2)
-          !$omp simd
-          do col = low(1), high(1)
-            u(col, row, 1) = u(col, row, 1) + near(col - i, row - j, 1)*change(1) + near(col - i, row - j, 2)*change(2)
-            u(col, row, 2) = u(col, row, 2) + near(col - i, row - j, 2)*change(1) + near(col - i, row - j, 3)*change(2)
-          end do
+        do row = max(j - near_reach, 1), min(j + near_reach, size(u, 2))
+          call add_near(problem, i, row - j, change, u(:, row, 1), u(:, row, 2))
         end do
       end do
     end associate

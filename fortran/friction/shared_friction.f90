@@ -10,15 +10,17 @@ module hc_shared_friction
   use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp, lk
   use hc_error, only: error_t, raise, status
+  use hc_memory, only: require_memory
   use hc_communicator, only: communicator_t
   use hc_field_space, only: space_over
+  use hc_flexibility_fft, only: spectra_of
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, load_target_t, n_motion, add_fields, add_history
+  use hc_contact_state, only: contact_state_t, load_target_t, n_load, n_motion, add_history
   use hc_coulomb, only: coulomb_t
   use hc_nodal_coulomb, only: nodal_coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
-  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   implicit none
   private
 
@@ -313,35 +315,33 @@ contains
     !> State at the end of the step; its fields are on the first rank
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
-    !> On the first rank: state to start from, and displacement that slip counts from
-    type(contact_state_t), intent(in), optional :: start
+    !> State to start from, with its fields on the first rank, and there the displacement that slip counts from
+    type(contact_state_t), intent(in) :: start
     real(wp), intent(in), contiguous, optional :: reference(:, :, :)
     type(contact_state_t) :: own
     real(wp), allocatable, target :: origin(:, :, :)
 
     if (self%by_rows .and. order%target%rolling%steady .and. order%target%rolling%ahead(2) /= 0) then
       ! a node feels all nodes ahead of it, in rows of other ranks
-      call prepare(self, .false., error)
+      associate (p => self%problem)
+        call require_memory(self%ranks%on_node*windowed_friction_memory(p%lattice%extent, p%lattice%size(), n_load, &
+                                                                        .not. p%goodman, p%space%threads, &
+                                                                        spectra_of(p%medium), p%lattice%is_periodic()), error)
+      end associate
+      call self%ranks%agree(error)
+      if (.not. allocated(error)) call prepare(self, .false., error)
       if (allocated(error)) return
     end if
-    if (present(start)) then
-      call deal_state(self, order, own, start)
-    else
-      call deal_state(self, order, own)
-    end if
+    call deal_state(self, order, own, start)
     allocate (origin, mold=own%traction)
     call deal_vector(self, reference, origin)
     if (order%guessed) then
       allocate (self%part%guess)
       allocate (self%part%guess%pressure, mold=own%pressure)
       allocate (self%part%guess%traction, mold=own%traction)
-      if (allocated(self%guess)) then
-        call deal_real(self, self%guess%pressure, self%part%guess%pressure)
-        call deal_vector(self, self%guess%traction, self%part%guess%traction)
-      else
-        call deal_real(self, own=self%part%guess%pressure)
-        call deal_vector(self, own=self%part%guess%traction)
-      end if
+      if (.not. allocated(self%guess)) allocate (self%guess)
+      call deal_real(self, self%guess%pressure, self%part%guess%pressure)
+      call deal_vector(self, self%guess%traction, self%part%guess%traction)
       self%part%guess%motion = order%guess_motion
     end if
     call self%part%solve_step(own, origin, order%target, order%tolerance, order%max_sweeps, state, error)
@@ -366,8 +366,8 @@ contains
     type(call_t), intent(in) :: order
     !> Rows of this rank
     type(contact_state_t), intent(out) :: own
-    !> All rows, on the first rank
-    type(contact_state_t), intent(in), optional :: state
+    !> All rows, on the first rank; on others without fields, which are absent then
+    type(contact_state_t), intent(in) :: state
 
     own%motion = order%motion
     own%load = order%load
@@ -375,19 +375,11 @@ contains
       allocate (own%pressure(n(1), n(2)), own%gap(n(1), n(2)), own%zone(n(1), n(2)), own%traction(n(1), n(2), 2), &
                 own%relative_displacement(n(1), n(2), 2))
     end associate
-    if (present(state)) then
-      call deal_real(self, state%pressure, own%pressure)
-      call deal_real(self, state%gap, own%gap)
-      call deal_zone(self, state%zone, own%zone)
-      call deal_vector(self, state%traction, own%traction)
-      call deal_vector(self, state%relative_displacement, own%relative_displacement)
-    else
-      call deal_real(self, own=own%pressure)
-      call deal_real(self, own=own%gap)
-      call deal_zone(self, own=own%zone)
-      call deal_vector(self, own=own%traction)
-      call deal_vector(self, own=own%relative_displacement)
-    end if
+    call deal_real(self, state%pressure, own%pressure)
+    call deal_real(self, state%gap, own%gap)
+    call deal_zone(self, state%zone, own%zone)
+    call deal_vector(self, state%traction, own%traction)
+    call deal_vector(self, state%relative_displacement, own%relative_displacement)
   end subroutine deal_state
 
   !> Compute the displacements of given tractions; called on the first rank alone.
@@ -421,12 +413,8 @@ contains
     associate (n => self%part%problem%own_extent())
       allocate (own(n(1), n(2), 3), displacement(n(1), n(2), 3))
     end associate
-    if (present(tractions)) then
-      call deal_vector(self, tractions, own)
-      deallocate (tractions)
-    else
-      call deal_vector(self, own=own)
-    end if
+    call deal_vector(self, tractions, own)
+    if (present(tractions)) deallocate (tractions)
     call self%part%displacements(own(:, :, 1), own(:, :, 2:), displacement, error)
     call self%ranks%agree(error)
     if (allocated(error)) return
@@ -462,7 +450,7 @@ contains
     !> Allocated on failure of any rank
     type(error_t), allocatable, intent(out) :: error
     type(call_t) :: order
-    type(contact_state_t) :: state
+    type(contact_state_t) :: state, nothing
     real(wp), allocatable :: displacement(:, :, :)
     integer(int32), allocatable :: words(:)
     integer :: n
@@ -473,7 +461,7 @@ contains
     order = transfer(words, order)
     select case (order%what)
     case (to_solve)
-      call solve_together(self, order, state, error)
+      call solve_together(self, order, state, error, nothing)
     case (to_displace)
       call displace_together(self, displacement, error)
     case (to_set_gap)

@@ -39,6 +39,8 @@ module hc_shear_preconditioner
     private
     !> Elastic compliance t_h of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
+    !> Rows of the window
+    integer, private :: n_row = 0
     !> Direction e
     real(wp), pointer, contiguous :: direction(:, :) => null()
     !> Shares a and f of each node in contact
@@ -79,6 +81,7 @@ contains
     call new_symbol_preconditioner(self, lattice, medium, space, options, error, cache, &
                                    more=4*(product(space%own_extent(lattice%extent)) + 2*margin_of(options, lattice%extent)))
     self%elastic_compliance = node_compliance(lattice, medium)
+    self%n_row = lattice%extent(2)
   end subroutine new_shear_preconditioner
 
   !> Set the nodes in contact, and the springs of those that slip.
@@ -207,14 +210,13 @@ contains
     integer, intent(out) :: before
     !> The nodes of all of these rows
     logical(lk), allocatable, intent(out) :: around(:, :)
-    integer :: n_row, own(2), last
+    integer :: own(2), last
 
-    n_row = self%space%number(extent(2))
-    own = self%space%own_rows(n_row)
+    own = self%space%own_rows(self%n_row)
     before = own(1) - max(own(1) - reach, 1)
-    last = min(own(2) + reach, n_row)
+    last = min(own(2) + reach, self%n_row)
     allocate (around(extent(1), last - own(1) + before + 1))
-    call self%space%fetch(n_row, slips, own(1) - before, around)
+    call self%space%fetch(self%n_row, slips, own(1) - before, around)
   end subroutine take_slipping
 
   !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there: the component along t at all
@@ -357,15 +359,14 @@ contains
     real(sp), intent(inout), contiguous, target :: field(low:)
     real(sp), pointer, contiguous :: own(:, :)
     real(sp), allocatable :: around(:, :)
-    integer :: n_row, rows(2), before, after
+    integer :: rows(2), before, after
 
-    n_row = self%space%number(extent(2))
-    rows = self%space%own_rows(n_row)
+    rows = self%space%own_rows(self%n_row)
     before = rows(1) - max(rows(1) - step, 1)
-    after = min(rows(2) + step, n_row) - rows(2)
+    after = min(rows(2) + step, self%n_row) - rows(2)
     own(1:extent(1), 1:extent(2)) => field(1:product(extent))
     allocate (around(extent(1), before + extent(2) + after))
-    call self%space%fetch(n_row, own, rows(1) - before, around)
+    call self%space%fetch(self%n_row, own, rows(1) - before, around)
     field(1 - before*extent(1):0) = reshape(around(:, :before), [before*extent(1)])
     field(product(extent) + 1:product(extent) + after*extent(1)) = reshape(around(:, before + extent(2) + 1:), [after*extent(1)])
   end subroutine take_beside

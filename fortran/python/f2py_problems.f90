@@ -209,6 +209,7 @@ contains
     if (.not. allocated(error) .and. is_shared .and. ranks%rank > 0) then
       allocate (own_gap(lattice%extent(1), lattice%extent(2)), source=0.0_wp)
       call new_friction_problem(problem, slot%lattice, bodies, own_gap, own_gap < 1.0_wp, friction, goodman, error, law)
+      deallocate (own_gap)
     else if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, error, law)
     end if

@@ -160,9 +160,7 @@ ADAPTIVE = SHEARED.replace("steps = 2\n[[load]]", "[[load]]").replace("steps = 2
     "step_tolerance = 0.3\n"
 )
 VARYING = LARGE.replace("coefficient = 0.2", 'coefficient = "0.2 + 0.1*tanh(x/20e-6)"')
-DIRECTED = LARGE.replace(
-    "coefficient = 0.2", 'coefficient = { along = 0.2, across = 0.3, angle = "30 deg" }'
-)
+DIRECTED = LARGE.replace("coefficient = 0.2", 'coefficient = { along = 0.2, across = 0.3, angle = "30 deg" }')
 ROLLING = LARGE.partition("[[load]]\ntangential")[0] + (
     '[[load]]\nrolling = "steady"\ncreepage_x = -1e-3\n[solver]\ntolerance = 1e-10\n'
 )
@@ -213,7 +211,18 @@ cycles = 1_000
         (3, DIRECTED),
         (2, ROLLING),
     ],
-    ids=["twisted", "alike", "worn", "adaptive", "waves", "shifted", "ends", "varying", "directed", "rolling"],
+    ids=[
+        "twisted",
+        "alike",
+        "worn",
+        "adaptive",
+        "waves",
+        "shifted",
+        "ends",
+        "varying",
+        "directed",
+        "rolling",
+    ],
 )
 def test_friction_in_several_processes(ranks: int, deck: str, tmp_path: Path) -> None:
     test_several_processes_write_the_file_of_one(ranks, deck, tmp_path)

@@ -13,6 +13,7 @@ module hc_contact_problem
   use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_rolling, only: rolling_t
   use hc_hierarchy, only: level_t
   use hc_elastic_medium, only: elastic_medium_t
@@ -70,16 +71,17 @@ module hc_contact_problem
 contains
 
   !> Set up a problem.
-  subroutine new_friction_problem(problem, lattice, medium, initial_gap, candidate, friction, goodman, error, normal_law)
+  subroutine new_friction_problem(problem, lattice, medium, initial_gap, candidate, friction, goodman, error, normal_law, &
+                                  space)
     !> Problem to be set up
     type(friction_problem_t), intent(out) :: problem
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> The two bodies
     class(elastic_medium_t), intent(in) :: medium
-    !> Initial gap (n_col, n_row) [m]
+    !> Initial gap (n_col, own rows) [m]
     real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
+    !> Nodes that may come into contact (n_col, own rows)
     logical, intent(in) :: candidate(:, :)
     !> Law of friction
     class(friction_law_t), intent(in) :: friction
@@ -89,12 +91,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Law of contact along the normal; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: normal_law
+    !> Space of the fields; absent: this rank has all rows
+    type(field_space_t), intent(in), optional :: space
 
-    call new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, normal_law)
+    call new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, normal_law, space)
     if (allocated(error)) return
     call friction%check(lattice, error)
     if (allocated(error)) return
     allocate (problem%friction, source=friction)
+    call problem%friction%begin_rows(problem%rows_before()*lattice%extent(1))
     problem%goodman = goodman
     call set_geometry(problem)
   end subroutine new_friction_problem

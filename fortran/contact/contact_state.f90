@@ -366,11 +366,11 @@ contains
   end subroutine check_target
 
   !> Refuse a state from which no load step with friction can start.
-  pure subroutine check_state(state, lattice, error)
+  pure subroutine check_state(state, extent, error)
     !> State
     type(contact_state_t), intent(in) :: state
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
+    !> Columns and own rows of the window
+    integer, intent(in) :: extent(2)
     !> Allocated on failure: fields that are missing or of another window, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
     logical :: fits
@@ -379,17 +379,15 @@ contains
     fits = allocated(state%pressure) .and. allocated(state%gap) .and. allocated(state%traction) .and. &
            allocated(state%relative_displacement) .and. allocated(state%accumulated_slip) .and. &
            allocated(state%dissipation_density)
-    if (fits) fits = all([shape(state%pressure), shape(state%gap), shape(state%accumulated_slip)] == [lattice%extent, &
-                                                                                    lattice%extent, lattice%extent])
-    if (fits) fits = all(shape(state%dissipation_density) == lattice%extent)
-    if (fits) fits = all(shape(state%traction) == [lattice%extent, 2]) .and. &
-                     all(shape(state%relative_displacement) == [lattice%extent, 2])
+    if (fits) fits = all([shape(state%pressure), shape(state%gap), shape(state%accumulated_slip)] == [extent, extent, extent])
+    if (fits) fits = all(shape(state%dissipation_density) == extent)
+    if (fits) fits = all(shape(state%traction) == [extent, 2]) .and. all(shape(state%relative_displacement) == [extent, 2])
     if (.not. fits) then
       call raise(error, status%invalid_input, 'the initial state does not have the shape of the lattice window')
       return
     end if
     fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy, state%path_error]))
-    do row = 1, lattice%extent(2)
+    do row = 1, extent(2)
       fits = fits .and. all(ieee_is_finite(state%pressure(:, row))) .and. all(ieee_is_finite(state%traction(:, row, :))) &
              .and. all(ieee_is_finite(state%relative_displacement(:, row, :))) &
              .and. all(ieee_is_finite(state%accumulated_slip(:, row))) &

@@ -206,10 +206,12 @@ contains
     real(wp) :: carried, error, factor, before, bounds(size(pressure))
     logical(lk), allocatable :: contact(:, :)
     type(active_set_t) :: nodes
-    integer :: k, try
+    integer :: k, try, n_contact
 
     overloads = .false.
-    if (.not. problem%friction%is_bounded() .or. problem%space%count_positive(pressure) == 0) return
+    if (.not. problem%friction%is_bounded()) return
+    n_contact = problem%space%count_positive(pressure)
+    if (n_contact == 0) return
     contact = pressure > 0.0_wp
     call new_driven_motions(driven, problem, target, contact)
     associate (n => size(driven%motion), options => problem%options%contact)

@@ -128,9 +128,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: all_touch = 1.0_wp - 1.0e-9_wp
     real(wp) :: lowest, mean
+    integer :: n
 
     if (.not. self%lattice%is_periodic() .or. target%control(normal) == force_control) return
-    if (self%normal_law%is_compliant() .or. self%space%count(self%candidate) < self%lattice%size()) return
+    if (self%normal_law%is_compliant()) return
+    n = self%space%count(self%candidate)
+    if (n < self%lattice%size()) return
     lowest = self%space%min(self%initial_gap, self%candidate)
     mean = self%space%sum(self%initial_gap)/self%lattice%size()
     if (target%value(normal) > lowest .and. target%value(normal) - lowest >= all_touch*(mean - lowest)) then

@@ -14,7 +14,7 @@ module hc_subwindow
   implicit none
   private
 
-  public :: next_part, solve_part
+  public :: next_part, enclose, solve_part
 
 contains
 

@@ -15,7 +15,7 @@ module hc_contact_edges
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
-  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, n_cell_sum, mesh_of_zone, distance_field
+  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, mesh_of_zone, distance_field
   implicit none
   private
 
@@ -33,10 +33,8 @@ module hc_contact_edges
     !> Tuning numbers
     type(edge_options_t) :: options
   contains
-    !> The edge of the contact area; sums of it by row
-    procedure :: contact_edge, contact_sums
-    !> The edge of the part of it that sticks
-    procedure :: stick_edge
+    !> The edges of the contact area and of the part of it that sticks; sums of them by row
+    procedure :: contact_edge, contact_sums, stick_edge, stick_sums
     !> Triangles that fill either of them, and a field there
     procedure :: contact_mesh, stick_mesh
     !> Distances of all nodes from either edge
@@ -101,18 +99,31 @@ contains
   end function contact_edge
 
   !> Sum the cells of the contact by row, of which `edge_of_sums` finds its area.
-  pure function contact_sums(self, rows, below) result(sums)
+  pure subroutine contact_sums(self, rows, sums)
     class(contact_edges_t), intent(in) :: self
-    !> First and last row of cells, each named by the row of nodes below it
-    integer, intent(in) :: rows(2)
-    !> Rows of the window before those of the fields
-    integer, intent(in) :: below
-    real(wp) :: sums(n_cell_sum, rows(1):rows(2))
-    real(wp), allocatable :: found(:, :), segments(:, :, :)
+    !> First and last row of cells, each named by the row of nodes below it, and rows of the window before those of the fields
+    integer, intent(in) :: rows(3)
+    !> Sums of each row
+    real(wp), allocatable, intent(out) :: sums(:, :)
+    real(wp), allocatable :: segments(:, :, :)
 
-    call sum_cells(self%candidate, self%contact, self%band, self%distance, rows, below, found, segments)
-    sums = found
-  end function contact_sums
+    call sum_cells(self%lattice, self%candidate, self%contact, self%band, self%distance, rows, sums, segments)
+  end subroutine contact_sums
+
+  !> Sum the cells of the part of it that sticks, as `contact_sums`.
+  pure subroutine stick_sums(self, stick, reserve, rows, sums)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    integer, intent(in) :: rows(3)
+    real(wp), allocatable, intent(out) :: sums(:, :)
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:), segments(:, :, :)
+
+    call self%from_stick(stick, reserve, band, distance)
+    call sum_cells(self%lattice, self%candidate, stick, band, distance, rows, sums, segments)
+  end subroutine stick_sums
 
   !> Fill the contact area with triangles, and carry a field to its edge.
   pure function contact_mesh(self, field, vanishes) result(mesh)

@@ -9,8 +9,8 @@ module hc_state_measures
   use hc_elastic_medium, only: elastic_medium_t
   use hc_contact_state, only: contact_state_t, separated, stick, normal, remote_displacement
   use hc_options, only: edge_options_t
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges
-  use hc_zone_edge, only: zone_edge_t, edge_of_sums, n_cell_sum
+  use hc_edges_by_rows, only: edges_by_rows_t, new_edges_by_rows
+  use hc_zone_edge, only: zone_edge_t
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, tangential_scale
   use hc_normal_law, only: normal_law_t
   use hc_friction_law, only: friction_law_t
@@ -124,7 +124,7 @@ contains
     type(contact_state_t), intent(in) :: state
 
     energy = sum(normal_energy(lattice, initial_gap, state%zone /= separated, state%pressure, state%gap, state%motion(normal)))
-    if (allocated(state%traction)) energy = energy + shear_energy(lattice, state)
+    if (allocated(state%traction)) energy = energy + sum(shear_energy(lattice, state, 0))
   end function elastic_energy
 
   !> Compute the part of the pressure by row [J].
@@ -150,23 +150,26 @@ contains
     energy = 0.5_wp*lattice%cell_area()*energy
   end function normal_energy
 
-  !> Compute the part of the shear tractions [J].
-  pure real(wp) function shear_energy(lattice, state) result(energy)
+  !> Compute the part of the shear tractions by row [J].
+  pure function shear_energy(lattice, state, below) result(energy)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> State with friction
     type(contact_state_t), intent(in) :: state
+    !> Rows of the window before those of the state
+    integer, intent(in) :: below
+    real(wp) :: energy(size(state%pressure, 2))
     real(wp), dimension(size(state%pressure, 1)) :: x, y
     real(wp) :: moved(2)
     integer :: col, row
 
     energy = 0.0_wp
     do row = 1, size(state%pressure, 2)
-      call lattice%row_coordinates(row, x, y)
+      call lattice%row_coordinates(below + row, x, y)
       do col = 1, size(x)
         if (state%zone(col, row) == separated) cycle
         moved = state%relative_displacement(col, row, :) + remote_displacement(state%motion, x(col), y(col))
-        energy = energy + dot_product(state%traction(col, row, :), moved)
+        energy(row) = energy(row) + dot_product(state%traction(col, row, :), moved)
       end do
     end do
     energy = 0.5_wp*lattice%cell_area()*energy
@@ -182,26 +185,29 @@ contains
     real(wp), intent(out) :: center(2), lower(2), upper(2)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp), dimension(2, size(zone, 2)) :: total, least, most
+    real(wp) :: total(size(zone, 2), 2), least(2, size(zone, 2)), most(2, size(zone, 2)), bounds(4)
     real(wp), dimension(size(zone, 1)) :: x, y
-    integer :: n, row
+    integer :: n, row, below
 
     center = ieee_value(1.0_wp, ieee_quiet_nan)
     lower = center
     upper = center
     n = space%count(logical(zone, lk))
     if (n == 0) return
+    below = space%ranks%first_row(lattice%extent(2)) - 1
     !$omp parallel do schedule(static) num_threads(space%threads) private(x, y)
     do row = 1, size(zone, 2)
-      call lattice%row_coordinates(row, x, y)
-      total(:, row) = [sum(x, mask=zone(:, row)), sum(y, mask=zone(:, row))]
+      call lattice%row_coordinates(below + row, x, y)
+      total(row, :) = [sum(x, mask=zone(:, row)), sum(y, mask=zone(:, row))]
       least(:, row) = [minval(x, mask=zone(:, row)), minval(y, mask=zone(:, row))]
       most(:, row) = [maxval(x, mask=zone(:, row)), maxval(y, mask=zone(:, row))]
     end do
     !$omp end parallel do
-    center = sum(total, dim=2)/n
-    lower = minval(least, dim=2)
-    upper = maxval(most, dim=2)
+    center = [space%total(total(:, 1)), space%total(total(:, 2))]/n
+    bounds = [-minval(least, dim=2), maxval(most, dim=2)]
+    call space%most(bounds)
+    lower = -bounds(:2)
+    upper = bounds(3:)
   end subroutine zone_extent
 
   !> Find the centroid of a pressure; NaN if there is none [m].
@@ -243,14 +249,15 @@ contains
     type(contact_state_t), intent(in) :: state
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    type(contact_edges_t) :: edges
+    type(edges_by_rows_t) :: edges
     real(wp), allocatable :: reserve(:, :), length(:)
     logical, allocatable :: zone(:, :)
     integer :: row
 
     call measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
     if (.not. allocated(state%traction)) return
-    found%elastic_energy = found%elastic_energy + shear_energy(lattice, state)
+    found%elastic_energy = found%elastic_energy + space%total(shear_energy(lattice, state, &
+                                                                                  space%ranks%first_row(lattice%extent(2)) - 1))
     allocate (reserve, mold=initial_gap)
     reserve = 0.0_wp ! of no use where nothing slips
     if (friction%is_bounded()) then
@@ -288,9 +295,9 @@ contains
     type(field_space_t), intent(in) :: space
     !> Measures; those of shear are not set
     type(state_measures_t), intent(out) :: found
-    !> Edges of the contact; on several ranks those near own rows
-    type(contact_edges_t), intent(out) :: edges
-    type(zone_edge_t) :: edge
+    !> Edges of the contact
+    type(edges_by_rows_t), intent(out) :: edges
+    type(edge_options_t) :: options
 
     found%max_pressure = space%max(state%pressure)
     associate (contact => state%zone /= separated)
@@ -305,57 +312,10 @@ contains
         return
       end if
       found%pressure_center = center_of(lattice, state%pressure, space)
-      if (space%ranks%size > 1) then
-        call find_shared_edge(lattice, contact, candidate, state, space, edges, edge)
-      else
-        call new_contact_edges(edges, lattice, state%pressure, state%gap, contact, candidate)
-        edge = edges%contact_edge()
-      end if
-      found%contact = size_of(lattice, space%count(logical(contact, lk)), edge)
+      call new_edges_by_rows(edges, lattice, state, candidate, space, options)
+      found%contact = size_of(lattice, space%count(logical(contact, lk)), edges%contact_edge())
     end associate
   end subroutine measure_contact
-
-  !> Find the edge of a contact whose rows several ranks share: each sums the cells of its rows, about which it takes those that
-  !> they depend on.
-  subroutine find_shared_edge(lattice, contact, candidate, state, space, edges, edge)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes in contact and those that can touch (n_col, own rows)
-    logical, intent(in), contiguous :: contact(:, :), candidate(:, :)
-    !> State, of which pressure and gap matter
-    type(contact_state_t), intent(in) :: state
-    type(field_space_t), intent(in) :: space
-    !> Edges near own rows
-    type(contact_edges_t), intent(out) :: edges
-    !> Area and ellipse of the contact
-    type(zone_edge_t), intent(out) :: edge
-    type(edge_options_t) :: options
-    real(wp), allocatable :: pressure(:, :), gap(:, :), sums(:, :)
-    logical(lk), allocatable :: touching(:, :), possible(:, :)
-    real(wp) :: totals(n_cell_sum)
-    integer :: own(2), wanted(2), k
-
-    own = space%own_rows(lattice%extent(2))
-    ! The first and last of these rows look like the rim of the window: their band has reach + 1 rows, and a value depends on
-    ! nodes that are reach + 2 rows away.
-    wanted = own + [-2, 2]*(options%reach + 2)
-    wanted = [max(wanted(1), 1), min(wanted(2), lattice%extent(2))]
-    associate (n => [size(contact, 1), wanted(2) - wanted(1) + 1])
-      allocate (pressure(n(1), n(2)), gap(n(1), n(2)), touching(n(1), n(2)), possible(n(1), n(2)))
-    end associate
-    call space%fetch(lattice%extent(2), state%pressure, wanted(1), pressure)
-    call space%fetch(lattice%extent(2), state%gap, wanted(1), gap)
-    call space%fetch(lattice%extent(2), logical(contact, lk), wanted(1), touching)
-    call space%fetch(lattice%extent(2), logical(candidate, lk), wanted(1), possible)
-    call new_contact_edges(edges, lattice%subwindow([1, wanted(1)], [lattice%extent(1), wanted(2)]), pressure, gap, &
-                           logical(touching), logical(possible))
-    if (own(1) == 1) own(1) = 0                                               ! the cells below the first row
-    sums = edges%contact_sums(own - wanted(1) + 1, wanted(1) - 1)
-    do k = 1, n_cell_sum
-      totals(k) = space%total(sums(k, :))
-    end do
-    edge = edge_of_sums(lattice, totals)
-  end subroutine find_shared_edge
 
   !> Test whether the pressure rises to an end of the surface, where it has no bound.
   !>

@@ -20,13 +20,13 @@ module hc_zone_edge
   !> Corners of the lower and of the upper triangle of a cell, counterclockwise: column and row.
   integer, parameter :: corner(2, 3, 2) = reshape([0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 1, 0], [2, 3, 2])
 
-  !> Sums over the cells of a row: covered triangles, and six moments.
-  integer, parameter :: n_cell_sum = 7
+  !> Sums over the cells of a row: covered triangles, six moments, and the length of the edge.
+  integer, parameter :: n_cell_sum = 8
 
   !> An area of the plane whose edge runs between the nodes.
   type :: zone_edge_t
-    !> Area [m^2]
-    real(wp) :: area = 0.0_wp
+    !> Area [m^2], and length of its edge [m]
+    real(wp) :: area = 0.0_wp, length = 0.0_wp
     !> Ellipse with the second moments of the area; of an elliptic area it is the edge
     type(ellipse_t) :: ellipse
     !> Pieces of the edge, in no order: x and y, first and last point; none where the zone ends at nodes that can never
@@ -35,8 +35,6 @@ module hc_zone_edge
   contains
     !> Radius of the disc with the same area [m]
     procedure :: radius
-    !> Length of the edge [m]
-    procedure :: length
   end type zone_edge_t
 
   !> Triangles that fill a zone up to its edge, and a field on them.
@@ -58,12 +56,6 @@ contains
     class(zone_edge_t), intent(in) :: self
     radius = sqrt(self%area/pi)
   end function radius
-
-  !> Return the length of the edge [m].
-  pure real(wp) function length(self)
-    class(zone_edge_t), intent(in) :: self
-    length = sum(norm2(self%segments(:, 2, :) - self%segments(:, 1, :), dim=1))
-  end function length
 
   !> Count the triangles that the edge of a zone cuts.
   pure integer function cut_triangles(zone)
@@ -123,7 +115,7 @@ contains
     real(wp), allocatable :: segments(:, :, :), sums(:, :)
     integer :: n, k
 
-    call sum_cells(candidate, zone, band, distance, [0, size(zone, 2)], 0, sums, segments)
+    call sum_cells(lattice, candidate, zone, band, distance, [0, size(zone, 2), 0], sums, segments)
     edge = edge_of_sums(lattice, [(sum(sums(k, :)), k=1, n_cell_sum)])
     allocate (edge%segments, mold=segments)
     do n = 1, size(segments, 3)
@@ -133,17 +125,18 @@ contains
     end do
   end function edge_of_zone
 
-  !> Sum the cells of a zone by row: covered triangles, and moments of the area (1, x, y, xx, xy, yy) in columns and rows.
-  pure subroutine sum_cells(candidate, zone, band, distance, rows, below, sums, segments)
+  !> Sum the cells of a zone by row: covered triangles, moments of the area (1, x, y, xx, xy, yy) in columns and rows, and the
+  !> length of its edge [m].
+  pure subroutine sum_cells(lattice, candidate, zone, band, distance, rows, sums, segments)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
     !> Nodes that can touch, nodes of the zone
     logical, intent(in) :: candidate(:, :), zone(:, :)
     !> Nodes about its edge, and their distances from it
     type(edge_band_t), intent(in) :: band
     real(wp), intent(in) :: distance(:)
-    !> First and last row of cells, each named by the row of nodes below it
-    integer, intent(in) :: rows(2)
-    !> Rows of the window before those of the zone
-    integer, intent(in) :: below
+    !> First and last row of cells, each named by the row of nodes below it, and rows of the window before those of the zone
+    integer, intent(in) :: rows(3)
     !> Sums of each row of cells
     real(wp), allocatable, intent(out) :: sums(:, :)
     !> Pieces of the edge, in columns and rows (2, 2, n)
@@ -162,7 +155,7 @@ contains
     do row = rows(1), rows(2)
       whole = 0_int64
       moments = 0.0_wp
-      sums(1, row) = 0.0_wp
+      sums([1, 8], row) = 0.0_wp
       do col = 0, size(zone, 1)
         inside = nodes_inside(padded(col:col + 1, row:row + 1))
         do half = 1, 2
@@ -172,11 +165,12 @@ contains
             cycle
           end if
           local = corners_of(half) + spread([col, row], 2, 3)
-          corners = local + spread([0, below], 2, 3)
+          corners = local + spread([0, rows(3)], 2, 3)
           at = [band%place(local(1, 1), local(2, 1)), band%place(local(1, 2), local(2, 2)), band%place(local(1, 3), local(2, 3))]
           if (all(can_touch(at))) then
             n = n + 1
             call cut(real(corners, wp), distance(at), lone, segments(:, :, n), sums(1, row))
+            sums(8, row) = sums(8, row) + norm2(matmul(lattice%basis, segments(:, 2, n) - segments(:, 1, n)))
             sign = merge(1.0_wp, -1.0_wp, inside(half) == 1)
             if (inside(half) == 2) moments = moments + moments_of(real(corners, wp))
             moments = moments + sign*moments_of(reshape([real(corners(:, lone), wp), segments(:, :, n)], [2, 3]))
@@ -192,9 +186,9 @@ contains
       end do
       sums(1, row) = sums(1, row) + sum(whole(1, :))
       do half = 1, 2
-        moments = moments + moments_of_whole(half, row + below, real(whole(:, half), wp))
+        moments = moments + moments_of_whole(half, row + rows(3), real(whole(:, half), wp))
       end do
-      sums(2:, row) = moments
+      sums(2:7, row) = moments
     end do
     segments = segments(:, :, :n)
   end subroutine sum_cells
@@ -208,7 +202,8 @@ contains
     type(zone_edge_t) :: edge
 
     edge%area = 0.5_wp*lattice%cell_area()*sums(1)
-    if (sums(2) > 0.0_wp) edge%ellipse = ellipse_of(lattice, sums(2:))
+    edge%length = sums(8)
+    if (sums(2) > 0.0_wp) edge%ellipse = ellipse_of(lattice, sums(2:7))
   end function edge_of_sums
 
   !> Return the corners of the lower or upper triangle of the cell at column and row 0.

@@ -27,7 +27,7 @@ module hc_adaptive_path
   use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_problem, only: friction_problem_t
-  use hc_contact_edges, only: contact_edges_t
+  use hc_edges_by_rows, only: edges_by_rows_t
   use hc_zone_edge, only: zone_edge_t
   use hc_load_path, only: advance, join_steps, step_settings_t
   use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, outgrown, rejected
@@ -273,7 +273,7 @@ contains
     self%operator_applications = self%operator_applications + next%operator_applications
     if (self%grows .and. next%clipped) then
       self%verdict = outgrown
-      self%larger = grown_window(solver%problem%lattice, next%zone /= separated)
+      self%larger = grown_window(solver%problem%lattice, next%zone /= separated, solver%problem%space)
     end if
     solved = next%converged .and. self%verdict /= outgrown
   end subroutine solve_part
@@ -285,7 +285,7 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> End of the load step
     type(contact_state_t), intent(inout) :: state
-    type(contact_edges_t) :: edges
+    type(edges_by_rows_t) :: edges
     type(zone_edge_t) :: edge
 
     state%sweeps = self%sweeps

@@ -24,6 +24,7 @@ module hc_contact_search
   use hc_contact_state, only: contact_state_t, load_target_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_step_control, only: accepted, failed, pending
+  use hc_field_space, only: field_space_t
   use hc_window_growth, only: grown_window
   implicit none
   private
@@ -86,7 +87,7 @@ contains
   end subroutine begin
 
   !> Judge the pressure on the present lattice: measure the contact, or set the next lattice.
-  pure subroutine judge(self, lattice, pressure)
+  subroutine judge(self, lattice, pressure)
     class(contact_search_t), intent(inout) :: self
     !> The present lattice
     type(lattice_t), intent(in) :: lattice
@@ -103,7 +104,7 @@ contains
       call self%put_around(self%spacing/4)
     else if (any(contact([1, size(contact, 1)], :)) .or. any(contact(:, [1, size(contact, 2)]))) then
       if (self%encloses) then
-        larger = grown_window(lattice, contact)
+        larger = grown_window(lattice, contact, field_space_t())
         self%first = larger%first
         self%extent = larger%extent
       else

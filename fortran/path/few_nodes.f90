@@ -6,13 +6,13 @@
 !>
 !> Theory: docs/theory/load_path.md.
 module hc_few_nodes
-  use hc_precision, only: wp
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
-  use hc_subwindow, only: solve_part
+  use hc_subwindow, only: enclose, solve_part
   implicit none
   private
 
@@ -43,7 +43,7 @@ contains
     type(contact_state_t) :: found
     logical, allocatable :: nodes(:, :)
     logical :: solved
-    integer :: low(2), high(2), try
+    integer :: low(2), high(2), try, n
 
     call solver%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
     if (allocated(error) .or. state%converged .or. state%sliding .or. target%rolling%steady) return
@@ -53,9 +53,10 @@ contains
     end select
     associate (problem => solver%problem, options => solver%problem%options%multilevel)
       nodes = state%pressure > 0.0_wp
-      if (count(nodes) == 0 .or. count(nodes) > options%few_nodes) return
+      n = problem%space%count(logical(nodes, lk))
+      if (n == 0 .or. n > options%few_nodes) return
       do try = 1, options%max_parts
-        call problem%lattice%enclose(nodes, options, low, high)
+        call enclose(problem, nodes, low, high)
         if (any(high - low >= options%largest_direct_side)) return
         call problem%extract_part(low, high, part)
         call new_direct_friction(direct, part, error)

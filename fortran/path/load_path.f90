@@ -189,7 +189,8 @@ contains
       call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
       return
     end if
-    call check_state(state, solver%problem%lattice, error)
+    call check_state(state, solver%problem%own_extent(), error)
+    call solver%problem%space%ranks%agree(error)
   end subroutine check_step
 
   !> Solve a part of a load step.
@@ -261,7 +262,7 @@ contains
     type(rolling_t), intent(in) :: rolling
     !> State at its end
     type(contact_state_t), intent(inout) :: state
-    real(wp) :: part(size(state%pressure, 2)), error(size(part)), spent(size(state%pressure, 1))
+    real(wp) :: part(size(state%pressure, 2)), error(size(state%pressure, 2)), spent(size(state%pressure, 1))
     integer :: row
 
     if (rolling%rolls()) then
@@ -281,11 +282,11 @@ contains
       end associate
     end do
     !$omp end parallel do
-    state%dissipated_energy = problem%lattice%cell_area()*sum(part)
+    state%dissipated_energy = problem%lattice%cell_area()*problem%space%total(part)
     state%path_error = 0.0_wp  ! without a path
     if (static) return
     state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
-    state%path_error = before%path_error + problem%lattice%cell_area()*sum(error)
+    state%path_error = before%path_error + problem%lattice%cell_area()*problem%space%total(error)
   end subroutine add_slip
 
   !> Bound the error of the energy that a row of nodes dissipates in a step, by area, (W4): slip at the traction of the end of the

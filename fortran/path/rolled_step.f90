@@ -43,7 +43,7 @@ contains
 
   !> Set shifts and twist over a spacing from creepages, and the displacement that slip counts from: that of the step before at
   !> the node ahead, (K3); nothing in the steady state, (K4).
-  pure subroutine begin_rolling(problem, state, target, ahead)
+  subroutine begin_rolling(problem, state, target, ahead)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: state
@@ -65,7 +65,7 @@ contains
     end if
     ahead = ahead + problem%rigid_displacement(state%motion)
     do m = 1, 2
-      ahead(:, :, m) = target%rolling%shifted(ahead(:, :, m))
+      ahead(:, :, m) = shifted(problem, target%rolling, ahead(:, :, m))
     end do
   end subroutine begin_rolling
 
@@ -82,15 +82,15 @@ contains
 
     state%accumulated_slip = norm2(state%slip_increment, dim=3)
     state%dissipation_density = merge(0.0_wp, -sum(state%traction*state%slip_increment, dim=3), state%zone == stick)
-    spent = problem%lattice%cell_area()*sum(state%dissipation_density)
+    spent = problem%lattice%cell_area()*problem%space%sum(state%dissipation_density)
     state%dissipated_energy = before%dissipated_energy
     state%path_error = before%path_error
     if (rolling%steady) then
       call rolling%sum_behind(state%accumulated_slip)
       call rolling%sum_behind(state%dissipation_density)
     else
-      state%accumulated_slip = rolling%shifted(before%accumulated_slip) + state%accumulated_slip
-      state%dissipation_density = rolling%shifted(before%dissipation_density) + state%dissipation_density
+      state%accumulated_slip = shifted(problem, rolling, before%accumulated_slip) + state%accumulated_slip
+      state%dissipation_density = shifted(problem, rolling, before%dissipation_density) + state%dissipation_density
       state%dissipated_energy = before%dissipated_energy + spent
     end if
     state%creepage = rolling%creepages(problem%lattice, state%motion(along_x:about_z))
@@ -109,13 +109,34 @@ contains
     end associate
   end subroutine add_rolled_slip
 
+  !> Return the values of the nodes ahead, also of those in rows of other ranks.
+  function shifted(problem, rolling, field)
+    type(friction_problem_t), intent(in) :: problem
+    type(rolling_t), intent(in) :: rolling
+    !> Field (n_col, own rows)
+    real(wp), intent(in), contiguous :: field(:, :)
+    real(wp), allocatable :: shifted(:, :), near(:, :)
+    integer :: own(2), first, last
+
+    associate (n_row => problem%lattice%extent(2))
+      own = problem%space%own_rows(n_row)
+      first = max(own(1) - 1, 1)
+      last = min(own(2) + 1, n_row)
+      allocate (near(size(field, 1), last - first + 1))
+      call problem%space%fetch(n_row, field, first, near)
+      near = rolling%shifted(near)
+      shifted = near(:, own(1) - first + 1:own(2) - first + 1)
+    end associate
+  end function shifted
+
   !> Return the elastic energy of the shear tractions of similar bodies [J].
-  pure real(wp) function shear_energy(problem, state)
+  real(wp) function shear_energy(problem, state)
     type(friction_problem_t), intent(in) :: problem
     type(contact_state_t), intent(in) :: state
 
     shear_energy = 0.5_wp*problem%lattice%cell_area() &
-                   *sum(state%traction*(state%relative_displacement + problem%rigid_displacement(state%motion)))
+                   *problem%space%sum(sum(state%traction*(state%relative_displacement &
+                                                          + problem%rigid_displacement(state%motion)), dim=3))
   end function shear_energy
 
 end module hc_rolled_step

@@ -13,7 +13,7 @@ module hc_step_error
   use hc_contact_problem, only: friction_problem_t
   use hc_friction_law, only: friction_law_t
   use hc_contact_residuals, only: least_traction
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_edges_by_rows, only: edges_by_rows_t, new_edges_by_rows
   use hc_zone_edge, only: zone_edge_t
   implicit none
   private
@@ -50,7 +50,7 @@ contains
     real(wp), intent(in) :: area
     !> Change by the halves
     type(step_change_t), intent(out) :: change
-    type(contact_edges_t) :: edges
+    type(edges_by_rows_t) :: edges
     type(zone_edge_t) :: contact, sticking
     real(wp) :: carried, scale, grown, loaded
     integer :: entered
@@ -64,8 +64,8 @@ contains
       if (contact%radius() < steps%small_radius*spacing) then
         change%lattice = contact%area/area
       else if (space%count(logical(whole%zone == slip .or. half%zone == slip .or. halves%zone == slip, lk)) > 0) then
-        change%lattice = steps%ring_shift*spacing*sticking%length()/area &
-                         *min(1.0_wp, steps%entering_factor*entered*spacing/max(contact%length(), spacing))
+        change%lattice = steps%ring_shift*spacing*sticking%length/area &
+                         *min(1.0_wp, steps%entering_factor*entered*spacing/max(contact%length, spacing))
       end if
 
       if (friction%is_bounded()) then
@@ -105,27 +105,26 @@ contains
   end function shear_free
 
   !> Find the edges of a contact at the end of a load step, in a window about the origin.
-  pure subroutine edges_of(problem, state, edges)
+  subroutine edges_of(problem, state, edges)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> State
     type(contact_state_t), intent(in) :: state
     !> Its edges
-    type(contact_edges_t), intent(out) :: edges
+    type(edges_by_rows_t), intent(out) :: edges
     type(lattice_t) :: here
 
     ! lengths do not depend on where the window lies and how it grew, not even in their last digit
     here = problem%lattice
     here%first = 0
     here%origin = 0.0_wp
-    call new_contact_edges(edges, here, state%pressure, state%gap, state%zone /= separated, &
-                           logical(problem%candidate), problem%options%edges)
+    call new_edges_by_rows(edges, here, state, logical(problem%candidate), problem%space, problem%options%edges)
   end subroutine edges_of
 
   !> Find the edge of the stick area of a state.
-  pure function stick_edge_of(edges, friction, state) result(edge)
+  function stick_edge_of(edges, friction, state) result(edge)
     !> Edges of the contact
-    type(contact_edges_t), intent(in) :: edges
+    type(edges_by_rows_t), intent(in) :: edges
     !> Friction law
     class(friction_law_t), intent(in) :: friction
     !> State
@@ -146,12 +145,12 @@ contains
   end function stick_edge_of
 
   !> Compute the stick area of a state [m^2].
-  pure real(wp) function stick_area(problem, state)
+  real(wp) function stick_area(problem, state)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> State
     type(contact_state_t), intent(in) :: state
-    type(contact_edges_t) :: edges
+    type(edges_by_rows_t) :: edges
     type(zone_edge_t) :: edge
 
     call edges_of(problem, state, edges)

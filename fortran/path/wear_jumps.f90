@@ -6,15 +6,16 @@
 !> second order:
 !>
 !>     call energy_ahead(cycle, ..., cycles, ..., energy)
-!>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
+!>     call wear_by(energy, coefficient, friction, cycles, depth)
 !>     call jump_change(lattice, medium, law, two_jumps_t(energy, that of the second jump, that of one jump of both, cycles), ...)
 !>
 !> Equations: docs/theory/wear.md, (V1) to (V6), (V9).
 module hc_wear_jumps
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp, sp, lk
   use hc_options, only: step_options_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_contact_residuals, only: normal_self_compliance
   use hc_step_error, only: step_change_t
   implicit none
@@ -54,7 +55,7 @@ contains
   end function archard_depth
 
   !> Wear the surfaces by cycles that are all alike, (V3).
-  pure subroutine wear_by(energy, coefficient, friction, cycles, area, depth, volume)
+  pure subroutine wear_by(energy, coefficient, friction, cycles, depth)
     !> Dissipated energy of a cycle by area (n_col, n_row) [J/m^2]
     real(wp), intent(in) :: energy(:, :)
     !> Coefficient of wear [m^2/N]
@@ -63,15 +64,10 @@ contains
     real(wp), intent(in) :: friction(:, :)
     !> Number of cycles
     real(wp), intent(in) :: cycles
-    !> Area of a node [m^2]
-    real(wp), intent(in) :: area
     !> Worn depth (n_col, n_row) [m]
     real(wp), intent(inout) :: depth(:, :)
-    !> Worn volume [m^3]
-    real(wp), intent(out) :: volume
 
     depth = depth + cycles*archard_depth(energy, coefficient, friction)
-    volume = area*sum(depth)
   end subroutine wear_by
 
   !> Bound the change of the wear of a cycle by further repetitions, over the largest of a node, (V9).
@@ -79,7 +75,7 @@ contains
   !> Changes fade like 1/n**2 in the n-th repetition, which leaves n times the last one; n follows from the last two. A
   !> geometric series leaves less. Before the third cycle the bound follows from the shear tractions, which are back where
   !> they were when a cycle is closed.
-  pure real(wp) function wear_left(energies, traction, pressure, friction) result(left)
+  real(wp) function wear_left(energies, traction, pressure, friction, space) result(left)
     !> Dissipated energy of the last cycles, at most three, by area (n_col, n_row, :) [J/m^2]
     real(wp), intent(in) :: energies(:, :, :)
     !> Shear tractions at the beginning and at the end of the last cycle (n_col, n_row, 2, 2) [Pa]
@@ -88,25 +84,27 @@ contains
     real(wp), intent(in) :: pressure(:, :)
     !> Coefficient of friction (n_col, n_row)
     real(wp), intent(in) :: friction(:, :)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     type(step_options_t) :: options
     real(wp), allocatable :: depth(:, :, :)
     real(wp) :: first, last
 
     associate (n => size(energies, 3))
-      left = options%closing_gain*sum(norm2(traction(:, :, :, 2) - traction(:, :, :, 1), dim=3)) &
-             /max(sum(friction*pressure, mask=energies(:, :, n) > 0.0_wp), tiny(1.0_wp))
+      left = options%closing_gain*space%sum(norm2(traction(:, :, :, 2) - traction(:, :, :, 1), dim=3)) &
+             /max(space%sum(friction*pressure, logical(energies(:, :, n) > 0.0_wp, lk)), tiny(1.0_wp))
       if (n < 3) return
       depth = archard_depth(energies, 1.0_wp, spread(friction, 3, n))
-      first = maxval(abs(depth(:, :, n - 1) - depth(:, :, n - 2)))
-      last = maxval(abs(depth(:, :, n) - depth(:, :, n - 1)))
-      left = options%closing_safety*last/max(maxval(depth(:, :, n)), tiny(1.0_wp)) &
+      first = space%max(abs(depth(:, :, n - 1) - depth(:, :, n - 2)))
+      last = space%max(abs(depth(:, :, n) - depth(:, :, n - 1)))
+      left = options%closing_safety*last/max(space%max(depth(:, :, n)), tiny(1.0_wp)) &
              /(1.0_wp - min(last/max(first, tiny(1.0_wp)), options%slowest_closing))
     end associate
   end function wear_left
 
   !> Compare two jumps with one of both, (V6): difference of the depth, and its root mean square over the indentation of one node
   !> by the largest pressure, in place of the tractions that a step adds.
-  subroutine jump_change(lattice, medium, law, jumps, p_max, slower, change)
+  subroutine jump_change(lattice, medium, law, jumps, p_max, slower, change, space)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
     !> The two bodies
@@ -121,12 +119,14 @@ contains
     real(wp), intent(out) :: slower(:, :)
     !> The change for hc_step_control
     type(step_change_t), intent(out) :: change
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     type(step_options_t) :: options
 
     associate (first => jumps%first, second => jumps%second, both => jumps%both)
       slower = jumps%cycles*archard_depth((first - both) + (second - both), law%coefficient, law%friction)
-      associate (n_wearing => count(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp))
-        if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(slower**2)/n_wearing) &
+      associate (n_wearing => space%count(logical(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp, lk)))
+        if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(space%sum(slower**2)/n_wearing) &
                                                                 /(normal_self_compliance(lattice, medium)*p_max)
       end associate
     end associate

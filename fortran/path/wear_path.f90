@@ -282,7 +282,7 @@ contains
     jump = until - self%cycle%cycles
     area = solver%problem%lattice%cell_area()
     self%next%worn = self%cycle%worn
-    call wear_by(energy, self%coefficient, self%friction, jump, area, self%next%worn, self%volume)
+    call wear_by(energy, self%coefficient, self%friction, jump, self%next%worn)
     call solver%wear(self%next%worn)
     allocate (self%next%state)
     associate (before => self%cycle, sums => self%next%state)
@@ -290,7 +290,7 @@ contains
       self%next%change = before%change
       sums%accumulated_slip = before%state%accumulated_slip + jump*before%path
       sums%dissipation_density = before%state%dissipation_density + jump*energy
-      sums%dissipated_energy = before%state%dissipated_energy + jump*area*sum(energy)
+      sums%dissipated_energy = before%state%dissipated_energy + jump*area*solver%problem%space%sum(energy)
       sums%path_error = before%state%path_error
       self%jumped = jump
       self%state = before%state
@@ -332,7 +332,7 @@ contains
     if (allocated(error)) return
     if (self%grows .and. reached%clipped) then
       self%verdict = outgrown
-      self%larger = grown_window(solver%problem%lattice, reached%zone /= separated)
+      self%larger = grown_window(solver%problem%lattice, reached%zone /= separated, solver%problem%space)
     else if (.not. reached%converged) then
       self%verdict = failed
     end if
@@ -382,7 +382,7 @@ contains
       if (allocated(error) .or. self%verdict == pending) return
       call move_alloc(self%next, self%cycle)
     end if
-    call self%measure(solver%problem%lattice%cell_area())
+    call self%measure(solver%problem)
   end subroutine end_cycle
 
   !> Decide whether the unworn cycle is closed, (V9), and choose the first pair of jumps: the wear of each is the indentation of a
@@ -399,7 +399,7 @@ contains
     real(wp), allocatable :: energies(:, :, :), slower(:, :), traction(:, :, :, :)
     integer :: extent(2)
 
-    if (.not. any(abs(self%next%energy) > 0.0_wp)) then
+    if (.not. problem%space%max(abs(self%next%energy)) > 0.0_wp) then
       call raise(error, status%invalid_input, 'no node slips in this cycle, so that nothing wears')
       return
     end if
@@ -409,7 +409,7 @@ contains
       if (self%unworn >= 1) energies = reshape([self%last, energies], [extent, 2])
       if (self%unworn >= 2) energies = reshape([self%last_but_one, energies], [extent, 3])
       traction = reshape([before%state%traction, after%state%traction], [extent, 2, 2])
-      self%left = wear_left(energies, traction, after%state%pressure, self%friction)
+      self%left = wear_left(energies, traction, after%state%pressure, self%friction, problem%space)
       if (self%unworn >= 1) then
         self%last_but_one = self%last
         call add_sums(before%state, after%state)
@@ -428,7 +428,8 @@ contains
     jumps%both = 0.0_wp
     jumps%cycles = 1.0_wp
     allocate (slower, mold=jumps%first)
-    call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
+    call jump_change(problem%lattice, self%medium, law, jumps, problem%space%max(self%cycle%state%pressure), slower, change, &
+                     problem%space)
     ! the first step of a segment is `most_growth` times as large
     self%control%first = 0.5_wp*min(1.0_wp, 1.0_wp/max(change%added*self%cycles, 1.0e-300_wp))
   end subroutine close_cycle
@@ -455,7 +456,8 @@ contains
     jumps%both = self%both
     allocate (slower, self%next%ahead, mold=jumps%first)
     law = wear_law_t(self%coefficient, self%friction)
-    call jump_change(problem%lattice, self%medium, law, jumps, maxval(self%cycle%state%pressure), slower, change)
+    call jump_change(problem%lattice, self%medium, law, jumps, problem%space%max(self%cycle%state%pressure), slower, change, &
+                     problem%space)
     call energy_of_second_jump(problem%lattice, self%medium, law, jumps, self%next%path, self%next%ahead)
     self%next%change = self%next%change + slower
     if (self%jump > 0.0_wp) return
@@ -486,7 +488,12 @@ contains
     type(worn_cycle_t) :: now
 
     pressed%space = space_over(problem%lattice%extent)
-    call require_memory(energy_ahead_memory(problem%lattice%extent, pressed%space%threads), error, pressed%space%threads)
+    pressed%space%ranks = problem%space%ranks
+    associate (ranks => pressed%space%ranks)
+      call require_memory(energy_ahead_memory(problem%lattice%extent, pressed%space%threads)/ranks%size*ranks%on_node, error, &
+                          pressed%space%threads)
+      call ranks%agree(error)
+    end associate
     if (allocated(error)) return
     now = worn_cycle_t(cycle%energy, cycle%path, cycle%state%pressure, merge(cycle%state%gap, 0.0_wp, problem%candidate), &
                        logical(problem%candidate), self%friction, self%steps(1)%target%control(normal) == force_control)
@@ -498,21 +505,23 @@ contains
   end subroutine energy_of_jump
 
   !> Compute volume, largest depth and the bound on its error after a cycle.
-  pure subroutine measure(self, area)
+  subroutine measure(self, problem)
     class(wear_path_t), intent(inout) :: self
-    !> Area of a node [m^2]
-    real(wp), intent(in) :: area
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
 
-    self%volume = area*sum(self%cycle%worn)
-    self%deepest = maxval(self%cycle%worn)
-    self%depth_error = depth_safety*maxval(abs(self%cycle%change)) + self%left*self%deepest
+    associate (space => problem%space)
+      self%volume = problem%lattice%cell_area()*space%sum(self%cycle%worn)
+      self%deepest = space%max(self%cycle%worn)
+      self%depth_error = depth_safety*space%max(abs(self%cycle%change)) + self%left*self%deepest
+    end associate
   end subroutine measure
 
   !> Return the coefficient of friction of each node: its bound under a pressure of 1.
   pure function nodal_coefficients(problem) result(coefficient)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
-    real(wp) :: coefficient(problem%lattice%extent(1), problem%lattice%extent(2)), one(problem%lattice%extent(1))
+    real(wp) :: coefficient(problem%lattice%extent(1), problem%own_rows()), one(problem%lattice%extent(1))
     integer :: row
 
     one = 1.0_wp
@@ -588,12 +597,12 @@ contains
     associate (larger => solver%problem%lattice)
       call carry_fields(self%cycle)
       call carry_fields(self%next)
-      call embed(lattice, larger, self%next%state%accumulated_slip)
-      call embed(lattice, larger, self%next%state%dissipation_density)
-      call embed(lattice, larger, self%first)
-      call embed(lattice, larger, self%both)
-      call embed(lattice, larger, self%last)
-      call embed(lattice, larger, self%last_but_one)
+      call embed(lattice, larger, solver%problem%space, self%next%state%accumulated_slip)
+      call embed(lattice, larger, solver%problem%space, self%next%state%dissipation_density)
+      call embed(lattice, larger, solver%problem%space, self%first)
+      call embed(lattice, larger, solver%problem%space, self%both)
+      call embed(lattice, larger, solver%problem%space, self%last)
+      call embed(lattice, larger, solver%problem%space, self%last_but_one)
     end associate
     self%friction = nodal_coefficients(solver%problem)
     ! the last solutions are of the smaller window
@@ -616,11 +625,11 @@ contains
       type(wear_cycle_t), intent(inout) :: cycle
 
       associate (larger => solver%problem%lattice)
-        call embed(lattice, larger, cycle%worn)
-        call embed(lattice, larger, cycle%change)
-        call embed(lattice, larger, cycle%energy)
-        call embed(lattice, larger, cycle%path)
-        call embed(lattice, larger, cycle%ahead)
+        call embed(lattice, larger, solver%problem%space, cycle%worn)
+        call embed(lattice, larger, solver%problem%space, cycle%change)
+        call embed(lattice, larger, solver%problem%space, cycle%energy)
+        call embed(lattice, larger, solver%problem%space, cycle%path)
+        call embed(lattice, larger, solver%problem%space, cycle%ahead)
       end associate
     end subroutine carry_fields
 

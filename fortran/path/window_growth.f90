@@ -12,7 +12,7 @@ module hc_window_growth
   implicit none
   private
 
-  public :: grown_window, shared_grown_window, embed, extend_state
+  public :: grown_window, embed, extend_state
 
   !> Share of its columns or rows by which a window grows on a side, and the fewest that it grows by.
   real(wp), parameter :: growth = 0.25_wp
@@ -21,18 +21,7 @@ module hc_window_growth
 contains
 
   !> Return a window with more nodes on each side that a contact reaches.
-  pure type(lattice_t) function grown_window(lattice, contact) result(larger)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes in contact (n_col, n_row)
-    logical, intent(in) :: contact(:, :)
-
-    larger = grown_on(lattice, [any(contact(1, :)), any(contact(:, 1)), any(contact(size(contact, 1), :)), &
-                                any(contact(:, size(contact, 2)))])
-  end function grown_window
-
-  !> Return a window as `grown_window` for a contact whose rows several ranks share.
-  type(lattice_t) function shared_grown_window(lattice, contact, space) result(larger)
+  type(lattice_t) function grown_window(lattice, contact, space) result(larger)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Nodes in contact (n_col, own rows)
@@ -47,7 +36,7 @@ contains
     end associate
     call space%ranks%add_counts(reached)
     larger = grown_on(lattice, reached > 0)
-  end function shared_grown_window
+  end function grown_window
 
   !> Return a window with more nodes at the left, lower, right and upper side.
   pure type(lattice_t) function grown_on(lattice, sides) result(larger)
@@ -64,21 +53,44 @@ contains
   end function grown_on
 
   !> Put a field of a smaller window on a larger one; its new nodes have 0.
-  pure subroutine embed(lattice, larger, field)
+  subroutine embed(lattice, larger, space, field)
     !> The smaller and the larger window
     type(lattice_t), intent(in) :: lattice, larger
-    !> The field (n_col, n_row)
+    !> Space of the fields of the larger window
+    type(field_space_t), intent(in) :: space
+    !> The field (n_col, own rows)
     real(wp), allocatable, intent(inout) :: field(:, :)
-    real(wp), allocatable :: small(:, :)
-    integer :: low(2), high(2)
+    real(wp), allocatable :: grown(:, :)
 
     if (.not. allocated(field)) return
-    call move_alloc(field, small)
-    low = lattice%first - larger%first + 1
-    high = low + lattice%extent - 1
-    allocate (field(larger%extent(1), larger%extent(2)), source=0.0_wp)
-    field(low(1):high(1), low(2):high(2)) = small
+    associate (n => space%own_extent(larger%extent))
+      allocate (grown(n(1), n(2)), source=0.0_wp)
+    end associate
+    call put(lattice, larger, space, field, grown)
+    call move_alloc(grown, field)
   end subroutine embed
+
+  !> Set a field at the nodes of a smaller window.
+  subroutine put(lattice, larger, space, field, grown)
+    !> The smaller and the larger window, and space of the fields of this one
+    type(lattice_t), intent(in) :: lattice, larger
+    type(field_space_t), intent(in) :: space
+    !> Field there (n_col, own rows of the smaller window), and on the larger one (n_col, own rows)
+    real(wp), intent(in), contiguous :: field(:, :)
+    real(wp), intent(inout), contiguous :: grown(:, :)
+    type(field_space_t) :: before
+    real(wp), allocatable :: rows(:, :)
+    integer :: low(2), own(2), wanted(2)
+
+    before%ranks = space%ranks%over(lattice%extent)
+    low = lattice%first - larger%first
+    own = space%own_rows(larger%extent(2))
+    ! own rows of the larger window that the smaller one has
+    wanted = [max(own(1), low(2) + 1), min(own(2), low(2) + lattice%extent(2))]
+    allocate (rows(lattice%extent(1), max(wanted(2) - wanted(1) + 1, 0)))
+    call before%fetch(lattice%extent(2), field, wanted(1) - low(2), rows)
+    grown(low(1) + 1:low(1) + size(rows, 1), wanted(1) - own(1) + 1:wanted(1) - own(1) + size(rows, 2)) = rows
+  end subroutine put
 
   !> Extend a state of a smaller window to that of a solver.
   subroutine extend_state(solver, lattice, state, extended, error)
@@ -92,34 +104,52 @@ contains
     type(contact_state_t), intent(out) :: extended
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: moved(:, :, :)
-    integer :: low(2), high(2)
+    real(wp), allocatable :: moved(:, :, :), zone(:, :)
+    integer :: m
 
-    low = lattice%first - solver%problem%lattice%first + 1
-    high = low + lattice%extent - 1
     extended = state
     deallocate (extended%pressure, extended%gap, extended%zone, extended%traction, extended%relative_displacement, &
                 extended%accumulated_slip, extended%dissipation_density)
     if (allocated(extended%slip_increment)) deallocate (extended%slip_increment)
-    call add_fields(extended, solver%problem%lattice, solver%problem%space)
-    call add_history(extended)
-    extended%pressure(low(1):high(1), low(2):high(2)) = state%pressure
-    extended%traction(low(1):high(1), low(2):high(2), :) = state%traction
-    extended%gap = solver%problem%initial_gap
-    if (any(state%pressure > 0.0_wp) .or. any(abs(state%motion) > 0.0_wp)) then
-      allocate (moved(size(extended%gap, 1), size(extended%gap, 2), 3))
-      call solver%displacements(extended%pressure, extended%traction, moved, error)
-      if (allocated(error)) return
-      extended%gap = extended%gap + (moved(:, :, 1) - state%motion(normal))
-      extended%relative_displacement = moved(:, :, 2:) - solver%problem%rigid_displacement(state%motion)
-    end if
-    extended%gap(low(1):high(1), low(2):high(2)) = state%gap
-    where (.not. solver%problem%candidate) extended%gap = 0.0_wp
-    extended%zone(low(1):high(1), low(2):high(2)) = state%zone
-    extended%relative_displacement(low(1):high(1), low(2):high(2), :) = state%relative_displacement
-    extended%accumulated_slip(low(1):high(1), low(2):high(2)) = state%accumulated_slip
-    extended%dissipation_density(low(1):high(1), low(2):high(2)) = state%dissipation_density
+    associate (problem => solver%problem)
+      call add_fields(extended, problem%lattice, problem%space)
+      call add_history(extended)
+      call put_field(state%pressure, extended%pressure)
+      do m = 1, 2
+        call put_field(state%traction(:, :, m), extended%traction(:, :, m))
+      end do
+      extended%gap = problem%initial_gap
+      if (problem%space%max(extended%pressure) > 0.0_wp .or. any(abs(state%motion) > 0.0_wp)) then
+        allocate (moved(size(extended%gap, 1), size(extended%gap, 2), 3))
+        call solver%displacements(extended%pressure, extended%traction, moved, error)
+        if (allocated(error)) return
+        extended%gap = extended%gap + (moved(:, :, 1) - state%motion(normal))
+        extended%relative_displacement = moved(:, :, 2:) - problem%rigid_displacement(state%motion)
+        deallocate (moved)
+      end if
+      call put_field(state%gap, extended%gap)
+      where (.not. problem%candidate) extended%gap = 0.0_wp
+      allocate (zone, source=0.0_wp*extended%gap)
+      call put_field(real(state%zone, wp), zone)
+      extended%zone = nint(zone)
+      do m = 1, 2
+        call put_field(state%relative_displacement(:, :, m), extended%relative_displacement(:, :, m))
+      end do
+      call put_field(state%accumulated_slip, extended%accumulated_slip)
+      call put_field(state%dissipation_density, extended%dissipation_density)
+    end associate
     extended%clipped = .false.
+
+  contains
+
+    !> Set a field at the nodes of the smaller window.
+    subroutine put_field(field, grown)
+      real(wp), intent(in), contiguous :: field(:, :)
+      real(wp), intent(inout), contiguous :: grown(:, :)
+
+      call put(lattice, solver%problem%lattice, solver%problem%space, field, grown)
+    end subroutine put_field
+
   end subroutine extend_state
 
 end module hc_window_growth

@@ -40,7 +40,11 @@ module hc_f2py_handles
     !> Bytes that a call may take
     integer(c_int64_t) :: working = 0
     type(lattice_t) :: lattice
+    !> Columns and rows of the arrays: those of the window, or own rows of a problem that ranks share
+    integer :: extent(2) = 0
     type(field_space_t) :: space
+    !> Ranks that call procedures of a problem with friction together
+    type(communicator_t) :: ranks = communicator_t()
     class(flexibility_t), pointer :: operator => null()
     !> Solvers without and with friction
     class(contact_solver_t), pointer :: pressed => null()
@@ -217,11 +221,12 @@ contains
     else if (busy) then
       call raise(error, status%bad_handle, 'the object is at work in another thread')
     else
-      if (any(slot%lattice%extent /= extent)) then
+      if (any(slot%extent /= extent)) then
         call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
       else
         call require_memory(slot%working, error, slot%space%threads)
       end if
+      if (associated(slot%sheared)) call slot%ranks%agree(error)
       if (allocated(error)) call leave(slot)
     end if
   end subroutine enter

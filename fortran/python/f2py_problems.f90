@@ -1,7 +1,6 @@
 !> Operators, contact problems and states for Python: set-up, with checks of memory, and fields of states.
 module hc_f2py_problems
   use, intrinsic :: iso_c_binding, only: c_int64_t, c_intptr_t, c_loc
-  use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_memory, only: require_memory
@@ -21,12 +20,11 @@ module hc_f2py_problems
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
-  use hc_shared_friction, only: shared_friction_t, new_shared_friction
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_pressed_part, new_sheared, follow_sheared, secure_fields, entry_fields, wear_fields
+  public :: new_operator, new_pressed, new_pressed_part, new_sheared, sheared_options_t, secure_fields, entry_fields, wear_fields
   public :: new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
@@ -35,6 +33,15 @@ module hc_f2py_problems
   integer(c_int64_t), parameter :: dense_fields = 500
   !> Fields that the entry of nodes takes, and those of a cycle of wear with its states
   integer, parameter :: entry_fields = 45, wear_fields = 60
+
+  !> How a problem with friction is solved.
+  type :: sheared_options_t
+    !> Shear tractions do not move the pressure
+    logical :: goodman = .false.
+    !> All ranks call its procedures together, each with its rows of the arrays or all with all of them
+    logical :: shared = .false.
+    integer :: threads = 0
+  end type sheared_options_t
 
 contains
 
@@ -51,6 +58,7 @@ contains
     call take_slot(slot, handle, error)
     if (allocated(error)) return
     slot%lattice = lattice
+    slot%extent = lattice%extent
     slot%space = field_space_t()
     ! the constructors refuse another number
     if (threads < 0 .or. threads > most_threads) return
@@ -168,61 +176,50 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_pressed_part
 
-  !> Create a contact problem with friction: by FFT on all ranks, of which the first one has gap and candidates.
-  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, goodman, threads, wake, handle, error)
-    integer, intent(in) :: method, threads
+  !> Create a contact problem with friction.
+  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, options, handle, error)
+    integer, intent(in) :: method
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
-    !> Gap before loading [m]
+    !> Gap before loading (n_col, n_row or own rows) [m]
     real(wp), intent(in) :: gap(:, :)
-    !> Nodes that may come into contact
+    !> Nodes that may come into contact (n_col, n_row or own rows)
     logical, intent(in) :: candidate(:, :)
     class(friction_law_t), intent(in) :: friction
     class(normal_law_t), intent(in) :: law
-    !> Shear tractions do not move the pressure
-    logical, intent(in) :: goodman
-    !> Words that let the other ranks follow a call of the first one
-    integer(int32), intent(in) :: wake(:)
+    type(sheared_options_t), intent(in) :: options
     !> Handle of the problem
     integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks that share the problem
     type(error_t), allocatable, intent(out) :: error
     type(slot_t), pointer :: slot
-    type(field_space_t) :: space
     type(friction_problem_t) :: problem
     type(windowed_friction_t), pointer :: fft
-    type(shared_friction_t), pointer :: shared
     type(direct_friction_t), pointer :: dense
-    real(wp), allocatable :: own_gap(:, :)
-    type(communicator_t) :: sharing
+    type(field_space_t) :: space
+    type(communicator_t) :: together
     integer(c_int64_t) :: bytes
-    logical :: is_shared
 
-    is_shared = method == fft_based .and. ranks%size > 1
-    space = space_over(lattice%extent, threads)
+    if (options%shared) together = ranks
+    space = space_over(lattice%extent, options%threads)
+    if (size(gap, 2) < lattice%extent(2)) space%ranks = together%over(lattice%extent)
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
-    if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. goodman, &
+    if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. options%goodman, &
                                                               space%threads, spectra_of(bodies), lattice%is_periodic())
-    sharing = ranks%over(lattice%extent)
-    if (is_shared) bytes = bytes/sharing%size*ranks%on_node
-    call take_window(lattice, bytes, threads, slot, handle, error)
-    if (.not. allocated(error) .and. is_shared .and. ranks%rank > 0) then
-      allocate (own_gap(lattice%extent(1), lattice%extent(2)), source=0.0_wp)
-      call new_friction_problem(problem, slot%lattice, bodies, own_gap, own_gap < 1.0_wp, friction, goodman, error, law)
-      deallocate (own_gap)
-    else if (.not. allocated(error)) then
-      call new_friction_problem(problem, slot%lattice, bodies, gap, candidate, friction, goodman, error, law)
-    end if
-    if (is_shared) call ranks%agree(error)
+    call take_window(lattice, bytes/space%ranks%size*together%on_node, options%threads, slot, handle, error)
+    if (.not. allocated(error)) call new_friction_problem(problem, lattice, bodies, gap, candidate, friction, options%goodman, &
+                                                          error, law, space)
+    call together%agree(error)
     if (.not. allocated(error)) then
-      if (is_shared) then
-        allocate (shared)
-        slot%sheared => shared
-        call new_shared_friction(shared, problem, error, threads, kernel_cache, ranks, wake)
-      else if (method == fft_based) then
+      slot%ranks = together
+      slot%space%ranks = space%ranks
+      slot%extent = shape(gap)
+      if (method == fft_based) then
         allocate (fft)
         slot%sheared => fft
-        call new_windowed_friction(fft, problem, error, threads, kernel_cache)
+        call new_windowed_friction(fft, problem, error, options%threads, kernel_cache, together)
+        call together%agree(error)
       else
         allocate (dense)
         slot%sheared => dense
@@ -233,19 +230,6 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_sheared
 
-  !> Take part in a call of the first rank, of a problem with friction.
-  subroutine follow_sheared(solver, error)
-    class(friction_solver_t), intent(inout) :: solver
-    type(error_t), allocatable, intent(out) :: error
-
-    select type (solver)
-    type is (shared_friction_t)
-      call solver%follow(error)
-    class default
-      call raise(error, status%bad_handle, 'the problem is not one of several ranks')
-    end select
-  end subroutine follow_sheared
-
   !> Refuse a load step if there is no memory for further fields beside the solution.
   subroutine secure_fields(slot, n_field, error)
     type(slot_t), intent(in) :: slot
@@ -253,7 +237,9 @@ contains
     integer, intent(in) :: n_field
     type(error_t), allocatable, intent(out) :: error
 
-    call require_memory(slot%working + int(n_field, c_int64_t)*8*slot%lattice%size(), error, slot%space%threads)
+    call require_memory(slot%working + int(n_field, c_int64_t)*8*product(slot%extent)*slot%ranks%on_node, error, &
+                        slot%space%threads)
+    call slot%ranks%agree(error)
   end subroutine secure_fields
 
   !> Make a state with some numbers, and fields that are not set.

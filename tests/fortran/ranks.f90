@@ -15,17 +15,15 @@ module ranks_tests
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
-  use hc_contact_edges, only: contact_edges_t
+  use hc_edges_by_rows, only: edges_by_rows_t
   use hc_state_measures, only: state_measures_t, measure_contact, rises_to_end
-  use hc_window_growth, only: grown_window, shared_grown_window
+  use hc_window_growth, only: grown_window
   use hc_coulomb, only: coulomb_t
   use hc_orthotropic_coulomb, only: orthotropic_coulomb_t
   use hc_friction_law, only: friction_law_t
   use hc_rolling, only: rolling_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
-  use hc_shared_friction, only: shared_friction_t, new_shared_friction
-  use hc_spectrum_cache, only: kernel_cache_t
   use hc_load_path, only: advance, step_settings_t
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   use testing, only: test_t, new_test, check, check_true
@@ -36,8 +34,6 @@ module ranks_tests
 
   real(wp), parameter :: two_pi = 2.0_wp*pi
 
-  !> Words of the first rank: to take part in a call, or that there is none any more
-  integer(int32), parameter :: to_follow = 1, to_end = 2
   !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
 
@@ -303,19 +299,19 @@ contains
     integer, intent(in) :: rows(2)
     type(error_t), allocatable, intent(out) :: error
     type(state_measures_t) :: of_all, of_parts
-    type(contact_edges_t) :: edges
+    type(edges_by_rows_t) :: edges
     type(field_space_t) :: space
     type(lattice_t) :: grown, grown_from_parts
     logical :: rises, rise_in_parts
 
     call measure_contact(lattice, gap, candidate, expected, space, of_all, edges)
     rises = rises_to_end(merge(1.0_wp, 0.0_wp, candidate), expected%pressure, space, lattice%extent(2))
-    grown = grown_window(lattice, expected%zone > 0)
+    grown = grown_window(lattice, expected%zone > 0, space)
     space%ranks = ranks
     call measure_contact(lattice, gap(:, rows(1):rows(2)), candidate(:, rows(1):rows(2)), found, space, of_parts, edges)
     rise_in_parts = rises_to_end(merge(1.0_wp, 0.0_wp, candidate(:, rows(1):rows(2))), found%pressure, space, &
                                  lattice%extent(2))
-    grown_from_parts = shared_grown_window(lattice, found%zone > 0, space)
+    grown_from_parts = grown_window(lattice, found%zone > 0, space)
     call check(error, [of_parts%contact%area_error, of_parts%mean_gap, of_parts%elastic_energy], &
                [of_all%contact%area_error, of_all%mean_gap, of_all%elastic_energy], 0.0_wp, 'measures of windows that repeat')
     if (allocated(error) .or. lattice%is_periodic()) return
@@ -468,74 +464,63 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(elastic_pair_t) :: pair
-    type(friction_problem_t) :: problem
-    type(windowed_friction_t) :: alone
-    type(shared_friction_t) :: shared
-    type(kernel_cache_t), target :: spectra
-    type(kernel_cache_t), pointer :: cache
-    type(contact_state_t) :: start, expected, found
+    type(friction_problem_t) :: problem, part
+    type(windowed_friction_t) :: alone, shared
+    type(contact_state_t) :: start, begun, expected, found
     type(load_target_t) :: target
+    type(field_space_t) :: space
     real(wp) :: gap(n, n - 3), p_max
-    integer :: step, n_step
+    integer :: step, n_step, rows(2)
 
     call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(merge(70.0e9_wp, 210.0e9_wp, unlike), 0.3_wp), error)
     if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n - 3], error)
     if (allocated(error)) return
     lattice%periodic = periodic
     call sphere(lattice, gap)
+    space%ranks = ranks
+    rows = space%own_rows(n - 3)
     call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), law, .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
-    cache => spectra
-    if (.not. allocated(error)) call new_shared_friction(shared, problem, error, 1, cache, ranks, [to_follow])
+    associate (own => gap(:, rows(1):rows(2)))
+      if (.not. allocated(error)) call new_friction_problem(part, lattice, pair, own, own < huge(gap), law, .false., error, &
+                                                            space=space)
+    end associate
+    if (.not. allocated(error)) call new_windowed_friction(shared, part, error, 1, ranks=ranks)
     if (allocated(error)) return
-    if (ranks%rank > 0) then
-      call follow_first(shared, error)
-      return
-    end if
     call new_friction_state(start, lattice)
-    ! bodies of like materials also roll along rows
-    n_step = merge(3, 2, n == 40 .and. .not. (unlike .or. periodic))
+    call new_friction_state(begun, lattice, space)
+    ! bodies of like materials also roll along rows, in the steady state and by a spacing, then across rows
+    n_step = merge(5, 2, n == 40 .and. .not. (unlike .or. periodic))
     do step = 1, n_step
       target%value(:2) = [30.0_wp, merge(0.0_wp, 4.0_wp, step == 1)]
-      if (step == 3) target%rolling = rolling_t([1, 0], .true.)
+      if (step >= 3) target%rolling = rolling_t(merge([1, 0], [0, 1], step < 5), step == 3)
       call advance(alone, start, target, step_settings_t(1.0e-12_wp), expected, error)
-      if (.not. allocated(error)) call advance(shared, start, target, step_settings_t(1.0e-12_wp), found, error)
-      if (step == n_step .or. allocated(error)) call ranks%tell([to_end])
+      if (.not. allocated(error)) call advance(shared, begun, target, step_settings_t(1.0e-12_wp), found, error)
       if (allocated(error)) return
       call check_true(error, expected%converged .and. found%converged, 'converged')
       if (allocated(error)) return
       p_max = maxval(expected%pressure)
-      call check(error, maxval(abs(found%pressure - expected%pressure))/p_max, 0.0_wp, 1.0e-10_wp, 'pressure')
+      call check(error, maxval(abs(found%pressure - expected%pressure(:, rows(1):rows(2))))/p_max, 0.0_wp, 1.0e-10_wp, 'pressure')
       if (allocated(error)) return
-      call check(error, maxval(abs(found%traction - expected%traction))/p_max, 0.0_wp, 1.0e-10_wp, 'traction')
+      call check(error, maxval(abs(found%traction - expected%traction(:, rows(1):rows(2), :)))/p_max, 0.0_wp, 1.0e-10_wp, &
+                 'traction')
       if (allocated(error)) return
-      call check_true(error, all(found%zone == expected%zone), 'zones')
+      call check_true(error, all(found%zone == expected%zone(:, rows(1):rows(2))), 'zones')
       if (allocated(error)) return
       call check(error, found%load(:3), expected%load(:3), 1.0e-9_wp, 'loads')
+      if (allocated(error)) return
+      call check(error, [found%dissipated_energy, found%path_error], [expected%dissipated_energy, expected%path_error], &
+                 1.0e-8_wp, 'energies')
+      if (allocated(error)) return
+      call check(error, maxval(abs(found%accumulated_slip - expected%accumulated_slip(:, rows(1):rows(2)))), 0.0_wp, &
+                 1.0e-8_wp*maxval(expected%accumulated_slip) + tiny(p_max), 'slip')
       if (allocated(error)) return
       call check_true(error, any(expected%zone == 1) .or. step == 1, 'stick')
       if (allocated(error)) return
       start = expected
+      begun = found
     end do
   end subroutine shear_sphere
-
-  !> Take part in the calls of the first rank.
-  subroutine follow_first(shared, error)
-    type(shared_friction_t), intent(inout) :: shared
-    type(error_t), allocatable, intent(out) :: error
-    integer(int32), allocatable :: words(:)
-    integer :: n
-
-    do
-      call ranks%wait_for_words(n)
-      if (allocated(words)) deallocate (words)
-      allocate (words(n))
-      call ranks%hear(words)
-      if (words(1) == to_end) return
-      call shared%follow(error)
-      if (allocated(error)) return
-    end do
-  end subroutine follow_first
 
   !> Waves that repeat, on even and odd numbers of rows; even ones have a coarser lattice, too.
   subroutine test_waves(error)

@@ -195,7 +195,7 @@ contains
     if (allocated(error)) return
     call check(error, edge%radius(), sqrt(edge%area/pi), 1.0e-12_wp, 'its radius')
     if (allocated(error)) return
-    call check(error, edge%length(), 2.0_wp*pi*(outer + inner), 0.04_wp, 'length of its edges')
+    call check(error, edge%length, 2.0_wp*pi*(outer + inner), 0.04_wp, 'length of its edges')
     if (allocated(error)) return
     associate (r => norm2(edge%segments, dim=1))
       call check_true(error, maxval(min(abs(r - outer), abs(r - inner))) < 0.052_wp, 'its edges are circles')

@@ -186,7 +186,7 @@ contains
   end subroutine free_slip
 
   !> Look up an operator or a problem and mark it as in use.
-  subroutine enter(handle, kind, extent, slot, error)
+  subroutine enter(handle, kind, extent, slot, error, together)
     !> Its handle
     integer(c_int64_t), intent(in) :: handle
     !> Name of the pointer to it
@@ -197,6 +197,8 @@ contains
     type(slot_t), pointer, intent(out) :: slot
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> The ranks that share the object call this together, and all of them fail, or none
+    logical, intent(in), optional :: together
     logical :: busy, fits
     integer :: place
 
@@ -226,7 +228,7 @@ contains
       else
         call require_memory(slot%working, error, slot%space%threads)
       end if
-      if (associated(slot%sheared)) call slot%ranks%agree(error)
+      if (present(together)) call slot%ranks%agree(error)
       if (allocated(error)) call leave(slot)
     end if
   end subroutine enter

@@ -348,13 +348,13 @@ def test_a_full_disk_between_two_ranks_ends_all(tmp_path: Path) -> None:
 # The disk is full after the rows of the first rank.
 FULL = """
 import errno, os
-import hexcontact.core.shared as shared
-taken = shared.SharedSolution.rows
-def rows(self, rank, *more):
+from hexcontact.core import ranks
+ask = ranks.ask
+def asked(rank, *arguments, **named):
     if rank == 1:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    return taken(self, rank, *more)
-shared.SharedSolution.rows = rows
+    return ask(rank, *arguments, **named)
+ranks.ask = asked
 """
 
 

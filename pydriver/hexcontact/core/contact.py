@@ -255,13 +255,15 @@ class Contact(Handle):
         initial_gap: ArrayLike,
         candidate: ArrayLike | None,
         rim_warning: bool,
+        own: Lattice | None = None,
     ) -> None:
         self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
-        self._mask: Mask = np.broadcast_to(True, lattice.shape)  # takes no memory
+        self.own = lattice if own is None else own  # the nodes of the arrays
+        self._mask: Mask = np.broadcast_to(True, self.own.shape)  # takes no memory
         if candidate is not None:
-            given = reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
+            given = reals(candidate, "candidate", self.own.shape, _SHAPE) != 0
             self._mask = self._mask if given.all() else given
-        gap = shaped(initial_gap, lattice, "initial_gap")
+        gap = shaped(initial_gap, self.own, "initial_gap")
         self._beyond = gap[~self._mask]  # of nodes that cannot touch
         gap = _finite(gap if self._mask.all() else np.where(self._mask, gap, 0.0), "initial_gap")
         # for the core, which keeps the only copy of the gap
@@ -276,7 +278,7 @@ class Contact(Handle):
 
     def _found(self, kind: type[S], handle: int) -> S:
         """Return the solution behind a handle, with views of its fields."""
-        held = HeldState(handle, self.lattice.shape)
+        held = HeldState(handle, self.own.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
         found |= {"zone": held.view("zone").astype(np.int8), "stopped": STOPPED[found["stopped"]]}
         names = [field.name for field in fields(kind)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ from .contact import (
     window_size,
 )
 from .flat import AdaptiveSteps
-from .handles import Handle, HeldState
+from .handles import HeldState
 from .lattice import Lattice
 
 Coupling = Literal["full", "goodman"]
@@ -184,6 +185,9 @@ class FrictionalContact(Contact):
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     iteration
         Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
+    own
+        Nodes of the arrays, of a problem that all ranks share and whose methods they call together: the rows
+        of this rank, or the lattice itself.
     """
 
     def __init__(
@@ -201,19 +205,15 @@ class FrictionalContact(Contact):
         threads: int = 0,
         interface: Interface = UNILATERAL,
         rim_warning: bool = True,
+        own: Lattice | None = None,
     ) -> None:
-        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        law = _checked_law(friction_coefficient, shear_limit, lattice)
-        _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
-        given = *self._surfaces, law, springs, coupling == "goodman", count
+        with contextlib.nullcontext() if own is None else ranks.agreed():
+            super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
+            law = _checked_law(friction_coefficient, shear_limit, lattice)
+            _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
+        given = *self._surfaces, law, springs, coupling == "goodman", own is not None, count
         del self._surfaces
-        wake = np.empty(0, np.int32)
-        if ranks.count > 1 and method == "fft":
-            number = ranks.numbered(self)
-            wake = ranks.wake(_follow, number)
-            # without arrays that the lattice keeps
-            ranks.others(_create_part, number, dataclasses.replace(lattice), *given[1:2], *given[4:])
-        self._create(flat.create_sheared, method_code(method, iteration), *given, wake)
+        self._create(flat.create_sheared, method_code(method, iteration), *given)
 
     initial_gap: Any = property(
         flat.gap_of_sheared, doc="Gap before loading and without wear (m), 0 where the bodies cannot touch."
@@ -221,10 +221,10 @@ class FrictionalContact(Contact):
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
-        gap, zero = self.initial_gap, np.broadcast_to(0.0, self.lattice.shape)
+        gap, zero = self.initial_gap, np.broadcast_to(0.0, self.own.shape)
         held = HeldState.copied(dict.fromkeys(_FIELDS, zero) | {"gap": gap, "zone": zero}, {})
         fields: dict[str, Any] = {name: held.view(name) for name in _FIELDS}
-        zone = np.zeros(self.lattice.shape, np.int8)
+        zone = np.zeros(self.own.shape, np.int8)
         return self._masked(ContactState(**fields, zone=zone).behind(held))
 
     def advance(
@@ -290,7 +290,7 @@ class FrictionalContact(Contact):
         strain = reals(kept if bulk_strain is None else bulk_strain, "bulk_strain", (3,))
         ahead = [0, 0] if rolling is None else rolling.ahead(self.lattice)
         if guess is not None:
-            flat.set_guess(self, np.reshape(guess[0], (3, *self.lattice.shape)), [*guess[1]])
+            flat.set_guess(self, np.reshape(guess[0], (3, *self.own.shape)), [*guess[1]])
         handle = self.called(
             *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
             *(entry == "interpolated", *limits),
@@ -364,12 +364,12 @@ class FrictionalContact(Contact):
 
     def _held(self, state: ContactState) -> HeldState:
         """Return a state in the memory of the core, which is no copy if it was found there."""
-        if state.known is not None and state.pressure.shape == self.lattice.shape:
+        if state.known is not None and state.pressure.shape == self.own.shape:
             return state.known
         known = numbers({name: getattr(state, name) for name in CORE["numbers"]})
-        gap = np.where(self._mask, shaped(state.gap, self.lattice, "gap"), 0.0)
+        gap = np.where(self._mask, shaped(state.gap, self.own, "gap"), 0.0)
         given = {name: getattr(state, name) for name in _FIELDS} | {"gap": gap}
-        fields = {name: checked_field(values, self.lattice, name) for name, values in given.items()}
+        fields = {name: checked_field(values, self.own, name) for name, values in given.items()}
         return HeldState.copied({**fields, "zone": np.asarray(state.zone)}, known)
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
@@ -397,24 +397,6 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
         return FrictionLaw(mu, limit)
     [found] = checked(friction_coefficient=coefficient)
     return FrictionLaw(found, limit)
-
-
-class _Part(Handle):
-    """The part of a problem with friction on a rank other than the first."""
-
-    def __init__(self, lattice: Lattice, *given: Any) -> None:
-        self.lattice = lattice
-        self._create(flat.create_sheared_part, lattice, *given)
-
-
-def _create_part(number: int, *given: Any) -> None:
-    """Set up the part of this rank of a problem with friction."""
-    ranks.held[number] = _Part(*given)
-
-
-def _follow(number: int) -> None:
-    """Take part in a call of the solver of the first rank."""
-    flat.follow(ranks.held[number])
 
 
 def memory_needed(

@@ -90,9 +90,14 @@ def _end() -> None:
     """End the service of the other ranks."""
 
 
+def new_number() -> int:
+    """Return the number of a new object of all ranks."""
+    return next(_numbers)
+
+
 def numbered(owner: object) -> int:
     """Return the number of a new object of all ranks, which forget it with its owner on the first one."""
-    number = next(_numbers)
+    number = new_number()
     weakref.finalize(owner, _forget, number).atexit = False
     return number
 
@@ -118,15 +123,18 @@ def order(procedure: Callable[..., Any], *arguments: Any) -> Any:
     return procedure(*arguments)
 
 
-def wake(procedure: Callable[..., Any], *arguments: Any) -> NDArray[np.int32]:
-    """Return the words of an order, none on one rank, for a solver that sends it by itself."""
-    return _words(procedure, arguments, (), False) if count > 1 else np.empty(0, np.int32)
-
-
 def _words(*order: Any) -> NDArray[np.int32]:
     """Return an order as words."""
     text = pickle.dumps(order)
     return np.frombuffer(text + bytes(-len(text) % _WORD), np.int32).copy()
+
+
+def give(other: int, procedure: Callable[..., Any], *arguments: Any) -> None:
+    """Let one rank call a procedure, of which it reports no failures."""
+    if other == rank:
+        procedure(*arguments)
+    else:
+        flat.tell_words(_words(procedure, arguments, (), False), other)
 
 
 def ask(other: int, procedure: Callable[..., Array], *arguments: Any, shape: tuple[int, int]) -> Array:
@@ -156,9 +164,15 @@ def least(value: float) -> float:
     return float(flat.least_of_ranks(value))
 
 
+def span(lattice: Lattice, of: int) -> tuple[int, int]:
+    """Return the first row of a rank, from 0 on, and the row after its last one."""
+    first, after = flat.rows_of_rank(of, lattice.n_row)
+    return int(first), int(after)
+
+
 def rows(lattice: Lattice, of: int | None = None) -> Lattice:
     """Return the window of the rows of a rank, by default this one."""
-    first, after = flat.rows_of_rank(rank if of is None else of, lattice.n_row)
+    first, after = span(lattice, rank if of is None else of)
     return replace(lattice, row_first=lattice.row_first + first, n_row=after - first)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any, Protocol
 
@@ -15,6 +15,10 @@ from .calls import checked
 from .contact import STOPPED, ElasticPair, Interface, NormalSolution
 from .handles import Handle, HeldState
 from .lattice import Lattice
+
+
+Rows = Callable[[int, tuple[int, int]], Array]
+"""The rows of a quantity on a rank, of a shape."""
 
 
 class Field(Protocol):
@@ -81,11 +85,10 @@ def _measure(number: int, solution: int) -> tuple[Any, bool]:
     return found
 
 
-def _grown(number: int, solution: int) -> tuple[list[int], list[int]]:
-    """Return the first node and extent of a window that grows with the contact of a solution."""
-    part = ranks.held[number]
-    low, extent = flat.grown_window_part(part.lattice, ranks.held[solution], part.own.n_row)
-    return low.tolist(), extent.tolist()
+def _grown(number: int, solution: int) -> Lattice:
+    """Return a window that grows with the contact of a solution."""
+    larger: Lattice = ranks.held[number].lattice.grown(ranks.held[solution].view("zone") > 0)
+    return larger
 
 
 def _prepare(number: int, *arguments: Any) -> None:
@@ -93,11 +96,17 @@ def _prepare(number: int, *arguments: Any) -> None:
     ranks.held[number] = OperatorPart(*arguments)
 
 
-def _displace(number: int, solution: int, displaced: int) -> None:
-    """Hold own rows of the displacements by the pressure of a solution."""
-    pressure = ranks.held[solution].view("pressure")
-    zero = np.zeros(pressure.shape)
-    ranks.held[displaced] = flat.apply_operator_part(ranks.held[number], [pressure, zero, zero])
+def _displace(number: int, solution: int, displaced: int, goodman: bool) -> None:
+    """Hold own rows of the displacements by the tractions of a solution."""
+    operator, found = ranks.held[number], ranks.held[solution]
+    state, shear = found.held, [np.zeros(found.held.shape)] * 2
+    alone = [state.view("pressure"), *shear]
+    if hasattr(found, "traction_x"):
+        shear = [found.traction_x, found.traction_y]
+    z, x, y = flat.apply_operator_part(operator, [alone[0], *shear])
+    if goodman:
+        z = flat.apply_operator_part(operator, alone)[0]
+    ranks.held[displaced] = z, x, y
 
 
 def _rows(number: int, solution: int, name: str) -> Array:
@@ -114,40 +123,56 @@ def _displaced_rows(displaced: int, place: int) -> Array:
     return np.asarray(ranks.held[displaced][place])
 
 
-class SharedFields(Banded):
-    """Fields of a solution, whose bands are the rows of each rank."""
+class Shared(Protocol):
+    """A contact that all ranks share."""
 
-    def __init__(
-        self, solution: SharedSolution, names: Iterable[str], more: Mapping[str, Displacement | None]
-    ) -> None:
-        super().__init__([*names, *more])
-        self.solution, self.more = solution, more
+    def parts(self) -> list[tuple[int, tuple[int, int]]]:
+        """Return the ranks that together have all rows, each with the shape of its fields."""
+        ...
+
+
+class SharedFields(Banded):
+    """Fields over a window, whose bands are the rows of each rank."""
+
+    def __init__(self, contact: Shared, fields: Mapping[str, Rows]) -> None:
+        super().__init__(fields)
+        self.contact, self.taken = contact, fields
 
     def bands(self, name: str) -> Iterator[NDArray[Any]]:
         """Take the rows of one rank after the other."""
-        lattice = self.solution.contact.lattice
-        for rank in range(ranks.count):
-            shape = ranks.rows(lattice, rank).shape
-            if name not in self.more:
-                band = self.solution.rows(rank, name, shape)
-                yield band.astype(np.int8) if name == "zone" else band
-            elif (moved := self.more[name]) is None:  # of a rigid body
-                yield np.zeros(shape)
-            else:
-                yield moved.rows(rank, "zxy".index(name[-1]), shape)
+        for rank, shape in self.contact.parts():
+            band = self.taken[name](rank, shape)
+            yield band.astype(np.int8) if name == "zone" else band
+
+    def joined(self, more: SharedFields) -> SharedFields:
+        """Return these fields and others."""
+        return SharedFields(self.contact, {**self.taken, **more.taken})
+
+
+def rigid(rank: int, shape: tuple[int, int]) -> Array:
+    """Return rows of the displacement of a rigid body."""
+    return np.zeros(shape)
 
 
 class Displacement:
-    """Displacements by a pressure, whose fields lie on all ranks."""
+    """Displacements by the tractions of a solution, whose fields lie on all ranks.
 
-    def __init__(self, solution: SharedSolution, operator: SharedOperator) -> None:
+    In Goodman's approximation shear tractions do not move the surfaces along z.
+    """
+
+    def __init__(self, solution: Any, operator: SharedOperator, goodman: bool = False) -> None:
         self.number, self.sign = ranks.numbered(self), operator.sign
-        ranks.order(_displace, operator.number, solution.number, self.number)
+        ranks.order(_displace, operator.number, solution.number, self.number, goodman)
 
-    def rows(self, rank: int, place: int, shape: tuple[int, int]) -> Array:
-        """Return the rows of a component on a rank."""
-        found = ranks.ask(rank, _displaced_rows, self.number, place, shape=shape)
-        return self.sign * found if place else found
+    def rows(self, axis: str) -> Rows:
+        """Return the rows of a component."""
+
+        def taken(rank: int, shape: tuple[int, int]) -> Array:
+            place = "zxy".index(axis)
+            found = ranks.ask(rank, _displaced_rows, self.number, place, shape=shape)
+            return self.sign * found if place else found
+
+        return taken
 
 
 class SharedOperator:
@@ -169,9 +194,9 @@ class SharedSolution:
     def __init__(self, contact: SharedContact) -> None:
         self.contact, self.number = contact, ranks.numbered(self)
 
-    def rows(self, rank: int, name: str, shape: tuple[int, int]) -> Array:
-        """Return the rows of a field on a rank."""
-        return ranks.ask(rank, _rows, self.contact.number, self.number, name, shape=shape)
+    def rows(self, name: str) -> Rows:
+        """Return the rows of a field."""
+        return lambda rank, shape: ranks.ask(rank, _rows, self.contact.number, self.number, name, shape=shape)
 
     def measures(self) -> tuple[Any, bool]:
         """Return its measures, and whether the pressure rises to an end of the surface."""
@@ -180,10 +205,8 @@ class SharedSolution:
 
     def grown(self) -> Lattice:
         """Return a larger window for a contact that reaches the rim."""
-        low, extent = ranks.order(_grown, self.contact.number, self.number)
-        return replace(
-            self.contact.lattice, row_first=low[1], col_first=low[0], n_row=extent[1], n_col=extent[0]
-        )
+        larger: Lattice = ranks.order(_grown, self.contact.number, self.number)
+        return larger
 
     def as_start(self) -> None:
         """Return what the next load step starts from."""
@@ -199,6 +222,10 @@ class SharedContact:
         self.lattice, self.number = replace(lattice), ranks.numbered(self)
         given = checked(interface=interface, threads=threads)
         ranks.order(_create, self.number, gap, self.lattice, pair, *given)
+
+    def parts(self) -> list[tuple[int, tuple[int, int]]]:
+        """Return the ranks, each with the shape of its fields."""
+        return [(rank, ranks.rows(self.lattice, rank).shape) for rank in range(ranks.count)]
 
     def solve(self, control: int, value: float, *, tolerance: float, max_sweeps: int = 200) -> SharedSolution:
         """Solve for a normal load (control 1, N) or an approach (2, m), as `NormalContact.solve`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,8 @@ from .flat import WearSettings as WearSettings
 from .flat import begin_step as begin_step
 from .flat import forget_changes as forget_changes
 from .flat import new_steps as new_steps
-from .friction import ContactState
+from ..variables import WORN
+from .friction import ContactState, FrictionalContact
 from .handles import Handle
 from .lattice import Lattice
 
@@ -24,6 +25,9 @@ REJECTED, ACCEPTED, LIMITED, FAILED, OUTGROWN, PENDING = range(6)
 """Verdicts on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones do
 not help; the smallest one did not converge; the contact reached the rim of its window; it is not solved to
 its end."""
+
+AHEAD = "ahead"
+"""Energy of a cycle by which the second of two jumps wears (J/m2), among the fields of a cycle."""
 
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
@@ -60,16 +64,40 @@ class CyclesOfWear(Handle):
     ) -> None:
         self._create(flat.create_wear, settings, pair, *map(list, zip(*steps, strict=True)), state)
 
-    def restore(
-        self, state: ContactState, fields: Sequence[Array], cycles: float, until: float, spent: float
-    ) -> None:
-        """Go on from a solved cycle: its fields in the order of the core, numbers as of `WearProgress`."""
-        between = len(fields) == 5
-        values = [*fields, 0.0 * fields[0]][:5]
-        flat.restore_wear(self, state, values, cycles, until, spent, between)
+    def advance(self, contact: FrictionalContact) -> WearProgress:
+        """Solve the next load step of a cycle."""
+        progress: WearProgress = contact.called(flat.advance_wear, self)
+        return progress
 
-    def ends(self, count: int, lattice: Lattice) -> Iterator[tuple[float, Array, Array]]:
-        """Yield the last solution of each load step: cycle (negative: none), motions, tractions."""
-        for place in range(1, count + 1):
-            cycles, motions, tractions = flat.wear_end(self, place, lattice.size)
-            yield cycles, motions, np.asarray(tractions).reshape(2, 3, *lattice.shape)
+    def carry(self, contact: FrictionalContact, smaller: Lattice) -> None:
+        """Go on with a contact on a larger window."""
+        flat.carry_wear(contact, self, smaller.first, smaller.extent)
+
+    def reached(self, contact: FrictionalContact) -> ContactState:
+        """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
+        return contact.solution(flat.state_of_wear(self))
+
+    def fields(self, contact: FrictionalContact) -> dict[str, Array]:
+        """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
+        depth, change, energy, path, ahead = flat.fields_of_wear(self, *contact.own.extent)
+        return dict(zip((*WORN, AHEAD), (depth, change, energy, 0.25 * path, ahead), strict=True))
+
+    def restore(
+        self, state: ContactState, fields: Mapping[str, Array], cycles: float, until: float, spent: float
+    ) -> None:
+        """Go on from a solved cycle: its fields as of `fields`, numbers as of `WearProgress`."""
+        depth, change, energy, amplitude = (np.asarray(fields[name]) for name in WORN)
+        ahead = fields.get(AHEAD)
+        values = [depth, change, energy, 4.0 * amplitude, 0.0 * depth if ahead is None else ahead]
+        flat.restore_wear(self, state, values, cycles, until, spent, ahead is not None)
+
+    def restore_end(
+        self, place: int, contact: FrictionalContact, cycles: float, motions: Array, tractions: Array
+    ) -> None:
+        """Set the last solution of a load step, from 1 on; see `end`."""
+        flat.restore_wear_end(self, place, cycles, motions, tractions.reshape(2, 3, -1))
+
+    def end(self, place: int, contact: FrictionalContact) -> tuple[float, Array, Array]:
+        """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
+        cycles, motions, tractions = flat.wear_end(self, place, contact.own.size)
+        return cycles, motions, np.asarray(tractions).reshape(2, 3, *contact.own.shape)

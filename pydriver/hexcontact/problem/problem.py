@@ -252,7 +252,7 @@ class Problem:
         that of a load step if surfaces move. DeckError if a gap given in Python does not fit the window or is
         NaN somewhere.
         """
-        gap = self._gap_in(step).over(lattice)
+        gap = self.gap_in(step).over(lattice)
         touching = np.isfinite(gap)
         return gap, np.broadcast_to(True, gap.shape) if touching.all() else touching
 
@@ -261,7 +261,7 @@ class Problem:
         """The gap before loading at any point."""
         return self._gap
 
-    def _gap_in(self, step: LoadStep | None) -> PlaneField:
+    def gap_in(self, step: LoadStep | None) -> PlaneField:
         """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:
             return self._gap
@@ -276,7 +276,7 @@ class Problem:
 
     def check_contact(self, number: int, zones: Callable[[], Iterable[tuple[Lattice, NDArray[Any]]]]) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
-        gap = self._gap_in(self.load_steps[number - 1] if self.moves else None)
+        gap = self.gap_in(self.load_steps[number - 1] if self.moves else None)
         for rows, zone in zones() if gap.maps and self.period is None else ():
             name, fault = gap.fault_near(rows, zone > 0)
             if fault:

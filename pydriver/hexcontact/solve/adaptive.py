@@ -11,8 +11,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from ..core import steps as core
 from ..core.friction import ContactState
 from ..problem.loads import LoadStep
@@ -65,8 +63,7 @@ class AdaptivePath(GivenPath):
             self.position, fraction = int(control["position"]), float(control["fraction"])
             self._steps = core.restored(self._steps._replace(fraction=fraction), control["chooser"])
             if before[-1].companion:
-                state: dict[str, Any] = {**before[-1].companion, **control["companion"]}
-                self._whole = ContactState(**state)
+                self._whole = window.assembled(before[-1].companion, control["companion"])
 
     def _numbered(self, target: LoadStep) -> LoadStep:
         """Return a load step with its number among the recorded ones."""
@@ -117,11 +114,9 @@ class AdaptivePath(GivenPath):
             "area": self._steps.area,
             "chooser": core.record_of(self._steps),
         }
-        companion: dict[str, Any] = {}
+        companion: Mapping[str, Any] = {}
         if self._whole is not None:
-            state = vars(self._whole)
-            companion = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
-            control["companion"] = {name: state[name] for name in state if name not in companion}
+            companion, control["companion"] = self.window.parts(self._whole)
         return dataclasses.replace(step, companion=companion, control=control, load_fraction=control["done"])
 
     def _taken(

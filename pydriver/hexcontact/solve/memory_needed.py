@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..core import contact, kernel_cache, memory, ranks
+from ..core.friction import row_ahead
 from ..core.lattice import Lattice
 from ..deck.below import cycle_of
 from ..deck.units import readable
@@ -24,18 +25,30 @@ _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the 
 
 
 def is_shared(case: Problem, lattice: Lattice) -> bool:
-    """Test whether all ranks share the rows of a window."""
-    return not case.frictional and case.method_for(lattice) == "fft" and ranks.share(lattice)
+    """Test whether all ranks share the rows of a window.
+
+    Where nodes that enter slip from where their gap closed, and in steady rolling across rows, a node depends
+    on those of all rows.
+    """
+    if case.method_for(lattice) != "fft" or not ranks.share(lattice):
+        return False
+    rolls = [step.roll.direction for step in case.load_steps if step.roll and step.roll.steady]
+    across = any(row_ahead(lattice, direction)[1] for direction in rolls)
+    return not (case.frictional and (_interpolates(case) or across))
+
+
+def _interpolates(case: Problem) -> bool:
+    """Test whether nodes that enter slip from where their gap closed."""
+    return case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
 
 
 def fields_held(case: Problem) -> int:
     """Return the number of fields that Python and the core hold besides the solver, by feature."""
     friction = case.frictional
-    entry = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
     table = [
         # initial gap of a record; with friction the state before, which the core holds, and holes in the heap
         (True, 10 if friction else 1),
-        (entry, 45),  # places of nodes when their gap closed
+        (_interpolates(case), 45),  # places of nodes when their gap closed
         (case.adaptive, 40),  # the path in whole steps, and edges
         (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts
         (case.deck.wear, 56),  # cycles before and after a jump, their record, the pressure ahead

@@ -122,7 +122,7 @@ def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]
 def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) -> None:
     """Warn of a load step that was halved where nothing prescribes the path of its parts."""
     static = case.solver.algorithm == "static"
-    if step.history.get("cuts") and (static or before is None or not (before.pressure > 0).any()):
+    if step.history.get("cuts") and (static or before is None or not before.normal_load > 0.0):
         in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
         words = unasked_path([step.number], in_parts)
         listener.said("halved", level=logging.WARNING, step=step.number, warning=words)

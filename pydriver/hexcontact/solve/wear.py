@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core import flat
 from ..core import steps as core
 from ..core.friction import CONTROLS, ContactState
 from ..errors import DeckError, PathWarning
@@ -65,7 +64,7 @@ class WearPath(GivenPath):
         cycles = self._begun(state)
         while done < self._wear.cycles:
             now = self._solved(cycles)
-            before, state = state, self._reached(cycles)
+            before, state = state, cycles.reached(self.window.contact)
             yield self._recorded(cycles, now, state, before, started)
             started, done = time.perf_counter(), now.cycles
 
@@ -84,26 +83,26 @@ class WearPath(GivenPath):
             )
             for target in self._targets
         ]
-        cycles = core.CyclesOfWear(settings, self.case.pair, steps, state)
+        cycles = self.window.cycles(settings, steps, state)
         if last is not None:
-            depth, change, energy, amplitude = (np.array(last.fields[name]) for name in WORN)
-            ahead = [np.array(last.companion["ahead"])] if "ahead" in last.companion else []
+            fields = {name: np.array(last.fields[name]) for name in WORN}
+            if core.AHEAD in last.companion:
+                fields[core.AHEAD] = np.array(last.companion[core.AHEAD])
             done, spent = (float(last.history[name]) for name in ("wear_cycles", "cycle_dissipated_energy"))
-            fields = [depth, change, energy, 4.0 * amplitude, *ahead]
             cycles.restore(state, fields, done, float(last.control["until"]), spent)
             for name, tractions in last.companion.items():
                 if name.startswith(_END):
                     place = int(name.removeprefix(_END))
                     solved, motions = (last.control[f"end_{kind}"][place] for kind in ("cycles", "numbers"))
-                    end = np.array(motions), np.array(tractions).reshape(2, 3, -1)
-                    flat.restore_wear_end(cycles, place + 1, solved, *end)
+                    end = solved, np.array(motions), np.array(tractions)
+                    cycles.restore_end(place + 1, self.window.contact, *end)
         return cycles
 
     def _solved(self, cycles: core.CyclesOfWear) -> core.WearProgress:
         """Solve a cycle load step by load step, on a window that grows with the contact."""
         while True:
             try:
-                now = self.window.contact.called(flat.advance_wear, cycles)
+                now = cycles.advance(self.window.contact)
             except DeckError as error:
                 raise DeckError(f'wear.cycle = "{self._wear.cycle}": {error}') from None
             if now.verdict == core.PENDING:
@@ -111,22 +110,18 @@ class WearPath(GivenPath):
             if now.verdict not in (core.FAILED, core.OUTGROWN):
                 break
             target = dataclasses.replace(self._targets[now.place - 1], index=self._number)
-            reached = self._reached(cycles)
+            reached = cycles.reached(self.window.contact)
             if now.verdict == core.FAILED:
                 values = now.driven_z, now.driven_x, now.driven_y, now.driven_twist
                 raise self.window.failure(reached, target, values)
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
-            flat.carry_wear(self.window.contact, cycles, smaller.first, smaller.extent)
+            cycles.carry(self.window.contact, smaller)
         found = {"unworn_cycles": now.unworn, "unworn_cycle_change": now.left}
         if now.cycles == 0.0 and now.left > self._wear.tolerance:
             words = unclosed_cycle(found, self._wear.tolerance)
             self.window.listener.said("unclosed", level=logging.WARNING, warning=words)
             warnings.warn(words, PathWarning, stacklevel=2)
         return now
-
-    def _reached(self, cycles: core.CyclesOfWear) -> ContactState:
-        """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
-        return self.window.contact.solution(flat.state_of_wear(cycles))
 
     def _recorded(
         self,
@@ -137,8 +132,8 @@ class WearPath(GivenPath):
         started: float,
     ) -> Step:
         """Return a cycle as a load step, with the restart data of the next one."""
-        depth, change, energy, path, ahead = flat.fields_of_wear(cycles, *self.window.lattice.extent)
-        self.window.worn = depth
+        fields = cycles.fields(self.window.contact)
+        self.window.remember_wear(fields)
         last = self._targets[0]
         target = dataclasses.replace(last, index=self._number, segment=last.segment + 1, label=LABEL)
         step = self.window.step(target, state, before, started)
@@ -155,15 +150,15 @@ class WearPath(GivenPath):
         if now.rejected >= 0:
             history |= {"rejected_steps": now.rejected, "step_limited": int(now.verdict == core.LIMITED)}
         self._number += 1
-        ends = [*cycles.ends(len(self._targets), self.window.lattice)]
+        ends = [cycles.end(place, self.window.contact) for place in range(1, len(self._targets) + 1)]
         beside = {f"{_END}{place}": end[2] for place, end in enumerate(ends) if end[0] >= 0.0}
         if now.until > now.cycles:
-            beside["ahead"] = ahead
+            beside[core.AHEAD] = fields[core.AHEAD]
         done = now.cycles / self._wear.cycles
         return dataclasses.replace(
             step,
             history=history,
-            fields={**step.fields, **dict(zip(WORN, (depth, change, energy, 0.25 * path), strict=True))},
+            fields=self.window.joined(step.fields, fields, WORN),
             companion=beside,
             control=self._control([end[0] for end in ends], np.array([end[1] for end in ends]), now),
             load_fraction=done,

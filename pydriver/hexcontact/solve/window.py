@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,31 @@ from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, Norm
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
 from ..core.measures import is_unbounded, measures, recorded
-from ..core.shared import Displacement, SharedContact, SharedFields, SharedOperator, SharedSolution
+from ..core.shared import (
+    Displacement,
+    Rows,
+    SharedContact,
+    SharedFields,
+    SharedOperator,
+    SharedSolution,
+    rigid,
+)
+from ..core.shared_friction import SharedCycles, SharedFriction, SharedState, gap_in_rows
+from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from ..variables import BULK_STRAIN, BULK_STRESS, CORE, MOVED_GAP, NODAL_FRICTION, STATE, names_where
+from ..variables import (
+    BULK_STRAIN,
+    BULK_STRESS,
+    CORE,
+    DISPLACEMENTS,
+    MOVED_GAP,
+    NODAL_FRICTION,
+    STATE,
+    names_where,
+)
 from .events import Listener
 from .memory_needed import fields_of, is_shared, require_memory
 
@@ -157,12 +176,17 @@ class Window:
             fields["worn_depth"] = self.worn
         if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
             fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
+        return fields | self._displaced(fields)
+
+    def _displaced(self, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+        """Return the displacements of the surfaces that the deck names."""
+        found: dict[str, Array] = {}
         for body in (1, 2):
             wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
             if wanted:
                 moved = self._displacement(body, fields)
-                fields |= {name: moved[name[-1]] for name in wanted}
-        return fields
+                found |= {name: moved[name[-1]] for name in wanted}
+        return found
 
     def _where_touching(self, values: Array) -> Array:
         """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
@@ -229,7 +253,7 @@ class SharedWindow(Window):
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener, self._bodies = listener or Listener(), {}
         self.friction = case.friction_law(lattice)  # none
-        self.contact = SharedContact(lattice, case.solved_pair, case.plane_gap, case.interface)
+        self.contact: Any = SharedContact(lattice, case.solved_pair, case.plane_gap, case.interface)
 
     def advance(self, state: None, target: LoadStep, values: tuple[float, ...]) -> SharedSolution:
         """Solve a load step from its load or approach alone."""
@@ -246,30 +270,36 @@ class SharedWindow(Window):
         found, unbounded = solution.measures()
         return recorded(self.lattice, found, friction=False), unbounded
 
-    def _fields(self, solution: SharedSolution) -> Mapping[str, NDArray[Any]]:
-        moved: dict[str, Displacement | None] = {}
-        for body in (1, 2):
-            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            moved |= dict.fromkeys(names, self._moved(body, solution) if names else None)
-        fields = SharedFields(solution, ("initial_gap", *self.state), moved)
+    def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
+        rows = {name: solution.rows(name) for name in ("initial_gap", *self.state)}
+        fields = SharedFields(self.contact, rows | self._moved(solution))
         return dict(fields) if self.steps_held else fields
 
-    def _moved(self, number: int, solution: SharedSolution) -> Displacement | None:
-        """Return the surface displacement of one body; None of a rigid one."""
-        if (pair := _pair_of_body(self.case, number)) is None:
-            return None
-        if number not in self._bodies:
-            self._bodies[number] = SharedOperator(self.lattice, pair, 1.0 if number == 1 else -1.0)
-        return Displacement(solution, self._bodies[number])
+    def _moved(self, solution: Any) -> dict[str, Rows]:
+        """Return the displacements of the surfaces that the deck names."""
+        moved: dict[str, Rows] = {}
+        for body in (1, 2):
+            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            if names and (pair := _pair_of_body(self.case, body)) is None:
+                moved |= dict.fromkeys(names, rigid)
+            elif names:
+                if body not in self._bodies:
+                    self._bodies[body] = SharedOperator(self.lattice, pair, 1.0 if body == 1 else -1.0)
+                found = Displacement(solution, self._bodies[body], self.case.solver.coupling == "goodman")
+                moved |= {name: found.rows(name[-1]) for name in names}
+        return moved
 
 
 def window_over(
     case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
 ) -> Window:
     """Return a case on a window, for the algorithm that it needs; arguments as of `Window`."""
-    kind = FrictionWindow if case.frictional else Window
-    if ranks.count > 1 and is_shared(case, lattice):
-        kind = SharedWindow
+    kind: type[Window] = FrictionWindow if case.frictional else Window
+    if ranks.count > 1 and case.method_for(lattice) == "fft":
+        if case.frictional:
+            kind = SharedFrictionWindow
+        elif is_shared(case, lattice):
+            kind = SharedWindow
     return kind(case, lattice, steps_held, listener)
 
 
@@ -308,9 +338,8 @@ class FrictionWindow(Window):
     ) -> ContactState:
         """Advance a state to new loads and motions, with surfaces that move at their new place."""
         if self.case.moves:
-            self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
-            self.contact = self._solver(self.gap)
-        return self.contact.advance(
+            self._move(target)
+        found: ContactState = self.contact.advance(
             self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],
             values,
@@ -319,6 +348,12 @@ class FrictionWindow(Window):
             rolling=None if target.roll is None else Rolling(target.roll.direction, target.roll.steady),
             **self.how,
         )
+        return found
+
+    def _move(self, target: LoadStep) -> None:
+        """Set the surfaces up at their place in a load step."""
+        self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
+        self.contact = self._solver(self.gap)
 
     @property
     def how(self) -> dict[str, Any]:
@@ -326,6 +361,28 @@ class FrictionWindow(Window):
         solver = self.case.solver
         entry = "interpolated" if solver.entry == "interpolated" else "implicit"
         return {"entry": entry, "tolerance": solver.tolerance}
+
+    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> Any:
+        """Return the state with some fields and numbers."""
+        return ContactState(**fields, **numbers)
+
+    def parts(self, state: Any) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return the fields and the numbers of a state."""
+        known = vars(state)
+        fields = {name: value for name, value in known.items() if isinstance(value, np.ndarray)}
+        return fields, {name: value for name, value in known.items() if name not in fields}
+
+    def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
+        """Return cycles that wear the surfaces."""
+        return CyclesOfWear(settings, self.case.pair, steps, state)
+
+    def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
+        """Remember the worn depth of a cycle, which the core has set."""
+        self.worn = fields["worn_depth"]
+
+    def joined(self, fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+        """Return fields, and some of others."""
+        return {**fields, **{name: more[name] for name in names}}
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
@@ -347,7 +404,7 @@ class FrictionWindow(Window):
         """Return the whole state, and set the worn depth of the step."""
         if (worn := step.fields.get("worn_depth")) is not None:
             self.wear(np.array(worn))
-        return state_of(step)
+        return self.assembled(*state_of(step))
 
     # --- history ------------------------------------------------------------------------------------------
 
@@ -364,22 +421,143 @@ class FrictionWindow(Window):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        solver, nodes = super()._solver(self.initial_gap), 1
-        for drive in self.case.largest_drives:
-            known: dict[str, Any] = {**drive}
-            nodes = max(nodes, int((solver.solve(**known, tolerance=_ROUGHLY).zone > 0).sum()))
-        return self.lattice.cell_area * nodes
+        area = self._frictionless()
+        return max([self.lattice.cell_area, *(area(**drive) for drive in self.case.largest_drives)])
+
+    def _frictionless(self) -> Callable[..., float]:
+        """Return the function of the contact area without friction (m2) under a load or at an approach."""
+        solver = Window._solver(self, self.initial_gap)
+
+        def area(**drive: float) -> float:
+            return self.lattice.cell_area * int((solver.solve(**drive, tolerance=_ROUGHLY).zone > 0).sum())
+
+        return area
 
 
-def state_of(step: Step) -> ContactState:
-    """Return the state with friction at the end of a step with all its fields."""
+def state_of(step: Step) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return fields and numbers of the state with friction at the end of a step with all its fields."""
     needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "
             f"{', '.join(sorted(missing))}"
         )
-    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
-    state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
-    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
-    return ContactState(**state)  # a finished step has converged, and away from the rim
+    fields = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    numbers: dict[str, Any] = {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
+    return fields, numbers | {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+
+
+class SharedFrictionWindow(SharedWindow, FrictionWindow):
+    """Contact with friction whose rows all ranks share; each evaluates the gap at its nodes.
+
+    Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those of all
+    rows, which each rank has then, as those of a small window.
+    """
+
+    state = STATE[True]
+
+    def __init__(
+        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
+    ) -> None:
+        require_memory(case, lattice, steps_held)
+        self.case, self.lattice, self.steps_held = case, lattice, steps_held
+        self.listener, self._bodies = listener or Listener(), {}
+        self.by_rows = is_shared(case, lattice)
+        self.friction = case.friction_law(ranks.rows(lattice) if self.by_rows else lattice)
+        self.contact = self._shared(case.plane_gap)
+
+    def _shared(self, gap: Any) -> SharedFriction:
+        """Return the solver for a gap."""
+        case = self.case
+        return SharedFriction(
+            *(gap, case.friction_law, self.lattice, self.by_rows),
+            pair=case.solved_pair,
+            coupling="goodman" if case.solver.coupling == "goodman" else "full",
+            interface=case.interface,
+        )
+
+    advance = FrictionWindow.advance
+
+    def _move(self, target: LoadStep) -> None:
+        self.contact = self._shared(self.case.gap_in(target))
+
+    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
+        found, unbounded = self.contact.method("measured", solution)
+        return found, unbounded
+
+    def _larger(self, solution: Any) -> Lattice:
+        larger: Lattice = self.contact.method("grown", solution)
+        return larger
+
+    grown = Window.grown
+
+    def carried(self, state: Any, lattice: Lattice) -> Any:
+        """Return a state on this window; the history of the new nodes follows from it."""
+        return None if state is None else self.contact.method("extended", state, lattice)
+
+    def restored(self, step: Step) -> Any:
+        """Return the whole state, and set the worn depth of the step."""
+        if (worn := step.fields.get("worn_depth")) is not None:
+            self.contact.method("wear", self.contact.given({"depth": np.asarray(worn)}, "depth"))
+        return self.assembled(*state_of(step))
+
+    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> Any:
+        """Return the state with some fields and numbers."""
+        return self.contact.state(fields, numbers)
+
+    def parts(self, state: Any) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return the fields and the numbers of a state."""
+        return state.fields(), state.numbers
+
+    def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
+        """Return cycles that wear the surfaces."""
+        return SharedCycles(settings, self.case.pair, steps, state)
+
+    def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
+        """Remember nothing: the core has the worn depth."""
+
+    def joined(self, fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+        """Return fields, and some of others."""
+        if not isinstance(fields, SharedFields):
+            return super().joined(fields, more, names)
+        return SharedFields(self.contact, {**fields.taken, **{name: more.taken[name] for name in names}})
+
+    def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:
+        """Return the error of a step that did not converge, from its fields, which are gathered here."""
+        return super().failure(solution.gathered(), target, values)
+
+    def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
+        rows = {"initial_gap": self.contact.rows("gap_rows")}
+        rows |= {name: solution.rows(name) for name in self.state}
+        if self.case.moves:
+            rows |= {
+                MOVED_GAP: rows["initial_gap"],
+                "initial_gap": gap_in_rows(self.case.plane_gap, self.lattice),
+            }
+        if math.isnan(self.case.friction_coefficient) and self.friction.limits:
+            rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
+        if self.by_rows:
+            rows |= self._moved(solution)
+        fields: Any = SharedFields(self.contact, rows)
+        if not self.by_rows and any(name in DISPLACEMENTS for name in fields_of(self.case)):
+            fields = dict(fields) | self._displaced(fields)
+        return dict(fields) if self.steps_held else fields
+
+    @property
+    def initial_gap(self) -> Array:
+        """Gap of the surfaces that have not moved, inf where nothing can touch."""
+        gap, self.candidate = self.case.initial_gap(self.lattice)
+        return gap
+
+    def _frictionless(self) -> Callable[..., float]:
+        if not ranks.share(self.lattice):
+            return super()._frictionless()
+        case = self.case
+        contact = SharedContact(self.lattice, case.solved_pair, case.plane_gap, case.interface)
+
+        def area(**drive: float) -> float:
+            [(name, value)] = drive.items()
+            solution = contact.solve(1 if name == "normal_load" else 2, value, tolerance=_ROUGHLY)
+            return float(solution.measures()[0].contact_area)
+
+        return area

@@ -93,13 +93,16 @@ contains
     class(normal_law_t), intent(in), optional :: normal_law
     !> Space of the fields; absent: this rank has all rows
     type(field_space_t), intent(in), optional :: space
+    real(wp), allocatable :: values(:)
 
     call new_normal_problem(problem, lattice, medium, initial_gap, candidate, error, normal_law, space)
     if (allocated(error)) return
-    call friction%check(lattice, error)
+    call friction%check(problem%own_size(), error)
+    call problem%space%ranks%agree(error)
     if (allocated(error)) return
     allocate (problem%friction, source=friction)
-    call problem%friction%begin_rows(problem%rows_before()*lattice%extent(1))
+    call problem%friction%find_nodal_values(values)
+    if (size(values) > 0) call problem%friction%set_nodal_values(values, problem%space%max(values))
     problem%goodman = goodman
     call set_geometry(problem)
   end subroutine new_friction_problem
@@ -112,12 +115,31 @@ contains
     call self%normal_problem_t%inherit(from)
     select type (from)
     type is (friction_problem_t)
-      call from%friction%on_lattice(from%lattice, self%lattice, self%friction)
+      if (allocated(self%friction)) deallocate (self%friction)
+      allocate (self%friction, source=from%friction)
+      call take_nodal_values(self, from)
       self%goodman = from%goodman
-      call self%friction%begin_rows(self%rows_before()*self%lattice%extent(1))
     end select
     call set_geometry(self)
   end subroutine inherit
+
+  !> Take the numbers of the nodes of a law of friction from a finer lattice, or from a larger window.
+  subroutine take_nodal_values(self, from)
+    type(friction_problem_t), intent(inout) :: self
+    type(friction_problem_t), intent(in) :: from
+    real(wp), allocatable :: values(:), field(:, :)
+
+    call from%friction%find_nodal_values(values)
+    if (size(values) == 0) return
+    associate (given => reshape(values, [from%lattice%extent(1), from%own_rows()]))
+      if (self%lattice%spacing() > 1.5_wp*from%lattice%spacing()) then
+        call from%restrict(given, self, field)
+      else
+        call from%cut(given, self%lattice%first - from%lattice%first + 1, self, field)
+      end if
+    end associate
+    call self%friction%set_nodal_values(reshape(field, [size(field)]), self%space%max(field))
+  end subroutine take_nodal_values
 
   !> Set the tangential compliances of the nodes of the lattice.
   subroutine set_geometry(self)

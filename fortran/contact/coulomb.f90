@@ -7,7 +7,6 @@ module hc_coulomb
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lattice, only: lattice_t
   use hc_disc_law, only: disc_law_t
   implicit none
   private
@@ -64,9 +63,9 @@ contains
   end function is_bounded
 
   !> Refuse a coefficient that is negative or no finite number.
-  pure subroutine check(self, lattice, error)
+  pure subroutine check(self, n_node, error)
     class(coulomb_t), intent(in) :: self
-    type(lattice_t), intent(in) :: lattice
+    integer, intent(in) :: n_node
     type(error_t), allocatable, intent(out) :: error
     logical :: sound
 

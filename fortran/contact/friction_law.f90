@@ -21,7 +21,6 @@
 module hc_friction_law
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_lattice, only: lattice_t
   implicit none
   private
 
@@ -54,10 +53,8 @@ module hc_friction_law
     procedure :: is_isotropic, stretch
     !> Lengths of tractions that are at most b(p), and points of the boundary by its normals
     procedure :: find_lengths, find_boundary
-    !> The same law on another lattice: a coarser one, or a part
-    procedure :: on_lattice
-    !> Count the nodes of rows from one row of the window on
-    procedure :: begin_rows
+    !> Numbers of the nodes, where they differ; the law of other nodes
+    procedure :: find_nodal_values, set_nodal_values
     !> Take the zones at the beginning of a step
     procedure :: begin_step
   end type friction_law_t
@@ -69,12 +66,12 @@ module hc_friction_law
       class(friction_law_t), intent(in) :: self
     end function law_is
 
-    !> Refuse numbers that make no sense on a lattice.
-    pure subroutine law_check(self, lattice, error)
-      import :: friction_law_t, lattice_t, error_t
+    !> Refuse numbers that make no sense.
+    pure subroutine law_check(self, n_node, error)
+      import :: friction_law_t, error_t
       class(friction_law_t), intent(in) :: self
-      !> Lattice and window
-      type(lattice_t), intent(in) :: lattice
+      !> Number of nodes of this rank
+      integer, intent(in) :: n_node
       !> Allocated on failure
       type(error_t), allocatable, intent(out) :: error
     end subroutine law_check
@@ -275,22 +272,22 @@ contains
     integer, intent(in) :: zone(:, :)
   end subroutine begin_step
 
-  !> Set the number of nodes before those that are counted from one on; a law whose numbers differ from node to node overrides this.
-  pure subroutine begin_rows(self, before)
-    class(friction_law_t), intent(inout) :: self
-    !> Nodes of the window in the rows before
-    integer, intent(in) :: before
-  end subroutine begin_rows
-
-  !> Copy the law to another lattice; a law whose numbers differ from node to node overrides this.
-  subroutine on_lattice(self, from, onto, law)
+  !> Return a number of each node, row by row; a law whose nodes are not alike overrides this.
+  pure subroutine find_nodal_values(self, values)
     class(friction_law_t), intent(in) :: self
-    !> Lattice of the law, and one with every second node of it or with a part of its nodes
-    type(lattice_t), intent(in) :: from, onto
-    !> The law there
-    class(friction_law_t), allocatable, intent(out) :: law
+    !> Values at the nodes of this rank; none if all are alike
+    real(wp), allocatable, intent(out) :: values(:)
 
-    allocate (law, source=self)
-  end subroutine on_lattice
+    allocate (values(0))
+  end subroutine find_nodal_values
+
+  !> Set the number of each node, those of another lattice or of a part of the window; see `find_nodal_values`.
+  pure subroutine set_nodal_values(self, values, largest)
+    class(friction_law_t), intent(inout) :: self
+    !> Values at the nodes of this rank
+    real(wp), intent(in) :: values(:)
+    !> Largest value of all ranks
+    real(wp), intent(in) :: largest
+  end subroutine set_nodal_values
 
 end module hc_friction_law

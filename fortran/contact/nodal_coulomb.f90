@@ -12,9 +12,6 @@ module hc_nodal_coulomb
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lattice, only: lattice_t
-  use hc_transfer, only: restrict_field
-  use hc_friction_law, only: friction_law_t
   use hc_disc_law, only: disc_law_t
   implicit none
   private
@@ -29,12 +26,15 @@ module hc_nodal_coulomb
     real(wp) :: shear_limit = huge(1.0_wp)
     !> Power k of the pressure
     real(wp) :: power = 1.0_wp
-    !> Nodes before the first row of this rank, which has the coefficients of all rows
-    integer, private :: before = 0
+    !> Largest coefficient of all ranks; negative: of these nodes
+    real(wp), private :: largest = -1.0_wp
   contains
-    procedure :: resists, is_bounded, check, strength_of_disc, find_bounds, find_slopes, find_disc, on_lattice, begin_rows
+    procedure :: resists, is_bounded, check, strength_of_disc, find_bounds, find_slopes, find_disc
+    procedure :: find_nodal_values, set_nodal_values
     !> Return whether the bound is proportional to the pressure
     procedure, private :: is_linear
+    !> Largest coefficient
+    procedure, private :: strongest
   end type nodal_coulomb_t
 
 contains
@@ -43,7 +43,7 @@ contains
   pure logical function resists(self)
     class(nodal_coulomb_t), intent(in) :: self
 
-    resists = any(self%coefficient > 0.0_wp)
+    resists = self%strongest() > 0.0_wp
   end function resists
 
   !> Return whether nodes may slip: always, once the coefficients are set.
@@ -54,12 +54,12 @@ contains
   end function is_bounded
 
   !> Refuse coefficients, a bound or a power that make no sense on the window.
-  pure subroutine check(self, lattice, error)
+  pure subroutine check(self, n_node, error)
     class(nodal_coulomb_t), intent(in) :: self
-    type(lattice_t), intent(in) :: lattice
+    integer, intent(in) :: n_node
     type(error_t), allocatable, intent(out) :: error
 
-    if (size(self%coefficient) /= lattice%size()) then
+    if (size(self%coefficient) /= n_node) then
       call raise(error, status%invalid_input, 'coefficients of friction: one for each node of the window expected')
     else if (.not. all(ieee_is_finite(self%coefficient))) then
       call raise(error, status%invalid_input, 'coefficients of friction: finite numbers expected at all nodes')
@@ -84,7 +84,7 @@ contains
     class(nodal_coulomb_t), intent(in) :: self
     real(wp), intent(in) :: p_max
 
-    strength = maxval(self%coefficient)
+    strength = self%strongest()
     if (.not. self%is_linear()) then
       strength = merge(strength*max(p_max, tiny(1.0_wp))**(self%power - 1.0_wp), 1.0_wp, p_max > 0.0_wp)
     end if
@@ -100,9 +100,7 @@ contains
 
     bound = max(p, 0.0_wp)
     if (.not. self%is_linear()) bound = bound**self%power
-    associate (from => self%before + first)
-      bound = min(self%coefficient(from:from + size(p) - 1)*bound, self%shear_limit)
-    end associate
+    bound = min(self%coefficient(first:first + size(p) - 1)*bound, self%shear_limit)
   end subroutine find_bounds
 
   !> Differentiate the bounds of a row by the pressure.
@@ -112,7 +110,7 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out), contiguous :: bound(:)
 
-    bound = self%coefficient(self%before + first:self%before + first + size(p) - 1)
+    bound = self%coefficient(first:first + size(p) - 1)
     if (.not. self%is_linear()) bound = bound*merge(max(p, tiny(1.0_wp))**(self%power - 1.0_wp), 0.0_wp, p > 0.0_wp)
     where (bound*p > self%shear_limit)
       bound = 0.0_wp
@@ -134,31 +132,29 @@ contains
     pressed = merge(max(pressed, tiny(1.0_wp)), 0.0_wp, p > 0.0_wp)
   end subroutine find_disc
 
-  !> Set the number of nodes before the rows of this rank.
-  pure subroutine begin_rows(self, before)
-    class(nodal_coulomb_t), intent(inout) :: self
-    integer, intent(in) :: before
-
-    self%before = before
-  end subroutine begin_rows
-
-  !> Restrict the coefficients to a coarser lattice, or take those of a part of the window.
-  subroutine on_lattice(self, from, onto, law)
+  !> Return the largest coefficient.
+  pure real(wp) function strongest(self)
     class(nodal_coulomb_t), intent(in) :: self
-    type(lattice_t), intent(in) :: from, onto
-    class(friction_law_t), allocatable, intent(out) :: law
 
-    allocate (law, source=self)
-    select type (law)
-    class is (nodal_coulomb_t)
-      associate (mu => reshape(self%coefficient, from%extent), low => onto%first - from%first)
-        if (onto%spacing() > 1.5_wp*from%spacing()) then
-          law%coefficient = reshape(restrict_field(from, mu, onto), [onto%size()])
-        else
-          law%coefficient = reshape(mu(low(1) + 1:low(1) + onto%extent(1), low(2) + 1:low(2) + onto%extent(2)), [onto%size()])
-        end if
-      end associate
-    end select
-  end subroutine on_lattice
+    strongest = self%largest
+    if (strongest < 0.0_wp) strongest = maxval(self%coefficient)
+  end function strongest
+
+  !> Return the coefficients.
+  pure subroutine find_nodal_values(self, values)
+    class(nodal_coulomb_t), intent(in) :: self
+    real(wp), allocatable, intent(out) :: values(:)
+
+    values = self%coefficient
+  end subroutine find_nodal_values
+
+  !> Set the coefficients.
+  pure subroutine set_nodal_values(self, values, largest)
+    class(nodal_coulomb_t), intent(inout) :: self
+    real(wp), intent(in) :: values(:), largest
+
+    self%coefficient = values
+    self%largest = largest
+  end subroutine set_nodal_values
 
 end module hc_nodal_coulomb

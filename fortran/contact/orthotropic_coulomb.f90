@@ -17,7 +17,6 @@ module hc_orthotropic_coulomb
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lattice, only: lattice_t
   use hc_nodal_coulomb, only: nodal_coulomb_t
   implicit none
   private
@@ -57,13 +56,13 @@ contains
   end function stretch
 
   !> Refuse coefficients, a ratio or an angle that make no sense.
-  pure subroutine check(self, lattice, error)
+  pure subroutine check(self, n_node, error)
     class(orthotropic_coulomb_t), intent(in) :: self
-    type(lattice_t), intent(in) :: lattice
+    integer, intent(in) :: n_node
     type(error_t), allocatable, intent(out) :: error
     logical :: sound
 
-    call self%nodal_coulomb_t%check(lattice, error)
+    call self%nodal_coulomb_t%check(n_node, error)
     if (allocated(error)) return
     sound = ieee_is_finite(self%ratio) .and. ieee_is_finite(self%angle)
     if (sound) sound = self%ratio > 0.0_wp

@@ -469,6 +469,8 @@ contains
     type(contact_state_t) :: start, begun, expected, found
     type(load_target_t) :: target
     type(field_space_t) :: space
+    class(friction_law_t), allocatable :: own_law
+    real(wp), allocatable :: values(:)
     real(wp) :: gap(n, n - 3), p_max
     integer :: step, n_step, rows(2)
 
@@ -481,8 +483,11 @@ contains
     rows = space%own_rows(n - 3)
     call new_friction_problem(problem, lattice, pair, gap, gap < huge(gap), law, .false., error)
     if (.not. allocated(error)) call new_windowed_friction(alone, problem, error, 1)
+    allocate (own_law, source=law)
+    call law%find_nodal_values(values)
+    if (size(values) > 0) call own_law%set_nodal_values(values((rows(1) - 1)*n + 1:rows(2)*n), maxval(values))
     associate (own => gap(:, rows(1):rows(2)))
-      if (.not. allocated(error)) call new_friction_problem(part, lattice, pair, own, own < huge(gap), law, .false., error, &
+      if (.not. allocated(error)) call new_friction_problem(part, lattice, pair, own, own < huge(gap), own_law, .false., error, &
                                                             space=space)
     end associate
     if (.not. allocated(error)) call new_windowed_friction(shared, part, error, 1, ranks=ranks)

@@ -4,7 +4,6 @@ module test_laws
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
-  use hc_transfer, only: restrict_field
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     separated, stick, slip, normal
   use hc_friction_law, only: friction_law_t
@@ -34,7 +33,7 @@ module test_laws
     type(coulomb_t) :: unit_law = coulomb_t(1.0_wp)
   contains
     procedure :: resists, is_bounded, check => check_nodal, strength, find_bounds, find_slopes, find_zones, project, violation, &
-      linearize, on_lattice
+      linearize, find_nodal_values, set_nodal_values
   end type nodal_law_t
 
 contains
@@ -231,12 +230,12 @@ contains
     is_bounded = size(self%coefficient) > 0
   end function is_bounded
 
-  pure subroutine check_nodal(self, lattice, error)
+  pure subroutine check_nodal(self, n_node, error)
     class(nodal_law_t), intent(in) :: self
-    type(lattice_t), intent(in) :: lattice
+    integer, intent(in) :: n_node
     type(error_t), allocatable, intent(out) :: error
 
-    if (size(self%coefficient) /= lattice%size()) error = error_t()
+    if (size(self%coefficient) /= n_node) error = error_t()
   end subroutine check_nodal
 
   pure real(wp) function strength(self, p_max)
@@ -303,14 +302,18 @@ contains
                                  qx, qy, dsx, dsy, zone, direction, compliance)
   end subroutine linearize
 
-  subroutine on_lattice(self, from, onto, law)
+  pure subroutine find_nodal_values(self, values)
     class(nodal_law_t), intent(in) :: self
-    type(lattice_t), intent(in) :: from, onto
-    class(friction_law_t), allocatable, intent(out) :: law
-    type(nodal_law_t) :: coarse
+    real(wp), allocatable, intent(out) :: values(:)
 
-    coarse%coefficient = reshape(restrict_field(from, reshape(self%coefficient, from%extent), onto), [onto%size()])
-    allocate (law, source=coarse)
-  end subroutine on_lattice
+    values = self%coefficient
+  end subroutine find_nodal_values
+
+  pure subroutine set_nodal_values(self, values, largest)
+    class(nodal_law_t), intent(inout) :: self
+    real(wp), intent(in) :: values(:), largest
+
+    self%coefficient = values
+  end subroutine set_nodal_values
 
 end module test_laws

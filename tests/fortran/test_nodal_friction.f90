@@ -372,13 +372,13 @@ contains
       if (i == 3) law%coefficient = law%coefficient(2:)
       if (i == 4) law%shear_limit = 0.0_wp
       if (i == 5) law%power = -1.0_wp
-      call law%check(sphere%problem%lattice, raised)
+      call law%check(sphere%problem%lattice%size(), raised)
       call check_true(error, allocated(raised), 'refused')
       if (allocated(error)) return
     end do
     tilted%coefficient = spread(0.3_wp, 1, sphere%problem%lattice%size())
     tilted%ratio = 0.0_wp
-    call tilted%check(sphere%problem%lattice, raised)
+    call tilted%check(sphere%problem%lattice%size(), raised)
     call check_true(error, allocated(raised), 'no ratio')
   end subroutine test_bad_numbers
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
@@ -38,6 +38,7 @@ Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 MAX_SWEEPS, MAX_CUTS = 40, 6
+_UNBOUNDED = 1e100  # coefficient of nodes that cannot slip, where others can
 CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS = CORE["fields"]
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
@@ -68,6 +69,15 @@ class FrictionLaw:
         """Return the law at a part of the nodes."""
         mu = self.coefficient
         return dataclasses.replace(self, coefficient=mu[part]) if isinstance(mu, np.ndarray) else self
+
+    def at_nodes(self, lattice: Lattice) -> FrictionLaw:
+        """Return the law with a coefficient for each node, unless the limit is mu p."""
+        plain = (self.shear_limit, self.power, self.ratio) == (math.inf, 1.0, 1.0)
+        if plain or isinstance(self.coefficient, np.ndarray):
+            return self
+        return dataclasses.replace(
+            self, coefficient=np.full(lattice.shape, min(self.coefficient, _UNBOUNDED))
+        )
 
     @property
     def limits(self) -> tuple[float | Array, float] | None:
@@ -163,6 +173,11 @@ class ContactState(NormalSolution):
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
+    def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return fields and numbers."""
+        fields = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return fields, {name: value for name, value in vars(self).items() if name not in fields}
+
     def as_start(self) -> ContactState:
         """Return what the next load step starts from: the state without the slip of the last one."""
         none = np.broadcast_to(0.0, self.pressure.shape)
@@ -209,9 +224,16 @@ class FrictionalContact(Contact):
     ) -> None:
         with contextlib.nullcontext() if own is None else ranks.agreed():
             super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
-            law = _checked_law(friction_coefficient, shear_limit, lattice)
+            law = _checked_law(friction_coefficient, shear_limit, self.own)
             _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
-        given = *self._surfaces, law, springs, coupling == "goodman", own is not None, count
+        given = (
+            *self._surfaces,
+            law.at_nodes(self.own),
+            springs,
+            coupling == "goodman",
+            own is not None,
+            count,
+        )
         del self._surfaces
         self._create(flat.create_sheared, method_code(method, iteration), *given)
 
@@ -321,6 +343,10 @@ class FrictionalContact(Contact):
             *(MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice), self._held(state)),
         )
         return loads[:solved], work[:solved], self.solution(handle)
+
+    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> ContactState:
+        """Return the state with given fields and numbers."""
+        return ContactState(**{**fields, **numbers})
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""

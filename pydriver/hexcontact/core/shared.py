@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, Protocol
 
@@ -15,7 +15,6 @@ from .calls import checked
 from .contact import STOPPED, ElasticPair, Interface, NormalSolution
 from .handles import Handle, HeldState
 from .lattice import Lattice
-
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
@@ -144,9 +143,12 @@ class SharedFields(Banded):
             band = self.taken[name](rank, shape)
             yield band.astype(np.int8) if name == "zone" else band
 
-    def joined(self, more: SharedFields) -> SharedFields:
-        """Return these fields and others."""
-        return SharedFields(self.contact, {**self.taken, **more.taken})
+
+def joined(fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+    """Return fields, and some of others."""
+    if isinstance(fields, SharedFields) and isinstance(more, SharedFields):
+        return SharedFields(fields.contact, {**fields.taken, **{name: more.taken[name] for name in names}})
+    return {**fields, **{name: more[name] for name in names}}
 
 
 def rigid(rank: int, shape: tuple[int, int]) -> Array:

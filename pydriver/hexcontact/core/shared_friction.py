@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,26 +28,30 @@ from .steps import AHEAD, CyclesOfWear
 _FIELDS = (*CORE["fields"], *CORE["zone"])
 
 
+class Friction(Protocol):
+    """Friction over the plane."""
+
+    def over(self, lattice: Lattice) -> FrictionLaw:
+        """Return the law at the nodes of a window."""
+        ...
+
+
 class Part(FrictionalContact):
     """The part of this rank of a contact: its rows, or all."""
 
     def __init__(
         self,
         gap: Field,
-        friction: Callable[[Lattice], FrictionLaw],
+        friction: Friction,
         lattice: Lattice,
         own: Lattice,
         **given: Any,
     ) -> None:
         with ranks.agreed():
-            values, law = gap.over(own), friction(lattice)
+            values, law = gap.over(own), friction.over(own)
         self.share, self.law = gap.share, law
         given |= {"friction_coefficient": law, "rim_warning": False, "own": own}
         super().__init__(lattice, given.pop("pair"), values, np.isfinite(values), **given)
-
-    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> ContactState:
-        """Return the state with given fields and numbers."""
-        return ContactState(**fields, **numbers)
 
     def measured(self, state: ContactState) -> tuple[dict[str, float], bool]:
         """Return the measures of a state, and whether its pressure rises to an end of the surface."""
@@ -64,10 +68,8 @@ class Part(FrictionalContact):
 
     def friction_rows(self) -> Array:
         """Return own rows of the coefficient of friction."""
-        first = self.own.row_first - self.lattice.row_first
-        law = self.law.on((slice(first, first + self.own.n_row), slice(None)))
-        assert law.limits is not None
-        return np.broadcast_to(law.limits[0], self.own.shape)
+        assert self.law.limits is not None
+        return np.broadcast_to(self.law.limits[0], self.own.shape)
 
 
 class _Shared(NamedTuple):
@@ -113,7 +115,7 @@ def _kept(found: Any, ends: list[int]) -> Any:
     if not isinstance(found, ContactState):
         return found
     ranks.held[ends.pop(0)] = found
-    return _Kept({name: value for name, value in vars(found).items() if not isinstance(value, np.ndarray)})
+    return _Kept(found.parts()[1])
 
 
 def _take(number: int, name: str, values: NDArray[Any]) -> None:
@@ -185,17 +187,18 @@ class SharedState(SharedObject):
 
     def __init__(self, contact: SharedFriction) -> None:
         super().__init__()
-        self.contact, self.numbers = contact, dict[str, Any]()
+        self.contact, self._numbers = contact, set[str]()
 
     def known(self, numbers: Mapping[str, Any]) -> SharedState:
         """Return the state with its numbers."""
-        self.numbers = dict(numbers)
+        self._numbers = {*numbers}
         vars(self).update(numbers)
         return self
 
-    def fields(self, names: tuple[str, ...] = _FIELDS, **more: Rows) -> SharedFields:
-        """Return fields, each of which is taken from the ranks at its use."""
-        return SharedFields(self.contact, {name: self.rows(name) for name in names} | more)
+    def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return fields, each of which is taken from the ranks at its use, and numbers."""
+        fields = SharedFields(self.contact, {name: self.rows(name) for name in _FIELDS})
+        return fields, {name: value for name, value in vars(self).items() if name in self._numbers}
 
     def as_start(self) -> SharedState:
         """Return what the next load step starts from: the state without the slip of the last one."""
@@ -204,7 +207,8 @@ class SharedState(SharedObject):
 
     def gathered(self) -> ContactState:
         """Return the state with its fields on this rank."""
-        return ContactState(**self.fields(), **self.numbers)
+        fields, numbers = self.parts()
+        return ContactState(**{**fields, **numbers})
 
 
 class SharedFriction(SharedObject):
@@ -213,7 +217,7 @@ class SharedFriction(SharedObject):
     def __init__(
         self,
         gap: Field,
-        friction: Callable[[Lattice], FrictionLaw],
+        friction: Friction,
         lattice: Lattice,
         by_rows: bool,
         **given: Any,
@@ -239,7 +243,16 @@ class SharedFriction(SharedObject):
         """Attempt a load step as a whole and in halves."""
         return self.method("attempt", *arguments, **named)
 
-    def state(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> SharedState:
+    def extended(self, state: SharedState, lattice: Lattice) -> SharedState:
+        """Return a state of a smaller window, `lattice`, on the window of this problem."""
+        found: SharedState = self.method("extended", state, lattice)
+        return found
+
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        self.method("wear", self.given({"depth": depth}, "depth"))
+
+    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> SharedState:
         """Return the state with given fields and numbers."""
         found: SharedState = self.method("assembled", self.given(fields), numbers)
         return found
@@ -323,7 +336,8 @@ class SharedCycles(SharedObject):
                 )
                 for rank, shape in contact.parts()
             ]
-            return np.concatenate(rows, axis=1).astype(np.float32).reshape(2, 3, *contact.lattice.shape)
+            found: Any = np.concatenate(rows, axis=1).astype(np.float32)
+            return np.asarray(found.reshape(2, 3, *contact.lattice.shape))
 
         return cycles, motions, Later((2, 3, *contact.lattice.shape), "f4", tractions)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
+from ..variables import WORN
 from . import flat
 from .contact import ElasticPair
 from .flat import AdaptiveSteps as AdaptiveSteps
@@ -16,7 +17,6 @@ from .flat import WearSettings as WearSettings
 from .flat import begin_step as begin_step
 from .flat import forget_changes as forget_changes
 from .flat import new_steps as new_steps
-from ..variables import WORN
 from .friction import ContactState, FrictionalContact
 from .handles import Handle
 from .lattice import Lattice

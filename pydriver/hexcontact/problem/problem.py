@@ -261,6 +261,11 @@ class Problem:
         """The gap before loading at any point."""
         return self._gap
 
+    @property
+    def plane_friction(self) -> FrictionField:
+        """The law of friction at any point."""
+        return self._friction
+
     def gap_in(self, step: LoadStep | None) -> PlaneField:
         """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:

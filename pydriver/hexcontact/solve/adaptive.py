@@ -63,7 +63,7 @@ class AdaptivePath(GivenPath):
             self.position, fraction = int(control["position"]), float(control["fraction"])
             self._steps = core.restored(self._steps._replace(fraction=fraction), control["chooser"])
             if before[-1].companion:
-                self._whole = window.assembled(before[-1].companion, control["companion"])
+                self._whole = window.contact.assembled(before[-1].companion, control["companion"])
 
     def _numbered(self, target: LoadStep) -> LoadStep:
         """Return a load step with its number among the recorded ones."""
@@ -116,7 +116,7 @@ class AdaptivePath(GivenPath):
         }
         companion: Mapping[str, Any] = {}
         if self._whole is not None:
-            companion, control["companion"] = self.window.parts(self._whole)
+            companion, control["companion"] = self._whole.parts()
         return dataclasses.replace(step, companion=companion, control=control, load_fraction=control["done"])
 
     def _taken(

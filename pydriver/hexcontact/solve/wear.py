@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core import steps as core
 from ..core.friction import CONTROLS, ContactState
+from ..core.shared import joined
 from ..errors import DeckError, PathWarning
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
@@ -158,7 +159,7 @@ class WearPath(GivenPath):
         return dataclasses.replace(
             step,
             history=history,
-            fields=self.window.joined(step.fields, fields, WORN),
+            fields=joined(step.fields, fields, WORN),
             companion=beside,
             control=self._control([end[0] for end in ends], np.array([end[1] for end in ends]), now),
             load_fraction=done,

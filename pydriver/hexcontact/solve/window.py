@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from ..core.shared import (
     SharedSolution,
     rigid,
 )
-from ..core.shared_friction import SharedCycles, SharedFriction, SharedState, gap_in_rows
+from ..core.shared_friction import SharedCycles, SharedFriction, gap_in_rows
 from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
@@ -272,22 +272,24 @@ class SharedWindow(Window):
 
     def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
         rows = {name: solution.rows(name) for name in ("initial_gap", *self.state)}
-        fields = SharedFields(self.contact, rows | self._moved(solution))
+        fields = SharedFields(self.contact, rows | displaced_rows(self, solution))
         return dict(fields) if self.steps_held else fields
 
-    def _moved(self, solution: Any) -> dict[str, Rows]:
-        """Return the displacements of the surfaces that the deck names."""
-        moved: dict[str, Rows] = {}
-        for body in (1, 2):
-            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            if names and (pair := _pair_of_body(self.case, body)) is None:
-                moved |= dict.fromkeys(names, rigid)
-            elif names:
-                if body not in self._bodies:
-                    self._bodies[body] = SharedOperator(self.lattice, pair, 1.0 if body == 1 else -1.0)
-                found = Displacement(solution, self._bodies[body], self.case.solver.coupling == "goodman")
-                moved |= {name: found.rows(name[-1]) for name in names}
-        return moved
+
+def displaced_rows(window: Window, solution: Any) -> dict[str, Rows]:
+    """Return the displacements of the surfaces that the deck names, of a solution that all ranks share."""
+    found: dict[str, Rows] = {}
+    for body in (1, 2):
+        names = [name for name in fields_of(window.case) if name.startswith(f"displacement_{body}")]
+        pair = _pair_of_body(window.case, body) if names else None
+        if pair is None:
+            found |= dict.fromkeys(names, rigid)
+            continue
+        if body not in window._bodies:
+            window._bodies[body] = SharedOperator(window.lattice, pair, 1.0 if body == 1 else -1.0)
+        moved = Displacement(solution, window._bodies[body], window.case.solver.coupling == "goodman")
+        found |= {name: moved.rows(name[-1]) for name in names}
+    return found
 
 
 def window_over(
@@ -362,16 +364,6 @@ class FrictionWindow(Window):
         entry = "interpolated" if solver.entry == "interpolated" else "implicit"
         return {"entry": entry, "tolerance": solver.tolerance}
 
-    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> Any:
-        """Return the state with some fields and numbers."""
-        return ContactState(**fields, **numbers)
-
-    def parts(self, state: Any) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
-        """Return the fields and the numbers of a state."""
-        known = vars(state)
-        fields = {name: value for name, value in known.items() if isinstance(value, np.ndarray)}
-        return fields, {name: value for name, value in known.items() if name not in fields}
-
     def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
         """Return cycles that wear the surfaces."""
         return CyclesOfWear(settings, self.case.pair, steps, state)
@@ -379,10 +371,6 @@ class FrictionWindow(Window):
     def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
         """Remember the worn depth of a cycle, which the core has set."""
         self.worn = fields["worn_depth"]
-
-    def joined(self, fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
-        """Return fields, and some of others."""
-        return {**fields, **{name: more[name] for name in names}}
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
@@ -404,7 +392,8 @@ class FrictionWindow(Window):
         """Return the whole state, and set the worn depth of the step."""
         if (worn := step.fields.get("worn_depth")) is not None:
             self.wear(np.array(worn))
-        return self.assembled(*state_of(step))
+        found: ContactState = self.contact.assembled(*state_of(step))
+        return found
 
     # --- history ------------------------------------------------------------------------------------------
 
@@ -447,14 +436,12 @@ def state_of(step: Step) -> tuple[dict[str, Any], dict[str, Any]]:
     return fields, numbers | {name: int(step.history[name]) for name in ("sweeps", "cuts")}
 
 
-class SharedFrictionWindow(SharedWindow, FrictionWindow):
+class SharedFrictionWindow(FrictionWindow):
     """Contact with friction whose rows all ranks share; each evaluates the gap at its nodes.
 
     Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those of all
     rows, which each rank has then, as those of a small window.
     """
-
-    state = STATE[True]
 
     def __init__(
         self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
@@ -470,44 +457,26 @@ class SharedFrictionWindow(SharedWindow, FrictionWindow):
         """Return the solver for a gap."""
         case = self.case
         return SharedFriction(
-            *(gap, case.friction_law, self.lattice, self.by_rows),
+            *(gap, case.plane_friction, self.lattice, self.by_rows),
             pair=case.solved_pair,
             coupling="goodman" if case.solver.coupling == "goodman" else "full",
             interface=case.interface,
         )
 
-    advance = FrictionWindow.advance
-
     def _move(self, target: LoadStep) -> None:
         self.contact = self._shared(self.case.gap_in(target))
 
     def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
-        found, unbounded = self.contact.method("measured", solution)
-        return found, unbounded
+        found: tuple[dict[str, float], bool] = self.contact.method("measured", solution)
+        return found
 
     def _larger(self, solution: Any) -> Lattice:
         larger: Lattice = self.contact.method("grown", solution)
         return larger
 
-    grown = Window.grown
-
-    def carried(self, state: Any, lattice: Lattice) -> Any:
-        """Return a state on this window; the history of the new nodes follows from it."""
-        return None if state is None else self.contact.method("extended", state, lattice)
-
-    def restored(self, step: Step) -> Any:
-        """Return the whole state, and set the worn depth of the step."""
-        if (worn := step.fields.get("worn_depth")) is not None:
-            self.contact.method("wear", self.contact.given({"depth": np.asarray(worn)}, "depth"))
-        return self.assembled(*state_of(step))
-
-    def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> Any:
-        """Return the state with some fields and numbers."""
-        return self.contact.state(fields, numbers)
-
-    def parts(self, state: Any) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
-        """Return the fields and the numbers of a state."""
-        return state.fields(), state.numbers
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        self.contact.wear(depth)
 
     def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
         """Return cycles that wear the surfaces."""
@@ -515,12 +484,6 @@ class SharedFrictionWindow(SharedWindow, FrictionWindow):
 
     def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
         """Remember nothing: the core has the worn depth."""
-
-    def joined(self, fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
-        """Return fields, and some of others."""
-        if not isinstance(fields, SharedFields):
-            return super().joined(fields, more, names)
-        return SharedFields(self.contact, {**fields.taken, **{name: more.taken[name] for name in names}})
 
     def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:
         """Return the error of a step that did not converge, from its fields, which are gathered here."""
@@ -537,7 +500,7 @@ class SharedFrictionWindow(SharedWindow, FrictionWindow):
         if math.isnan(self.case.friction_coefficient) and self.friction.limits:
             rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
         if self.by_rows:
-            rows |= self._moved(solution)
+            rows |= displaced_rows(self, solution)
         fields: Any = SharedFields(self.contact, rows)
         if not self.by_rows and any(name in DISPLACEMENTS for name in fields_of(self.case)):
             fields = dict(fields) | self._displaced(fields)

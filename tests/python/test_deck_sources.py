@@ -314,7 +314,7 @@ WRONG = [
     ("# nothing\n\n", ["history.csv: is empty; expected a line of headers"]),
     (
         "normal_load,tangential_load_x\n10,0\n10,3\n10,6\n",
-        ["series.tangential_load_x = 6.0: gross sliding: the tangential load of 6 N in load step 3"],
+        ['series.tangential_load_x = "6 N": gross sliding: the tangential load of 6 N in load step 3'],
     ),
 ]
 

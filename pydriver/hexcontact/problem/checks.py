@@ -60,7 +60,7 @@ def checked(
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
             period = repeating.period if repeating else _SOME_PERIOD
             steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
-            found += against
+            found += [fault for fault in against if repeating or fault.key[-1] not in MEANS]
             if {"grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
                 found += _mistakes(tables, _period_problems(tables, steps, period))
                 found += _mistakes(tables | {"solver": solver}, _rolling_problems(tables, solver))
@@ -283,9 +283,8 @@ def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> M
             continue
         length = spacing(segment.rolling_direction or 0.0)
         if not length:
-            degrees = f"{math.degrees(segment.rolling_direction or 0.0):g} deg"
             sentence = "expected the direction of a row of the lattice; or remove grid.direction"
-            return Mistake((*key, "rolling_direction"), degrees, sentence)
+            return Mistake((*key, "rolling_direction"), segment.rolling_direction or "0 deg", sentence)
         if isinstance(segment.rolling, float) and segment.rolling > MOST_STEPS * length:
             sentence = f"expected at most {MOST_STEPS} spacings of the lattice, each of them a load step"
             return Mistake((*key, "rolling"), segment.rolling, sentence)

@@ -578,6 +578,14 @@ def test_bad_formula(bad: Any) -> None:
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_formula_without_a_value() -> None:
-    with pytest.raises(DeckError, match="NaN"):
-        Case.from_toml(ROOT / "cases/two_pads.toml", {"body.1.surface.expression": "sqrt(x)"}).run()
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("sqrt(x)", "expected numbers, .*; it is NaN"),
+        ("9**9**9**9*x", "expected numbers, .*; it is -inf"),
+        ("9**9**9**9*(x**2 + y**2)", "nothing can touch at the center, where no height is finite"),
+    ],
+)
+def test_formula_without_a_value(expression: str, words: str) -> None:
+    with pytest.raises(DeckError, match=rf"body\.1\.surface\.expression: {words}"):
+        Case.from_toml(ROOT / "cases/two_pads.toml", {"body.1.surface.expression": expression})

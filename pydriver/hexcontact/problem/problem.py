@@ -419,8 +419,8 @@ class Problem:
             sentence = f"no window can be found: {error}{soft}"
             key: tuple[str, ...] = ("grid",)
             if not (self._gap.given or grid.center):
-                key = ("body", "2" if self.surfaces.surface_1.shape == "flat" else "1", "surface")
-                sentence = f"{error}{soft}; expected a shape that bounds the contact"
+                key = (self.surfaces.key_of("2" if self.surfaces.surface_1.shape == "flat" else "1"),)
+                sentence = f"{error}{soft}; expected a shape of finite heights that bounds the contact"
             raise deck_error([Mistake(key, MISSING, sentence)], source) from None
         # by force, and by approach
         self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())

@@ -221,6 +221,14 @@ def test_all_shapes_of_the_deck_are_there() -> None:
             'angle = 30: expected an angle with its unit such as "30 deg"',
         ),
         (
+            lambda: Cylinder(radius=1.0, length=2.0, profile="crown"),
+            'length: unknown key; did you mean shape = "roller", which has a length?',
+        ),
+        (
+            lambda: Punch(sides=[1.0, 2.0]),
+            'sides: unknown key; did you mean shape = "rectangular_punch", which has width and length?',
+        ),
+        (
             lambda: Power(exponent=2, coefficient="3 mm"),
             'coefficient = "3 mm": expected a coefficient in m^-1 above 0 such as "0.1 mm^-1"; '
             '"mm" is a length',

@@ -292,6 +292,10 @@ def test_counted_work_of_slender_contacts_with_friction() -> None:
 
 
 BAD_GRIDS = {
+    "three": (
+        {"spacing": ["1 um", "2 um", "3 um"]},
+        r'\Agrid.spacing = .*: expected a length above 0, two of them such as .*, or "auto"\Z',
+    ),
     "two": ({"spacing": [1e-5, 2e-5]}, "spacing = .*expected one length on an equilateral lattice"),
     "angle": (
         {"lattice": "rectangular", "spacing": 1e-5, "cell_angle": "80 deg"},

@@ -175,8 +175,9 @@ class Table(BaseModel):
                 raise _error(cls.__name__, [problem for problem in found if problem.key == (other,)])
             corrected = {meant.get(key) or key: value for key, value in data.items()}
             remaining = list(cls.conflicts(corrected))
+            blamed = {problem.key for problem in found}
             for key, sentence in conflicts:
-                if (key, sentence) in remaining:
+                if (key, sentence) in remaining and (key,) not in blamed:
                     found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:
             raise _error(cls.__name__, found)

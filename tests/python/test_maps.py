@@ -382,6 +382,10 @@ def test_holes_are_refused_opened_or_filled(file: Any) -> None:
     assert filled.run().dataset.attrs["notes"] == "10 holes of the map of body 1 are filled, not measured"
     rows = " ".join(row[1] for row in case_rows(filled))
     assert "10 holes filled with the means of their neighbors" in rows
+    holed[30:33, 39:42] = BALL[30:33, 39:42]
+    one = case({**of_file(file("hole.csv", rows_of(holed).replace("nan", "")), **MATRIX), "holes": "fill"})
+    assert "; 1 hole filled with" in " ".join(row[1] for row in case_rows(one))
+    assert "1 hole of the map of body 1 is filled" in plausibility.unjudged(one)
     opened = case({**surface, "holes": "open"})
     gap = opened.initial_gap(opened.lattice)[0]
     assert np.isinf(gap[np.hypot(opened.lattice.x, opened.lattice.y) < 10e-6]).all()

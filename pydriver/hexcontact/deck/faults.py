@@ -38,15 +38,15 @@ class Source:
     data: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # the tables as written
 
     def written(self, problem: Mistake) -> object:
-        """Return the value of a mistake as it is written, with its unit."""
+        """Return the value of a mistake, a number in SI as it is written, with its unit."""
         found: Any = self.data
         for part in problem.key:
             try:
                 found = found[part]
             except (LookupError, TypeError):
                 return problem.value
-        same = isinstance(found, str) or (isinstance(found, list) and isinstance(problem.value, tuple))
-        return found if same and problem.value is not MISSING else problem.value
+        kinds = {float: str, tuple: list}  # as read: as written
+        return found if isinstance(found, kinds.get(type(problem.value), ())) else problem.value
 
     def found(self, key: str) -> tuple[str, Place | None]:
         """Return the file of a dotted key and the place in it; no file for overrides and cases of Python."""

@@ -15,7 +15,7 @@ from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MEANS, MOST_STEPS
 from ..errors import DeckError
-from ..text import did_you_mean, listed, quantity, shown
+from ..text import counted, did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
@@ -403,9 +403,8 @@ def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fou
             yield (kind, place, "estimate_error"), sentence
         wanted = table.steps if isinstance(table.steps, tuple) else ()
         if last and (lost := [n for n in wanted if n > last or (n % output.every and n != last)]):
-            sentence = (
-                f"there are no fields of step {lost[0]}: {last} load steps, output.every = {output.every}"
-            )
+            of = f"{counted(last, 'load step')}, output.every = {output.every}"
+            sentence = f"there are no fields of step {lost[0]}: {of}"
             yield (kind, place, "steps"), sentence
         if kind == "fatigue":
             for key, sentence in _cycle_problems(table, stages, output.every, frictional, numbered=last > 0):

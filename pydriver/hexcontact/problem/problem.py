@@ -28,7 +28,7 @@ from ..deck.read import Assembled, assemble
 from ..deck.surfaces import Roller
 from ..deck.toml import as_toml, plain
 from ..errors import DeckError
-from ..text import listed
+from ..text import counted, listed
 from ..variables import LOADS
 from . import checks, window
 from .arguments import Body
@@ -371,7 +371,7 @@ class Problem:
         what = "adaptive segment" if self.adaptive else "load step"
         return (
             f"{type(self).__name__}({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
-            f"{(n := len(self.load_steps))} {what}{'s' * (n > 1)})"
+            f"{counted(len(self.load_steps), what)})"
         )
 
     # --- the window -----------------------------------------------------------------------------------------

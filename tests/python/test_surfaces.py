@@ -395,6 +395,19 @@ def test_a_logarithmic_roller_is_loaded_evenly_at_its_design_load() -> None:
     assert middle == pytest.approx(2 * by_length / (math.pi * half_width), rel=3e-3)
 
 
+@pytest.mark.parametrize(
+    ("load", "ratio", "warns"),
+    [(13.0, 4, True), (13.0, 2, True), (13.0, 1, False), (8.0, 4, False), (14.5, 4, False)],
+)
+def test_cells_that_do_not_resolve_the_end_of_a_logarithmic_roller_warn(
+    load: float, ratio: int, warns: bool
+) -> None:
+    """At 13 N p_max is 228 MPa on 1 um along the axis, 255 on 4 and 260 on 8; at 8 N contact ends before."""
+    deck = ROOT / "cases/logarithmic_roller.toml"
+    case = Case.from_toml(deck, {"load.1.normal_load": load, "grid.cell_ratio": ratio})
+    assert any("do not resolve its ends" in sentence for sentence in case.warnings) == warns
+
+
 # A node lies on the end at 8 um along the axis, and at 4 and 2 um; none does on the others.
 @pytest.mark.parametrize(
     ("spacing", "ratio"),

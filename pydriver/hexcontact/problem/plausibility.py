@@ -141,8 +141,8 @@ LIMITS = (
         "cells of {end_cell} along the axis of the logarithmic roller do not resolve its ends, expected at "
         "most {end_needed}: the largest pressure may be up to a quarter too large",
         "Contact ends within (1 - P/P_design) b of the end, b the half-width of plane contact under the "
-        "design load; with longer cells p_max rose by up to 24 % on rollers of 12 to 100 b, with shorter ones "
-        "by 5 %",
+        "design load; with longer cells p_max rose by up to 24 % on rollers of 12 to 100 b, with shorter "
+        "ones by 5 %",
         most=1.0,
     ),
     Limit(

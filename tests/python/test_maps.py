@@ -765,6 +765,10 @@ def test_a_picture_shows_maps_profiles_or_the_gap_of_a_deck(deck: Path) -> None:
     drawn = figure.axes[0].collections[0].get_array()
     assert np.ma.count_masked(drawn) == 1
     assert float(drawn.max()) == pytest.approx(2.0)  # nm
+    assert "1 hole filled" not in figure.axes[0].get_legend_handles_labels()[1]
+    axes = surface(case([ball, {**rough, "holes": "fill", "offset": ["0.1 mm", "0 mm"]}])).axes[0]
+    [hole] = [line for line in axes.lines if line.get_label() == "1 hole filled"]
+    assert (hole.get_xdata()[0], hole.get_ydata()[0]) == pytest.approx((-0.3, -0.5))  # mm
     plain = surface(case(ball, other=None))
     assert plain.axes[-1].get_ylabel().startswith("gap (")
     done = inside(deck.parent, "plot", deck.name, "--what", "surface", "--step", "2")

@@ -37,8 +37,9 @@ def checked(
     """Check a deck, table by table and as a whole; the last value is the window, if it repeats."""
     found = list(given.problems)
     tables, of_tables = Deck.checked(given.data)
-    blamed = {problem.key for problem in found}
-    found += [problem for problem in of_tables if problem.key not in blamed]
+    if of_tables:
+        blamed = {problem.key for problem in found}
+        found += [problem for problem in of_tables if problem.key not in blamed]
     for problem in given.problems:
         tables.pop(str(problem.key[0]), None)
     if any(len(problem.key) == 1 and problem.key[0] not in Deck.known_keys() for problem in of_tables):
@@ -60,7 +61,9 @@ def checked(
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
             period = repeating.period if repeating else _SOME_PERIOD
             steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
-            found += [fault for fault in against if repeating or fault.key[-1] not in MEANS]
+            if against and not repeating:
+                against = [fault for fault in against if fault.key[-1] not in MEANS]
+            found += against
             if {"grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
                 found += _mistakes(tables, _period_problems(tables, steps, period))
                 found += _mistakes(tables | {"solver": solver}, _rolling_problems(tables, solver))

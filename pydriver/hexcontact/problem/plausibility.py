@@ -239,7 +239,7 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
             "needed_spacings": math.ceil(needed),
             **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
         }
-    if case.accuracy is None and not case.deck.interface:
+    if case.rollers and case.accuracy is None and not case.deck.interface:
         found |= _ends_of_rollers(case)
     if ring is not None and case.accuracy is None:
         errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)

@@ -251,7 +251,8 @@ class Result:
             Direction of the line from x, rad.
         through : tuple of float, optional
             A point on it (m), from which ``distance`` counts; default: the node next to the center of
-            pressure, DeckError if nothing is in contact.
+            pressure, in a window that repeats that of the largest pressure; DeckError if nothing is in
+            contact.
         """
         along: dict[str, Any] = {"angle": angle, "through": through, "points": points, "source": source}
         return self._nodal(step).section(*names, **along)

@@ -304,11 +304,15 @@ def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
-        **{f"{name}_words": counted(f"{found.get(name, 0.0):.2g}", "spacing") for name in _IN_SPACINGS},
-        "holes_words": counted(
-            found.get("holes_near_contact", 0), "hole of the height map lies", "holes of the height map lie"
-        ),
-        **{name: quantity(found.get(name, 0.0), "m", 2) for name in ("end_cell", "end_needed")},
+        **{
+            f"{name}_words": counted(f"{found[name]:.2g}", "spacing")
+            for name in _IN_SPACINGS
+            if name in found
+        },
+        "holes_words": counted(count, "hole of the height map lies", "holes of the height map lie")
+        if (count := found.get("holes_near_contact"))
+        else "",
+        **{name: quantity(found[name], "m", 2) for name in ("end_cell", "end_needed") if name in found},
         "spacing_words": counted(f"{found.get('spacings', 0.0):.2g}", "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": "one step" if steps == "1" else f"{steps} even steps",

@@ -10,6 +10,8 @@ module hc_section_line
 
   !> Least margin of a section on both sides: in spacings, and as a part of the width of the contact.
   real(wp), parameter :: least_margin = 2.0_wp, margin_part = 0.15_wp
+  !> Difference of pressures that are alike, as a share.
+  real(wp), parameter :: alike = 1.0e-6_wp
   !> Spacings between crossings that are one.
   real(wp), parameter :: same = 1.0e-9_wp
 
@@ -35,7 +37,8 @@ contains
     type(section_line_t), intent(out) :: line
     !> Allocated on failure: nothing is in contact
     type(error_t), allocatable, intent(out) :: error
-    !> Point of the line; default: the node next to the centroid of the pressure [m]
+    !> Point of the line [m]; default: the node next to the centroid of the pressure, where the lattice repeats that with the
+    !> largest pressure
     real(wp), intent(in), optional :: point(2)
     real(wp), allocatable :: x(:, :), y(:, :), along(:, :)
     real(wp) :: through(2), way(2), ends(2), margin
@@ -53,7 +56,9 @@ contains
     else
       through = [sum(x*pressure, mask=pressure > 0.0_wp), sum(y*pressure, mask=pressure > 0.0_wp)] &
                 /sum(pressure, mask=pressure > 0.0_wp)
-      node = minloc(hypot(x - through(1), y - through(2)))
+      ! contacts that repeat have no center: the largest pressure, of several alike the one in the middle
+      node = minloc(hypot(x - through(1), y - through(2)), &
+                    mask=.not. lattice%is_periodic() .or. pressure > (1.0_wp - alike)*maxval(pressure))
       through = [x(node(1), node(2)), y(node(1), node(2))]
     end if
     way = [cos(angle), sin(angle)]

@@ -46,7 +46,7 @@ module hc_zone_edge
     !> Number of points and of triangles
     integer :: n_point = 0, n_triangle = 0
   contains
-    procedure, private :: add_point, add_polygon, add_star, trim
+    procedure, private :: add_point, add_polygon, trim
   end type zone_mesh_t
 
 contains
@@ -361,15 +361,15 @@ contains
     integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
     logical, allocatable :: can_touch(:)
     integer, allocatable :: at_node(:, :), at_cut(:, :, :)
-    integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, leaving, col, row, half, k
+    integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, col, row, half, k
     real(wp) :: part, value
-    logical :: is_rim, touches
+    logical :: touches
 
     padded = with_rim(zone)
     n_with = triangles(padded)
     can_touch = band%part_of(candidate)
     associate (n_cut => n_with(1) + n_with(2), n_node => count(zone))
-      allocate (mesh%points(2, n_node + 3*n_cut), mesh%values(n_node + 3*n_cut), mesh%triangles(3, n_with(3) + 3*n_cut))
+      allocate (mesh%points(2, n_node + 2*n_cut), mesh%values(n_node + 2*n_cut), mesh%triangles(3, n_with(3) + 2*n_cut))
     end associate
     allocate (at_node(0:size(zone, 1) + 1, 0:size(zone, 2) + 1), source=0)
     allocate (at_cut(0:size(zone, 1) + 1, 0:size(zone, 2) + 1, 3), source=0)
@@ -377,8 +377,6 @@ contains
       do col = 0, size(zone, 1)
         do half = 1, 2
           length = 0
-          leaving = 0
-          is_rim = .false.
           do k = 1, 3
             ends(:, 1) = [col, row] + corner(:, k, half)
             ends(:, 2) = [col, row] + corner(:, modulo(k, 3) + 1, half)
@@ -389,12 +387,10 @@ contains
                 polygon(length) = number
               end if
               if (padded(here(1), here(2)) == padded(next(1), next(2))) cycle
-              if (padded(here(1), here(2)) /= 0) leaving = length + 1
               if (padded(here(1), here(2)) == 0) ends = ends(:, 2:1:-1)
             end associate
             associate (node => ends(:, 1), beyond => ends(:, 2), link => ends(:, 2) - ends(:, 1))
               touches = can_touch(band%place(beyond(1), beyond(2)))
-              is_rim = is_rim .or. .not. touches
               length = length + 1
               base = merge(node, beyond, link(2) > 0 .or. (link(2) == 0 .and. link(1) > 0))
               kind = merge(1, merge(2, 3, link(1) == 0), link(2) == 0)
@@ -415,11 +411,7 @@ contains
             end associate
           end do
           if (length == 0) cycle
-          if (is_rim) then
-            call mesh%add_star(polygon(:length), leaving, position(lattice, [col, row] + sum(corner(:, :, half), dim=2)/3.0_wp))
-          else
-            call mesh%add_polygon(polygon(:length))
-          end if
+          call mesh%add_polygon(polygon(:length))
         end do
       end do
     end do
@@ -454,19 +446,6 @@ contains
     mesh%points(:, number) = point
     mesh%values(number) = value
   end subroutine add_point
-
-  !> Add the triangles of a polygon, all with a point inside it, where the field is the mean of the corners.
-  pure subroutine add_star(mesh, corners, leaving, middle)
-    class(zone_mesh_t), intent(inout) :: mesh
-    !> Numbers of its corners, counterclockwise, and how many are before the edge
-    integer, intent(in) :: corners(:), leaving
-    !> The point [m]
-    real(wp), intent(in) :: middle(2)
-    integer :: number
-
-    call mesh%add_point(middle, sum(mesh%values(corners))/size(corners), number)
-    call mesh%add_polygon([number, cshift(corners, leaving)])
-  end subroutine add_star
 
   !> Add the triangles of a polygon, all with its first corner.
   pure subroutine add_polygon(mesh, corners)

@@ -71,7 +71,7 @@ class Case(Problem):
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
         Keys of [grid].
     cell_ratio, cell_angle, direction, boundary : optional
-        Keys of [grid]; an angle carries its unit: "90 deg".
+        Keys of [grid]; an angle in rad, or with its unit: "90 deg".
     normal_load, approach : float, optional
         The only load (N) or motion (m), in one step or in `steps`.
     mean_pressure, mean_gap, mean_traction_x, mean_traction_y : optional
@@ -142,9 +142,9 @@ class Case(Problem):
         center: Sequence[float | str] | None = None,
         origin: Sequence[float | str] | None = None,
         cell_ratio: float | None = None,
-        cell_angle: str | None = None,
+        cell_angle: float | str | None = None,
         boundary: str | None = None,
-        direction: str | None = None,
+        direction: float | str | None = None,
         normal_load: float | str | None = None,
         approach: float | str | None = None,
         mean_pressure: float | str | None = None,
@@ -332,4 +332,4 @@ def _deck_keys(arguments: Mapping[str, Any], lattice: Lattice | None) -> dict[st
     if isinstance(accuracy, int | float):
         found["accuracy"] = {"target": accuracy}
     found = {key: plain(value) for key, value in found.items()}
-    return found | {"load": with_radians(found["load"])} if "load" in found else found
+    return dict(with_radians(found))

@@ -90,6 +90,11 @@ def nearest(word: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     return of_folded[near[0]] if near else ""
 
 
+def counted(count: int | str, one: str, more: str = "") -> str:
+    """Write a number of things: "1 hole", "2 holes"; `more` is an irregular plural."""
+    return f"{count} {one if str(count) == '1' else more or f'{one}s'}"
+
+
 def did_you_mean(word: object, known: Iterable[str]) -> str:
     """Return "; did you mean ...?" with the nearest known word, or nothing."""
     near = nearest(word, known)

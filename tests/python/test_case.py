@@ -318,6 +318,10 @@ def test_a_case_from_python_is_a_deck_too() -> None:
             {"nodes_across": 41, "loads": []},
             "loads: expected either loads, or one load or motion with steps",
         ),
+        (
+            {"nodes_across": 41, "normal_load": None, "loads": [{"normal_load": 1.0}, {"twist": "1 deg"}]},
+            'load.2.twist = "1 deg": expected 0, or a [friction] table',
+        ),
         ({"nodes_across": 41, "normal_load": None, "loads": [3]}, "load.1 = 3: expected a table of keys"),
         (
             {"nodes_across": 41, "body_1": {**BALL, "poisson_ratio": 0.6}},

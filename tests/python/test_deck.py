@@ -128,7 +128,7 @@ WRONG = [
     (
         '"sphere", radius = "1 mm" }',
         '"punch", width = "1 mm", height = "2 mm" }',
-        'body.1.surface.width: unknown key; did you mean shape = "rectangular_punch"?',
+        'body.1.surface.width: unknown key; did you mean shape = "rectangular_punch", which has width and',
     ),
     (
         '"sphere", radius = "1 mm" }',

@@ -314,7 +314,7 @@ WRONG = [
     ("# nothing\n\n", ["history.csv: is empty; expected a line of headers"]),
     (
         "normal_load,tangential_load_x\n10,0\n10,3\n10,6\n",
-        ["series.tangential_load_x = 6.0: gross sliding: the tangential load of 6 N in load step 3"],
+        ['series.tangential_load_x = "6 N": gross sliding: the tangential load of 6 N in load step 3'],
     ),
 ]
 
@@ -373,7 +373,7 @@ def test_a_missing_value_keeps_the_quantity_and_is_counted(folder: Path, nothing
 
 def test_what_is_unusual_in_a_series_is_named(folder: Path) -> None:
     for text, sentence in (
-        (f"Operator: n.n.\n{PLAIN}", "line 2: expected 1 cells, as many as headers in line 1, not 3"),
+        (f"Operator: n.n.\n{PLAIN}", "line 2: expected 1 cell, as many as headers in line 1, not 3"),
         (f"{PLAIN}5,-1e-6,0\n", "; this is noise, 5e-08 of the largest one: write 0"),
         ("normal_load [mN]\n20 000\n", "expected a number without separators of thousands"),
         ('normal_load [N]\n"1,000"\n', "expected a decimal point, not a comma"),

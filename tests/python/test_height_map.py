@@ -128,6 +128,8 @@ def test_a_contact_near_a_hole_is_an_error_with_its_place() -> None:
     assert complaint(one).startswith(f"{sentence}{quantity(X[53], 'm')}, y = 0 m; fill it")
     doubts = plausibility.warnings(case(on_grid(BALL).where(~EVERYWHERE)))
     assert any("holes of the height map lie near the estimated contact" in doubt for doubt in doubts)
+    one.loc[{"x": X[45]}] = one.sel(x=X[45]).where(one.y != Y[30])
+    assert any("1 hole of the height map lies near" in doubt for doubt in plausibility.warnings(case(one)))
     one = on_grid(BALL)
     one.loc[{"x": X[55]}] = one.sel(x=X[55]).where(one.y != Y[30])
     assert float(case(one).run().max_pressure[-1]) == pytest.approx(801.7e6, rel=1e-3)

@@ -99,6 +99,8 @@ def test_the_file_and_the_deck_in_it_have_the_lattice(tmp_path: Path) -> None:
     assert result.lattice == case.lattice
     assert Case.from_text(result.dataset.attrs["deck"]).lattice == case.lattice
     assert ", at 50 deg" in dict(case_rows(case))["spacing"]
+    turned = case.changed(cell_angle="90 deg", direction="0.1 rad")
+    assert case.changed(cell_angle=math.pi / 2, direction=0.1).lattice == turned.lattice
     usual = case.changed(cell_angle="60 deg", cell_ratio=1.0)
     assert "cells" not in dict(case_rows(usual))["spacing"]
     assert usual.lattice.pattern == Lattice(1.0, 0, 0, 1, 1).pattern
@@ -292,6 +294,10 @@ def test_counted_work_of_slender_contacts_with_friction() -> None:
 
 
 BAD_GRIDS = {
+    "three": (
+        {"spacing": ["1 um", "2 um", "3 um"]},
+        r'\Agrid.spacing = .*: expected a length above 0, two of them such as .*, or "auto"\Z',
+    ),
     "two": ({"spacing": [1e-5, 2e-5]}, "spacing = .*expected one length on an equilateral lattice"),
     "angle": (
         {"lattice": "rectangular", "spacing": 1e-5, "cell_angle": "80 deg"},

@@ -382,6 +382,10 @@ def test_holes_are_refused_opened_or_filled(file: Any) -> None:
     assert filled.run().dataset.attrs["notes"] == "10 holes of the map of body 1 are filled, not measured"
     rows = " ".join(row[1] for row in case_rows(filled))
     assert "10 holes filled with the means of their neighbors" in rows
+    holed[30:33, 39:42] = BALL[30:33, 39:42]
+    one = case({**of_file(file("hole.csv", rows_of(holed).replace("nan", "")), **MATRIX), "holes": "fill"})
+    assert "; 1 hole filled with" in " ".join(row[1] for row in case_rows(one))
+    assert "1 hole of the map of body 1 is filled" in plausibility.unjudged(one)
     opened = case({**surface, "holes": "open"})
     gap = opened.initial_gap(opened.lattice)[0]
     assert np.isinf(gap[np.hypot(opened.lattice.x, opened.lattice.y) < 10e-6]).all()
@@ -761,6 +765,10 @@ def test_a_picture_shows_maps_profiles_or_the_gap_of_a_deck(deck: Path) -> None:
     drawn = figure.axes[0].collections[0].get_array()
     assert np.ma.count_masked(drawn) == 1
     assert float(drawn.max()) == pytest.approx(2.0)  # nm
+    assert "1 hole filled" not in figure.axes[0].get_legend_handles_labels()[1]
+    axes = surface(case([ball, {**rough, "holes": "fill", "offset": ["0.1 mm", "0 mm"]}])).axes[0]
+    [hole] = [line for line in axes.lines if line.get_label() == "1 hole filled"]
+    assert (hole.get_xdata()[0], hole.get_ydata()[0]) == pytest.approx((-0.3, -0.5))  # mm
     plain = surface(case(ball, other=None))
     assert plain.axes[-1].get_ylabel().startswith("gap (")
     done = inside(deck.parent, "plot", deck.name, "--what", "surface", "--step", "2")

@@ -239,7 +239,7 @@ def test_a_fault_of_several_segments_is_one_sentence(folder: Path) -> None:
     with pytest.raises(DeckError) as refused:
         Study("deck.toml", values)
     [line] = str(refused.value).splitlines()
-    assert "path.1.tangential_load_x = 24.0: expected 0, or a [friction] table" in line
+    assert 'path.1.tangential_load_x = "24 N": expected 0, or a [friction] table' in line
     assert "(likewise in 2 more segments) (in case 3: friction.coefficient = 0.0" in line
     invalid = Study("deck.toml", values, skip_invalid=True).invalid
     assert [case.fault for case in invalid] == [line.partition(" (in case")[0]] * 2

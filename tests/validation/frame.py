@@ -14,7 +14,7 @@ from rich.text import Text
 from hexcontact.cli.printed import console
 from hexcontact.errors import DeckError
 
-UNITS = dict.fromkeys(("-", "s", "N", "m", "Pa", "rad"), 1.0)
+UNITS = dict.fromkeys(("-", "s", "N", "m", "Pa", "rad", "nodes"), 1.0)
 UNITS |= {"mm": 1e-3, "um": 1e-6, "MPa": 1e6, "GPa": 1e9, "deg": math.pi / 180.0}
 """SI values of the units of tables."""
 
@@ -97,12 +97,20 @@ def cells_of(row: Row) -> list[str]:
             return ""
         return f"{value / factor:{form}} {unit}".rstrip() if row.absolute else f"{value:{form}}"
 
+    more = 0  # digits without which a row that passes looks as if it failed
+    while (
+        row.passed
+        and more < 2
+        and abs(float(f"{row.difference:.{1 + more}e}")) > float(f"{row.tolerance:.{more}e}")
+    ):
+        more += 1
+    forms = ("+.0f", ".0f") if unit == "nodes" else (f"+.{1 + more}e", f".{more}e")
     return [
         row.case,
         row.quantity + (f" ({unit})" if unit else ""),
         *(number(getattr(row, name)) for name in _VALUES),
-        deviation(row.difference, "+.1e"),
-        deviation(row.tolerance, ".0e"),
+        deviation(row.difference, forms[0]),
+        deviation(row.tolerance, forms[1]),
         {True: "ok", False: "FAIL", None: ""}[row.passed],
     ]
 

@@ -26,7 +26,7 @@ from ..core.measures import line_of
 from ..deck.read import recorded
 from ..deck.surfaces import Punch, Surface
 from ..errors import DeckError
-from ..text import TextTable, html_table, quantity, text_table
+from ..text import TextTable, counted, html_table, quantity, text_table
 from ..variables import VARIABLES, spelled
 from . import friction, hertz_gap
 from .friction import LubkinTorsion, MindlinContact, SuperposedContact
@@ -578,7 +578,8 @@ def compare(
     entries = [entry for one in known for entry in _entries(data, one)]
     radius = float(data["contact_radius"]) if "contact_radius" in data else 0.0
     if entries and radius:
-        spacings = f"{radius / float(dataset.attrs['lattice_spacing']):.3g} spacings in the contact radius"
+        number_of = f"{radius / float(dataset.attrs['lattice_spacing']):.3g}"
+        spacings = f"{counted(number_of, 'spacing')} in the contact radius"
         note = f"{spacings}; {note}" if note else spacings
     return Comparison(entries, number, note)
 

@@ -31,7 +31,7 @@ from ..problem.preview import case_rows
 from ..problem.problem import Problem
 from ..result.history_words import load_or_motion, worth_showing
 from ..result.result import Result
-from ..text import quantity, visible
+from ..text import counted, quantity, visible
 from ..variables import RESIDUALS, label_of
 from . import printed
 
@@ -92,7 +92,7 @@ def _unfinished(result: Result) -> str:
     planned = int(result.dataset.attrs.get("planned_steps", 0))
     reason = str(result.dataset.attrs.get("stopped", ""))
     of = f" of {planned}" if planned else ""
-    return f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
+    return f"Unfinished run: {counted(f'{len(result)}{of}', 'load step')}. {reason}".strip()
 
 
 def _kept(shown: int, steps: int) -> str:

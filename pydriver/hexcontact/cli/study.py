@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
-from ..text import text_table
+from ..text import counted, text_table
 from . import frame
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _plan(study: Study, as_json: bool) -> frame.Content:
     ]
     print(text_table(headers, rows))
     counts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
-    frame.print_output(f"{study.title}: {len(study)} cases, {', '.join(counts)}")
+    frame.print_output(f"{study.title}: {counted(len(study), 'case')}, {', '.join(counts)}")
     return None
 
 
@@ -181,13 +181,17 @@ class _State:
         number = study.folder.number
         if not quiet:
             files = f"their files in {study.folder.folder}/"
-            frame.print_output(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
+            frame.print_output(
+                f"written: {study.output}, {self.done} of {counted(len(study), 'case')} ({files})"
+            )
         for case, outcome in self.failures[:_MOST_NAMED]:
             frame.print_error(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
         if len(self.failures) > _MOST_NAMED:
             frame.print_error(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
         if self.missing:
-            frame.print_error(f"{self.missing} of {len(study)} cases have not been run")
+            frame.print_error(
+                f"{self.missing} of {counted(len(study), 'case has', 'cases have')} not been run"
+            )
         if any(outcome.lasting for _, outcome in self.failures):
             frame.print_error("--retry runs cases again that failed by themselves")
 
@@ -257,7 +261,9 @@ def _run_missing(study: Study, **options: Any) -> None:
         with signal_pipe() as pipe:
             in_background(work, pipe, ends)
     except Interrupted as signaled:
-        saved = f"{_State.of(study).done} of {len(study)} cases are finished and recorded"
+        saved = (
+            f"{_State.of(study).done} of {counted(len(study), 'case is', 'cases are')} finished and recorded"
+        )
         message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"
         raise frame.Failure(message, signaled.exit_code) from None
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from ..errors import DeckError, PlausibilityWarning
-from ..text import TextTable, quantity
+from ..text import TextTable, counted, quantity
 from ..variables import VARIABLES
 from .frame import AsJson, Content, argument, command, flag, print_error
 
@@ -117,4 +117,4 @@ def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
     screen.print(TextTable(check["title"], headers, cells))
     screen.print(check["note"], soft_wrap=True)
     passed = sum(row["passed"] for row in rows)
-    screen.print(f"{check['name']}: {passed} of {len(rows)} comparisons passed\n", soft_wrap=True)
+    screen.print(f"{check['name']}: {passed} of {counted(len(rows), 'comparison')} passed\n", soft_wrap=True)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask, reals
 from ..errors import DeckError, RimWarning, warn
+from ..text import counted
 from . import flat, kernel_cache
 from .calls import checked
 from .handles import Handle, HeldState, Solved
@@ -46,7 +47,10 @@ def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> Array:
 def _finite(values: Array, name: str) -> Array:
     array = np.ascontiguousarray(values)
     if not np.isfinite(array).all():
-        raise DeckError(f"{name}: {np.count_nonzero(~np.isfinite(array))} values are not finite numbers")
+        count = int(np.count_nonzero(~np.isfinite(array)))
+        raise DeckError(
+            f"{name}: {counted(count, 'value is not a finite number', 'values are not finite numbers')}"
+        )
     return array
 
 

@@ -256,7 +256,7 @@ def section_ends(
     """Return the ends of a line across a contact at an angle (rad) from x, with a margin on both sides.
 
     The third value is the distance (m) of its zero from the first end: at the point `through`, by default at
-    the node next to the center of pressure.
+    the node next to the center of pressure, or of a lattice that repeats the one with the largest pressure.
     """
     point = (0.0, 0.0) if through is None else through
     ends, zero = flat.section_of_pressure(lattice, pressure, angle, through is not None, point)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -35,6 +35,18 @@ class Source:
     # names and texts of the files that the deck includes, the one that counts most first
     included: tuple[tuple[str, str], ...] = ()
     of_override: str = "override: "  # prefix of the keys of overrides
+    data: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # the tables as written
+
+    def written(self, problem: Mistake) -> object:
+        """Return the value of a mistake, a number in SI as it is written, with its unit."""
+        found: Any = self.data
+        for part in problem.key:
+            try:
+                found = found[part]
+            except (LookupError, TypeError):
+                return problem.value
+        kinds = {float: str, tuple: list}  # as read: as written
+        return found if isinstance(found, kinds.get(type(problem.value), ())) else problem.value
 
     def found(self, key: str) -> tuple[str, Place | None]:
         """Return the file of a dotted key and the place in it; no file for overrides and cases of Python."""
@@ -69,7 +81,7 @@ def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     files = [source.name, *(name for name, _ in source.included)]
     for problem in problems:
         key = dotted(problem.key)
-        value = "" if problem.value is MISSING else shown(problem.value)
+        value = "" if problem.value is MISSING else shown(source.written(problem))
         lead = f"{source.locate(key)}{key}{value and ' = '}{value}"
         message = f"{lead}: {problem.sentence}" if lead else problem.sentence
         file, place = source.found(key)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Mask, reals
 from ..errors import DeckError
-from ..text import listed, quantity
+from ..text import counted, listed, quantity
 from .units import LENGTH, Dimension, UnitError, to_si
 
 if TYPE_CHECKING:
@@ -219,7 +219,7 @@ class HeightMap:
         """Describe the interpolation."""
         rule = "cubic spline" if self._degree > 1 else "bilinear"
         if special := int(np.count_nonzero(self.near_steps)):
-            rule += f", kept in the range of the heights near {special} points at steps and holes"
+            rule += f", kept in the range of the heights near {counted(special, 'point')} at steps and holes"
         return f"{rule}; largest overshoot {quantity(self.overshoot, 'm', 2)}"
 
 

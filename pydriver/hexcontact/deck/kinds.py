@@ -471,7 +471,7 @@ class Spacing(Kind):
 
     def _parse(self, value: object) -> Any:
         if isinstance(value, list | tuple):
-            return self.two.parse(value)
+            return self.two.parse(value) if len(value) == 2 else refuse(f"expected {self.expected}")
         return value if value == "auto" else self.one.parse(value)
 
 

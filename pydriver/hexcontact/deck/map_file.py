@@ -15,7 +15,7 @@ from .. import netcdf_library
 from ..arrays import Array
 from ..errors import DeckError
 from ..files import reading, text_of
-from ..text import listed, shown
+from ..text import counted, listed, shown
 from .series import MISSING_CELLS, split_header
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _of_text(path: Path, variable: str | None, profile: bool) -> MapFile:
     count = len(headers) or len(cells[0])
     wrong = [(n, len(row)) for n, row in zip(numbers, cells, strict=True) if len(row) != count]
     if wrong or not cells:
-        faults = [f"{path}, line {n}: expected {count} cells, not {found}" for n, found in wrong]
+        faults = [f"{path}, line {n}: expected {counted(count, 'cell')}, not {found}" for n, found in wrong]
         raise DeckError("\n".join(faults[:_MOST_SENTENCES]) or f"{path}: expected rows below the headers")
     _refuse_many(path, len(cells) * (1 if headers else count))
     values = _numbers(path, cells, numbers)

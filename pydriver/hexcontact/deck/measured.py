@@ -18,7 +18,7 @@ from pydantic import PrivateAttr, model_validator
 
 from ..arrays import Array
 from ..errors import DeckError
-from ..text import quantity
+from ..text import counted, quantity
 from .faults import MISSING
 from .height_map import HeightMap, Placed
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
@@ -237,8 +237,9 @@ class Measured(Surface):
             row, col = np.argwhere(np.isnan(z))[-1]
             at = [f"x = {quantity(float(x[row]), 'm')}", f"y = {quantity(float(y[col]), 'm')}"]
             where = ", ".join(at[self.extruded :])
-            points = "1 point has" if count == 1 else f"{count} points have"
-            sentence = f"{points} no height, one of them at {where}; expected "
+            sentence = (
+                f"{counted(count, 'point has', 'points have')} no height, one of them at {where}; expected "
+            )
             refuse_key("holes", MISSING, f'{sentence}"fill", or "open" if nothing can touch there')
         mean, along, across = self.plane
         height = z - mean - along * _centered(x)[:, None] - across * _centered(y)
@@ -368,7 +369,7 @@ class Measured(Surface):
     def holes_in_words(self) -> str:
         """Describe the holes."""
         done = {"fill": "filled with the means of their neighbors", "open": "open: nothing touches there"}
-        return f"{count} holes {done[self.holes]}" if (count := self.holes_found) else "no holes"
+        return f"{counted(count, 'hole')} {done[self.holes]}" if (count := self.holes_found) else "no holes"
 
     def __str__(self) -> str:
         """Name the shape and its file."""
@@ -583,7 +584,7 @@ class Profile(Measured):
         spacings = step / apart(self.angle + math.pi / 2)
         yield (
             f"{len(y)} points, y from {quantity(y.min(), 'm')} to {quantity(y.max(), 'm')}, "
-            f"{quantity(step, 'm', 3)} apart, {spacings:.3g} spacings of the lattice"
+            f"{quantity(step, 'm', 3)} apart, {counted(f'{spacings:.3g}', 'spacing')} of the lattice"
         )
         lowest = quantity(float(self._in_period(*self.field.first_touch)[1]), "m")
         yield f"{self._heights}; nearest to the other body at y = {lowest}"

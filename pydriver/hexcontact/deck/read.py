@@ -58,7 +58,7 @@ def assemble(
 ) -> Assembled:
     """Return a deck with its included decks merged, single keys replaced, and series of loads read."""
     if not ("include" in data or overrides or any(True for _ in _named_files(data))):
-        return Assembled(dict(data), text, source, [])
+        return Assembled(dict(data), text, replace(source, data=data), [])
     name = Path(source.name) if source.name else None
     merged, included = _merged(data, source, folder, (name.resolve(),) if name else (), [])
     if overrides:
@@ -67,8 +67,8 @@ def assemble(
         refuse_deep(overrides, "")
         merged = with_overrides(merged, overrides)
         refuse_deep(merged, source.name)
-    source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included))
     merged = copy.deepcopy(merged)
+    source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included), data=merged)
     for table, key, number in _named_files(merged):
         if number is None:  # read when the case is built, from any folder
             table[key] = str((folder / table[key]).absolute())

@@ -18,6 +18,7 @@ from pydantic import PrivateAttr
 
 from ..arrays import Array
 from ..errors import DeckError
+from ..text import counted
 from .kinds import Quantity, Whole
 from .measured import TwoLengths
 from .surfaces import PositiveLength, PositiveNumber, Surface, shape
@@ -142,4 +143,5 @@ class Rough(Surface):
         """Yield lines about its period, and its shortest wave beside the distance of nodes."""
         spacing = max(apart(0.0), apart(math.pi / 2))
         yield f"repeats after {self._in_words}"
-        yield f"shortest wave of {self.shortest / spacing:.3g} spacings; the contact area needs 8 or more"
+        shortest = counted(f"{self.shortest / spacing:.3g}", "spacing")
+        yield f"shortest wave of {shortest}; the contact area needs 8 or more"

@@ -31,6 +31,11 @@ class Separation:
         """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
         return self._sum(x, y) - (self.at_rest or self).first_touch[2]
 
+    def key_of(self, number: str) -> str:
+        """Return the key of the heights of a body in a deck."""
+        shape = (self.surface_1 if number == "1" else self.surface_2).shape
+        return f"body.{number}.surface" + ".expression" * (shape == "formula")
+
     def moved(self, by: ArrayLike) -> Separation:
         """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
         return Separation(self.surface_1.moved(by), self.surface_2.moved(by), self.at_rest or self)

@@ -17,7 +17,7 @@ from pydantic_core import PydanticCustomError
 from .. import netcdf_library
 from ..errors import DeckError
 from ..files import is_defect, require_ordinary, text_of
-from ..text import did_you_mean, folded, listed, shown
+from ..text import counted, did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Several, Text, refuse
 from .table_base import Table, extended, meaning
@@ -211,7 +211,8 @@ class Series(_Rows):
             yield "", "expected a file, or arrays such as normal_load = [10, 20, 30]"
         for key, array in arrays.items():
             if len(array) != (count := len(next(iter(arrays.values())))):
-                yield key, f"expected {count} entries, as many as {next(iter(arrays))} has, not {len(array)}"
+                entries = counted(count, "entry", "entries")
+                yield key, f"expected {entries}, as many as {next(iter(arrays))} has, not {len(array)}"
                 return
         for row, force, displacement in driven_twice(arrays):
             yield displacement, f"expected {force} or {displacement} in each row, not both (entry {row + 1})"
@@ -409,7 +410,7 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
     while len(headers) > 1 and not headers[-1] and not any(any(row[len(headers) - 1 :]) for row in rows):
         headers.pop()
     rows = [row if any(row[len(headers) :]) else row[: len(headers)] for row in rows]  # trailing separators
-    expected = f"expected {len(headers)} cells, as many as headers in line {lines[0][0]}"
+    expected = f"expected {counted(len(headers), 'cell')}, as many as headers in line {lines[0][0]}"
     problems = [
         f"{path}, line {number}: {expected}, not {len(row)}"
         for (number, _), row in zip(lines[1:], rows, strict=True)

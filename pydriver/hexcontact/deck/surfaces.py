@@ -113,6 +113,8 @@ class Surface(Argument):
     """Whether it touches a flat in about an ellipse, for a spacing of "auto"."""
     wave: ClassVar[str] = ""
     """Key of its shortest wavelength."""
+    others: ClassVar[Mapping[str, str]] = {}
+    """The shapes that have a key, by keys that this one does not have."""
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -181,6 +183,11 @@ class Surface(Argument):
 
     def _height(self, x: Array, y: Array) -> Array:
         raise NotImplementedError
+
+    @classmethod
+    def meant(cls, key: str) -> str:
+        """Return another shape, or a known key, that an unknown key may mean."""
+        return cls.others.get(key) or super().meant(key)
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
         """Return the keys, always with the shape."""
@@ -295,6 +302,10 @@ class Cylinder(Surface):
     radius: CurvatureRadius = meaning(..., "radius R")
     angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
     formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
+    others: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("length", "profile", "chamfer", "crown_radius", "design_load"),
+        'shape = "roller", which has a length',
+    )
 
     @property
     def curvature(self) -> Array:
@@ -336,18 +347,18 @@ class Punch(Surface):
 
     radius: Radius = meaning(..., "radius a of the flat end")
     formula: ClassVar[str] = "h = 0 for r ≤ a, nothing beyond"
+    others: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(
+            ("width", "height", "length", "side", "sides"),
+            'shape = "rectangular_punch", which has width and length',
+        ),
+        "edge_radius": 'shape = "rounded_punch" or "rectangular_punch"',
+    }
 
     @property
     def reach(self) -> float:
         """The radius."""
         return self.radius
-
-    @classmethod
-    def meant(cls, key: str) -> str:
-        """Return the shape that has sides, or a known key that an unknown one may mean."""
-        if key == "edge_radius":
-            return 'shape = "rounded_punch" or "rectangular_punch"'
-        return 'shape = "rectangular_punch"' if key in ("width", "height", "length") else super().meant(key)
 
     def _height(self, x: Array, y: Array) -> Array:
         return np.where(np.hypot(x, y) <= self.radius * _RIM, 0.0, np.inf)

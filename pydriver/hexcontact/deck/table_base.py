@@ -171,10 +171,13 @@ class Table(BaseModel):
             meant = {key: cls.meant(str(key)) for key in data if key not in known}
             given = {tuple(key.split(".")) for key in meant.values() if key}
             found = [problem for problem in found if problem.value is not MISSING or problem.key not in given]
+            if other := next((key for key, of in meant.items() if of.startswith("shape = ")), None):
+                raise _error(cls.__name__, [problem for problem in found if problem.key == (other,)])
             corrected = {meant.get(key) or key: value for key, value in data.items()}
             remaining = list(cls.conflicts(corrected))
+            blamed = {problem.key for problem in found}
             for key, sentence in conflicts:
-                if (key, sentence) in remaining:
+                if (key, sentence) in remaining and (key,) not in blamed:
                     found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:
             raise _error(cls.__name__, found)

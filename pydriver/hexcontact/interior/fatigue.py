@@ -18,6 +18,7 @@ from ..core import memory
 from ..core.lattice import Lattice
 from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError, NotInResult
+from ..text import counted
 from . import fields
 from .fields import Region, region
 from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, summed, window_over
@@ -126,7 +127,7 @@ def _of_tractions(loaded: Loaded, loads: Array, where: Region) -> Iterator[tuple
     most = max(block // (48 * len(steps)), 1)
     memory.require(
         memory_needed(lattice, where, len(steps)),
-        f"the stress at {where.count} points in {len(steps)} steps",
+        f"the stress at {counted(where.count, 'point')} in {counted(len(steps), 'step')}",
         "choose fewer points or steps",
     )
     if where.lattice is None or summed(lattice, where):

@@ -15,7 +15,7 @@ from ..deck.below import Fatigue, Stress
 from ..deck.read import recorded
 from ..errors import DeckError
 from ..files import reading, remove_stale, replacing
-from ..text import quantity
+from ..text import counted, quantity
 from .stress import extremes_of, place_of
 
 STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
@@ -66,7 +66,10 @@ def description(path: Path) -> list[str]:
     steps = np.atleast_1d(about["steps"] if "steps" in about else found["step"].values).tolist()
     sizes = " x ".join(str(n) for name, n in found.sizes.items() if name != "step") or "1"
     over = f"step {steps[0]}" if len(steps) == 1 else f"steps {steps[0]} to {steps[-1]}"
-    lines = [str(about["title"]), f"{about['content']} of body {about['body']}, {over}, {sizes} points"]
+    lines = [
+        str(about["title"]),
+        f"{about['content']} of body {about['body']}, {over}, {counted(sizes, 'point')}",
+    ]
     for name, values in found.data_vars.items():
         unit = str(values.attrs.get("units", "")).removesuffix("1")
         if unit == "rad":  # of critical planes

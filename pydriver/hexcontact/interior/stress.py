@@ -26,7 +26,7 @@ from ..deck.below import SOURCES
 from ..deck.keys import Body
 from ..deck.read import recorded
 from ..errors import DeckError, NotInResult
-from ..text import did_you_mean, percent, quantity
+from ..text import counted, did_you_mean, percent, quantity
 from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS
 from . import fields
 from .fields import Region, region
@@ -245,7 +245,7 @@ def below(
     if found.lattice is None or summed(lattice, found):
         memory.require(
             memory_needed(lattice, found, len(loads), loaded.coated),
-            f"the stress at {found.count} points in {len(loads)} steps",
+            f"the stress at {counted(found.count, 'point')} in {counted(len(loads), 'step')}",
             "choose fewer points or steps",
         )
         flat = fields.at_points(lattice, loads, body, layers, found.nodes)
@@ -369,7 +369,8 @@ def _in_box(
     whole, rows, cols = window_over(lattice, target)
     memory.require(
         memory_needed(lattice, where, len(loads), len(layers) > 1),
-        f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes in {len(loads)} steps",
+        f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes "
+        f"in {counted(len(loads), 'step')}",
         "choose a smaller box, or one nearer to the window, fewer depths or steps",
     )
     loads = embedded(lattice, whole, loads)

@@ -143,6 +143,12 @@ class Part:
         at[((row - middle[0]) % across == 0) & ((col - middle[1]) % along == 0)] = True
         at &= view.contact & (size > 0.02 * size.max())
         longest = float(size[at].max()) if at.any() else 1.0
+        reach = min(along * view.spacing, min(sides) or max(sides))
+        for axis, place in enumerate((view.x, view.y)):  # the ends of all arrows are inside the part
+            low, high = self.limits[2 * axis : 2 * axis + 2]
+            room = np.minimum(place[at] - low, high - place[at]) * longest
+            half = 0.5 * np.abs(vector[axis][at])
+            reach = float(np.min(room[half > 0.0] / half[half > 0.0], initial=reach))
         axes.quiver(
             view.x[at] * self.factor,
             view.y[at] * self.factor,
@@ -150,7 +156,7 @@ class Part:
             vector[1][at],
             angles="xy",
             scale_units="xy",
-            scale=longest / (0.95 * min(along * view.spacing, min(sides) or max(sides)) * self.factor),
+            scale=longest / (0.95 * reach * self.factor),
             pivot="mid",
             width=0.0045 if self.aspect < 2.0 else 0.0025 * self.aspect,  # of the width of the axes
             color=color,

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..arrays import Array
 from ..deck.measured import Measured
-from ..text import scaled
+from ..text import counted, scaled
 from .registry import figure
 from .style import EDGED, EXACT, legend_below, new_figure, set_title
 
@@ -44,10 +44,14 @@ def surface(case: Any) -> Figure:
 
 
 def _map(axes: Axes, one: Measured, case: Any) -> None:
-    """Draw the heights of a map as far as it is measured; points without one are gray."""
+    """Draw the heights of a map as far as it is measured; points without one are gray, or marked."""
     found, touch = one.placed("").map, case.surfaces.first_touch
     (x, y), height = (found.x + one.offset[0], found.y + one.offset[1]), -found.gap  # type: ignore[operator]
-    _colored(axes, x, y, height if one.upwards else -height, "height" if one.upwards else "gap", case, touch)
+    u, v, z, _ = one.points
+    row, col = np.nonzero(np.isnan(z) & (one.holes == "fill"))
+    filled = u[row] + one.offset[0], v[col] + one.offset[1]  # type: ignore[operator]
+    shown = height if one.upwards else -height
+    _colored(axes, x, y, shown, "height" if one.upwards else "gap", case, touch, filled)
 
 
 def _gap(axes: Axes, case: Any) -> None:
@@ -61,9 +65,16 @@ def _gap(axes: Axes, case: Any) -> None:
 
 
 def _colored(
-    axes: Axes, x: Array, y: Array, values: Array, words: str, case: Any, touch: Sequence[float]
+    axes: Axes,
+    x: Array,
+    y: Array,
+    values: Array,
+    words: str,
+    case: Any,
+    touch: Sequence[float],
+    filled: tuple[Array, ...] = (),
 ) -> None:
-    """Draw values over the plane, with the window and the point of first touch."""
+    """Draw values over the plane, with the window, the point of first touch and filled holes."""
     shown = np.ma.masked_invalid(values)
     times, unit = scaled(float(shown.max() - shown.min()), "m")
     scale, length = scaled(max(float(np.ptp(x)), float(np.ptp(y))), "m")
@@ -73,8 +84,12 @@ def _colored(
     u, v = _window(case)
     axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
     axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
+    if filled and filled[0].size:
+        holes: dict[str, Any] = {"mfc": "k", "mec": "w", "mew": 0.4, "ms": 3.5}
+        holes["label"] = f"{counted(filled[0].size, 'hole')} filled"
+        axes.plot(filled[0] * scale, filled[1] * scale, "o", **holes)
     axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})", aspect="equal")
-    legend_below(axes, ncols=2, fontsize=8)
+    legend_below(axes, ncols=3, fontsize=8)
 
 
 def _window(case: Any) -> tuple[Array, Array]:

@@ -28,6 +28,9 @@ _TABLES: dict[str, type[Table]] = {  # of arguments that take one
 }
 
 
+_ANGLES = ("twist", "rolling_direction", "grid.cell_angle", "grid.direction")
+
+
 def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
     """Let a method name the keyword nearest to an unknown one in its TypeError.
 
@@ -83,7 +86,7 @@ class Body(Argument, deck_keys.Body):
 
 
 def with_radians(value: Any, key: str = "") -> Any:
-    """Add the unit to bare angles of loads: in Python, unlike in a deck, all numbers are SI.
+    """Add the unit to bare angles of grid and loads: in Python, unlike in a deck, all numbers are SI.
 
     NaN is an empty entry of a series.
     """
@@ -91,7 +94,7 @@ def with_radians(value: Any, key: str = "") -> Any:
         return {name: with_radians(entry, name) for name, entry in value.items()}
     if isinstance(value, list):
         return [with_radians("" if key in COLUMNS and entry != entry else entry, key) for entry in value]
-    bare = key == "twist" and isinstance(value, int | float) and not isinstance(value, bool)
+    bare = key in _ANGLES and isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value!r} rad" if bare else value
 
 

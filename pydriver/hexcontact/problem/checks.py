@@ -15,7 +15,7 @@ from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MEANS, MOST_STEPS
 from ..errors import DeckError
-from ..text import did_you_mean, listed, quantity, shown
+from ..text import counted, did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
@@ -37,8 +37,9 @@ def checked(
     """Check a deck, table by table and as a whole; the last value is the window, if it repeats."""
     found = list(given.problems)
     tables, of_tables = Deck.checked(given.data)
-    blamed = {problem.key for problem in found}
-    found += [problem for problem in of_tables if problem.key not in blamed]
+    if of_tables:
+        blamed = {problem.key for problem in found}
+        found += [problem for problem in of_tables if problem.key not in blamed]
     for problem in given.problems:
         tables.pop(str(problem.key[0]), None)
     if any(len(problem.key) == 1 and problem.key[0] not in Deck.known_keys() for problem in of_tables):
@@ -60,6 +61,8 @@ def checked(
             known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
             period = repeating.period if repeating else _SOME_PERIOD
             steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
+            if against and not repeating:
+                against = [fault for fault in against if fault.key[-1] not in MEANS]
             found += against
             if {"grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
                 found += _mistakes(tables, _period_problems(tables, steps, period))
@@ -283,9 +286,8 @@ def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> M
             continue
         length = spacing(segment.rolling_direction or 0.0)
         if not length:
-            degrees = f"{math.degrees(segment.rolling_direction or 0.0):g} deg"
             sentence = "expected the direction of a row of the lattice; or remove grid.direction"
-            return Mistake((*key, "rolling_direction"), degrees, sentence)
+            return Mistake((*key, "rolling_direction"), segment.rolling_direction or "0 deg", sentence)
         if isinstance(segment.rolling, float) and segment.rolling > MOST_STEPS * length:
             sentence = f"expected at most {MOST_STEPS} spacings of the lattice, each of them a load step"
             return Mistake((*key, "rolling"), segment.rolling, sentence)
@@ -404,9 +406,8 @@ def _problems_below(tables: Mapping[str, Any], steps: Sequence[LoadStep]) -> Fou
             yield (kind, place, "estimate_error"), sentence
         wanted = table.steps if isinstance(table.steps, tuple) else ()
         if last and (lost := [n for n in wanted if n > last or (n % output.every and n != last)]):
-            sentence = (
-                f"there are no fields of step {lost[0]}: {last} load steps, output.every = {output.every}"
-            )
+            of = f"{counted(last, 'load step')}, output.every = {output.every}"
+            sentence = f"there are no fields of step {lost[0]}: {of}"
             yield (kind, place, "steps"), sentence
         if kind == "fatigue":
             for key, sentence in _cycle_problems(table, stages, output.every, frictional, numbered=last > 0):

@@ -15,8 +15,8 @@ from typing import Any, Literal, NamedTuple
 from ..deck.faults import MISSING, Mistake
 from ..deck.keys import Bulk, Load, Segment
 from ..deck.kinds import SMALLEST, Share
-from ..deck.series import MEANS, MOST_STEPS
-from ..text import quantity
+from ..deck.series import COLUMNS, MEANS, MOST_STEPS
+from ..text import quantity, worded
 from ..variables import BULK_STRESS, LOADS, ROLLED
 
 Control = Literal["force", "displacement"]
@@ -291,6 +291,9 @@ class History:
         return segment.model_copy(update=forces) if forces else segment
 
     def _complain(self, problem: Mistake) -> None:
+        if "series" in problem.key and isinstance(problem.value, float):  # of a row, in SI
+            unit = COLUMNS[str(problem.key[-1])].kind.dimension.unit
+            problem = problem._replace(value=worded(problem.value, unit))
         # the first fault of a key is enough: its segment has many steps, and may be repeated
         self._problems[problem.key] = self._problems.pop(problem.key, problem)
 

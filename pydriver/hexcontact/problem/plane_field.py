@@ -121,7 +121,7 @@ class PlaneField:
                 f"{key}: expected an array of the shape of x, {np.shape(x)}, one number for each node, "
                 f"not one of {values.shape}"
             )
-        self._refuse(values, np.isnan(values), x, y)
+        self._refuse(values, ~(values >= self.rule.least), x, y)
         return values
 
     def over(self, lattice: Lattice) -> Array:
@@ -167,8 +167,11 @@ class PlaneField:
         value, where = values[bad][0], place(x[bad][0], y[bad][0])
         if self.map and np.isinf(value):
             raise DeckError(f"{self.rule.key}: the map does not cover the window: it has no value at {where}")
-        shown = "NaN" if np.isnan(value) else f"{value:g}"
-        raise DeckError(f"{self.rule.key}: expected {self.rule.expected}; it is {shown} at {where}")
+        shown, key = "NaN" if np.isnan(value) else f"{value:g}", self.rule.key
+        if isinstance(self.source, Separation):
+            one = self.heights[0](x[bad][:1], y[bad][:1])
+            key = self.source.key_of("2" if one >= self.rule.least else "1")
+        raise DeckError(f"{key}: expected {self.rule.expected}; it is {shown} at {where}")
 
     @property
     def touch_fault(self) -> tuple[str, str]:

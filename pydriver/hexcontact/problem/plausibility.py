@@ -22,7 +22,7 @@ from ..core.measures import (
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
-from ..text import listed, percent, quantity
+from ..text import counted, listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
 from .problem import Problem
@@ -92,7 +92,7 @@ LIMITS = (
     ),
     Limit(
         "edge_spacings",
-        "{edge_tables}: {edge_spacings:.2g} spacings in the {radius_words} are too few for the largest value "
+        "{edge_tables}: {edge_spacings_words} in the {radius_words} are too few for the largest value "
         "at the surface: it lies at the edge of the contact, between nodes, where stresses fall by a tenth "
         f"within a tenth of a spacing; expected at least {_EDGE_SPACINGS}, or points deeper than a spacing",
         "The stress falls from the edge like the root of the distance: at 20 spacings by 7 % of p_max in a "
@@ -123,7 +123,7 @@ LIMITS = (
     ),
     Limit(
         "layer_spacings",
-        "the thinnest coating has {layer_spacings:.2g} spacings, expected at least 2: the lattice does not "
+        "the thinnest coating has {layer_spacings_words}, expected at least 2: the lattice does not "
         "resolve tractions that vary over its thickness",
         "Kernels hold for any thickness; tractions that are linear between nodes have no waves shorter than "
         "two spacings",
@@ -131,14 +131,23 @@ LIMITS = (
     ),
     Limit(
         "wave_spacings",
-        "the shortest wave of the surfaces has {wave_spacings:.2g} spacings, expected at least 4: the "
+        "the shortest wave of the surfaces has {wave_spacings_words}, expected at least 4: the "
         "lattice does not resolve it",
         "Tractions that are linear between nodes have no waves shorter than two spacings",
         least=4.0,
     ),
     Limit(
+        "end_cells",
+        "cells of {end_cell} along the axis of the logarithmic roller do not resolve its ends, expected at "
+        "most {end_needed}: the largest pressure may be up to a quarter too large",
+        "Contact ends within (1 - P/P_design) b of the end, b the half-width of plane contact under the "
+        "design load; with longer cells p_max rose by up to 24 % on rollers of 12 to 100 b, with shorter "
+        "ones by 5 %",
+        most=1.0,
+    ),
+    Limit(
         "holes_near_contact",
-        "{holes_near_contact} holes of the height map lie near the estimated contact: a contact that comes "
+        "{holes_words} near the estimated contact: a contact that comes "
         "within two points of one ends the run; fill them, as by gap.interpolate_na",
         "Contact beside a hole would end there only because the data do",
         most=0.0,
@@ -153,7 +162,7 @@ LIMITS = (
     ),
     Limit(
         "ring_spacings",
-        "the slip annulus of the tangential loop is {ring_spacings:.2g} spacings wide, expected at least 1: "
+        "the slip annulus of the tangential loop is {ring_spacings_words} wide, expected at least 1: "
         "its dissipated energy may be off by {ring_percent}",
         "A ring of nodes sticks or slips as a whole: (X2)",
         least=1.0,
@@ -162,6 +171,7 @@ LIMITS = (
 """All limits, in the order of the warnings."""
 
 _OPEN = (-math.inf, math.inf)
+_IN_SPACINGS = ("edge_spacings", "layer_spacings", "wave_spacings", "ring_spacings")
 _CORNERS = ("points", "line", "plane")  # keys of a region that has depths
 _ASSUMED = 0.5  # Q/mu P of shear that is prescribed by a motion: a ring of a fifth of the radius
 _NOTICED = 0.2  # Q/mu P below which slip dissipates next to no energy
@@ -229,6 +239,8 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
             "needed_spacings": math.ceil(needed),
             **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
         }
+    if case.rollers and case.accuracy is None and not case.deck.interface:
+        found |= _ends_of_rollers(case)
     if ring is not None and case.accuracy is None:
         errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
         found |= {
@@ -240,6 +252,19 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if entering := list(_entering(case)):
         error, steps, needed = max(entering)
         found |= {"step_error": error, "growing_steps": steps, "needed_steps": math.ceil(needed)}
+    return found
+
+
+def _ends_of_rollers(case: Problem) -> dict[str, float]:
+    """Return cells along the axis of a logarithmic roller over those that resolve its ends; else nothing."""
+    found: dict[str, float] = {}
+    load = max((drive.get("normal_load", 0.0) for drive in case.largest_drives), default=0.0)
+    for roller in case.rollers:
+        if roller.design_load and 0.0 < load < roller.design_load:
+            width, _ = roller.plane_contact(case.pair.effective_modulus, roller.design_load)
+            cell, needed = case.lattice.apart(roller.angle), (1.0 - load / roller.design_load) * width
+            if cell / needed > found.get("end_cells", 0.0):
+                found = {"end_cells": cell / needed, "end_cell": cell, "end_needed": needed}
     return found
 
 
@@ -279,7 +304,16 @@ def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
-        "spacing_words": _counted(found.get("spacings", 0.0), "spacing"),
+        **{
+            f"{name}_words": counted(f"{found[name]:.2g}", "spacing")
+            for name in _IN_SPACINGS
+            if name in found
+        },
+        "holes_words": counted(count, "hole of the height map lies", "holes of the height map lie")
+        if (count := found.get("holes_near_contact"))
+        else "",
+        **{name: quantity(found[name], "m", 2) for name in ("end_cell", "end_needed") if name in found},
+        "spacing_words": counted(f"{found.get('spacings', 0.0):.2g}", "spacing"),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": "one step" if steps == "1" else f"{steps} even steps",
         "step_percent": percent(found.get("step_error", 0.0)),
@@ -296,7 +330,7 @@ def row(case: Problem) -> str:
     pressures, axes = "unbounded at an end of a surface", _half_axes(found)
     if "pressure_ratio" in found:
         pressures = f"about {quantity(found['max_pressure'], 'Pa', 3)}, {found['pressure_ratio']:.2g} E*"
-    spacings = _counted(found["spacings"], "spacing")
+    spacings = counted(f"{found['spacings']:.2g}", "spacing")
     size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {spacings}"
     if axes:
         major, minor = (quantity(axis, "m", 3) for axis in axes)
@@ -323,9 +357,10 @@ def unjudged(case: Problem) -> str:
         bodies = ((1, case.body_1), (2, case.body_2))
         maps = [(number, one) for number, b in bodies if b.surface for one in b.surface.measured]
         filled = [
-            f"{one.holes_found} holes of the {one.shape} of body {number} are filled, not measured"
+            counted(one.holes_found, f"hole {of} is", f"holes {of} are") + " filled, not measured"
             for number, one in maps
             if one.holes == "fill" and one.holes_found
+            for of in [f"of the {one.shape} of body {number}"]
         ]
         return "; ".join(filled)
     return (
@@ -343,8 +378,8 @@ def rounded_distances(case: Problem) -> str:
         given, spacing = rolled[0].distance, case.row_along(rolled[0].direction)[1]
         if abs(len(rolled) * spacing - given) > _ROUNDED * spacing:
             words.append(
-                f"segment {segment + 1} rolls {quantity(len(rolled) * spacing, 'm')}, {len(rolled)} spacings "
-                f"of the lattice, and not {quantity(given, 'm')}"
+                f"segment {segment + 1} rolls {quantity(len(rolled) * spacing, 'm')}, "
+                f"{counted(len(rolled), 'spacing')} of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
 
@@ -378,12 +413,6 @@ def _half_axes(found: dict[str, Any]) -> tuple[float, float] | None:
     if "half_width" not in found or found["half_width"] > _ROUND * found["contact_radius"]:
         return None
     return found["contact_radius"] ** 2 / found["half_width"], found["half_width"]
-
-
-def _counted(count: float, noun: str) -> str:
-    """Return a number of things in words."""
-    words = f"{count:.2g}"
-    return f"{words} {noun}{'s' * (words != '1')}"
 
 
 def limits() -> list[dict[str, Any]]:

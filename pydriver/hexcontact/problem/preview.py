@@ -19,7 +19,7 @@ from ..core.lattice import Lattice
 from ..deck.keys import Body, Bulk, Coating
 from ..deck.kinds import Quantity
 from ..deck.surfaces import Flat, Roller, Surface, SurfaceSum
-from ..text import Row, percent, quantity
+from ..text import Row, counted, percent, quantity
 from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility
 from .loads import LoadStep
@@ -129,9 +129,7 @@ def _pair_parameters(case: Problem) -> dict[str, Any]:
 def machine() -> str:
     """Describe the machine: "node7, Linux x86_64, 16 processors"."""
     count = os.cpu_count() or 1
-    return (
-        f"{platform.node()}, {platform.system()} {platform.machine()}, {count} processor{'s' * (count > 1)}"
-    )
+    return f"{platform.node()}, {platform.system()} {platform.machine()}, {counted(count, 'processor')}"
 
 
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
@@ -144,9 +142,8 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         f"E* = {quantity(pair.effective_modulus, 'Pa')}, beta = {pair.beta:.4g}, gamma = {pair.gamma:.4g}"
     )
     if isinstance(pair, CoatedPair):
-        constants = (
-            f"coated, coupling up to {pair.beta:.4g}; {pair.images} images, error {pair.fit_error:.1g}"
-        )
+        images = counted(pair.images, "image")
+        constants = f"coated, coupling up to {pair.beta:.4g}; {images}, error {pair.fit_error:.1g}"
     size = f"{quantity(width, 'm')} x {quantity(height, 'm')}"
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
     accuracy = case.accuracy and (
@@ -240,14 +237,14 @@ def _history(case: Problem) -> str:
     if case.adaptive:
         chosen = sum(step.ramp is not None for step in case.load_steps)
         given = len(case.load_steps) - chosen
-        where = f"{chosen} segment{'s' * (chosen > 1)}"
+        where = counted(chosen, "segment")
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
         return f"adaptive in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}{gaps}"
     wears = ""
     if wear := case.deck.wear:
         auto = isinstance(wear.jump, str)
         solved = 'a number that the run finds (jump "auto")' if auto else f"{cycles(case):,}"
-        wears = f", then {solved} of {wear.cycles:,} cycles, with {1 + len(case.cycle)} each"
+        wears = f", then {solved} of {counted(f'{wear.cycles:,}', 'cycle')}, with {1 + len(case.cycle)} each"
     return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears + gaps
 
 
@@ -382,10 +379,10 @@ def work(case: Problem) -> str:
     found: Any = [[(operator_applications(one), seconds(one)) for one in cases] for cases in runs]
     below = (*case.deck.stress, *case.deck.fatigue)
     estimates = any(table.estimate_error or case.accuracy for table in below)
-    for counted, finest in zip(found, (cases[-1] for cases in runs), strict=True):
+    for known, finest in zip(found, (cases[-1] for cases in runs), strict=True):
         for one in coarser(finest) if estimates else []:  # counted on the finest lattice
             number, share = operator_applications(one), one.lattice.size / finest.lattice.size
-            counted.append((None if number is None else number * share, seconds(one)))
+            known.append((None if number is None else number * share, seconds(one)))
     if any(None in estimate for run in found for estimate in run):
         return "LAPACK on the nodes in contact, not estimated"
     applications, times = zip(*(map(math.fsum, zip(*run, strict=True)) for run in found), strict=True)
@@ -396,7 +393,9 @@ def work(case: Problem) -> str:
         words += "; adaptive load steps: uncertain by a factor of 3"
     if wear := case.deck.wear:
         chosen = isinstance(wear.jump, str)
-        words += f"; {cycles(case)} cycles are guessed, since jumps are adaptive" * chosen
+        words += (
+            f"; {counted(cycles(case), 'cycle is', 'cycles are')} guessed, since jumps are adaptive" * chosen
+        )
         repeated = "; unlike bodies repeat the unworn cycle until it closes, 3 to some 40 times"
         words += repeated * case.coupled
     return words

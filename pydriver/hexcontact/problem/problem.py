@@ -28,7 +28,7 @@ from ..deck.read import Assembled, assemble
 from ..deck.surfaces import Roller
 from ..deck.toml import as_toml, plain
 from ..errors import DeckError
-from ..text import listed
+from ..text import counted, listed
 from ..variables import LOADS
 from . import checks, window
 from .arguments import Body
@@ -376,7 +376,7 @@ class Problem:
         what = "adaptive segment" if self.adaptive else "load step"
         return (
             f"{type(self).__name__}({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
-            f"{(n := len(self.load_steps))} {what}{'s' * (n > 1)})"
+            f"{counted(len(self.load_steps), what)})"
         )
 
     # --- the window -----------------------------------------------------------------------------------------
@@ -424,8 +424,8 @@ class Problem:
             sentence = f"no window can be found: {error}{soft}"
             key: tuple[str, ...] = ("grid",)
             if not (self._gap.given or grid.center):
-                key = ("body", "2" if self.surfaces.surface_1.shape == "flat" else "1", "surface")
-                sentence = f"{error}{soft}; expected a shape that bounds the contact"
+                key = (self.surfaces.key_of("2" if self.surfaces.surface_1.shape == "flat" else "1"),)
+                sentence = f"{error}{soft}; expected a shape of finite heights that bounds the contact"
             raise deck_error([Mistake(key, MISSING, sentence)], source) from None
         # by force, and by approach
         self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())

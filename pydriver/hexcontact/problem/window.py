@@ -192,7 +192,7 @@ def starting_half_size(
     if inside[-1]:
         raise NoContactFound("the contact has no end")
     if not (inside.any() or np.isfinite(height[0]).any()):
-        raise NoContactFound("nothing can touch at the center")
+        raise NoContactFound("nothing can touch at the center, where no height is finite")
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 

@@ -14,7 +14,7 @@ from ..arrays import Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import half_axes, line_of, turning_points
 from ..deck.below import Stage
-from ..text import Row, cycle_count, listed, percent, quantity
+from ..text import Row, counted, cycle_count, listed, percent, quantity
 from ..variables import (
     BULK_STRESS,
     CREEPAGES,
@@ -185,7 +185,7 @@ def path_error_share(history: History) -> float:
 def halved(history: History) -> str:
     """Return "halved 2 times" for a step that was halved until the solver converged; else nothing."""
     cuts = int(history.get("cuts", 0))
-    return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
+    return f"halved {counted(cuts, 'time')}" if cuts else ""
 
 
 def in_halves(history: History) -> bool:
@@ -281,7 +281,7 @@ def _stick(history: History) -> str:
 def _work(history: History) -> str:
     parts = f"{parts_of(history)}, " if parts_of(history) else ""
     return (
-        f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
+        f"{counted(history['sweeps'], 'iteration')}, {parts}{history['operator_applications']:.3g} operator "
         f"applications, {quantity(history['seconds'], 's', 3)}"
     )
 
@@ -418,7 +418,7 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
         return _power_table(histories, parts[-most:])
     for row in parts:
         if _of_wear(last := histories[row["last_step"] - 1]):
-            row["label"] += f", {cycle_count(last['wear_cycles'])} cycles"
+            row["label"] += f", {counted(cycle_count(last['wear_cycles']), 'cycle')}"
     named = [(f"segment {row['segment']}", row["label"], row) for row in parts[-most:]]
     named += [(f"cycle {row['cycle']}", row["loading"], row) for row in loops[-most:]]
     shown, rows = 5 if loops else 4, []
@@ -521,14 +521,15 @@ def halved_steps(histories: Sequence[History], tolerance: float) -> str:
     named = _steps([f"{number} ({halved(history)})" for number, history in cut.items()])
     record = _of_whole_steps(cut.values(), tolerance)
     record = record or "as they are recorded they fulfil the conditions all the same"
-    return f"{len(cut)} of {len(histories)} load steps did not converge at once: {named}; {record}"
+    return f"{len(cut)} of {counted(len(histories), 'load step')} did not converge at once: {named}; {record}"
 
 
 def adaptive_steps(histories: Sequence[History], tolerance: float) -> str:
     """Describe the records of adaptive load steps; empty if these meet the conditions."""
     in_two = [history for history in histories if in_halves(history)]
     record = _of_whole_steps(in_two, tolerance)
-    return record and f"{len(in_two)} of {len(histories)} load steps were solved in two halves; {record}"
+    steps = counted(len(histories), "load step was", "load steps were")
+    return record and f"{len(in_two)} of {steps} solved in two halves; {record}"
 
 
 def _of_whole_steps(histories: Iterable[History], tolerance: float) -> str:
@@ -544,8 +545,9 @@ def limited_steps(histories: Sequence[History], tolerance: float) -> str:
     missed = [f"{k}" for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
     if not missed:
         return ""
+    steps = counted(len(histories), "load step changes", "load steps change")
     return (
-        f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
+        f"{len(missed)} of {steps} more by halving than solver.step_tolerance = "
         f"{tolerance:g}, and smaller ones did not help: {_steps(missed)}; their stick_area_step_error holds"
     )
 
@@ -574,9 +576,9 @@ def unclosed_cycle(history: History, tolerance: float) -> str:
     if not left > tolerance:
         return ""
     return (
-        f"the cycle of wear is not closed after {history['unworn_cycles']} cycles on unworn surfaces: its "
-        f"wear may still change by {percent(left)}, expected at most wear.tolerance = {tolerance:g}; "
-        "worn_depth_step_error includes this"
+        f"the cycle of wear is not closed after {counted(history['unworn_cycles'], 'cycle')} on unworn "
+        f"surfaces: its wear may still change by {percent(left)}, expected at most wear.tolerance = "
+        f"{tolerance:g}; worn_depth_step_error includes this"
     )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Dataset
 from ..errors import NotInResult
-from ..text import Row, html_table, quantity, visible
+from ..text import Row, counted, html_table, quantity, visible
 from ..variables import spelled
 from .history_words import extent_of, step_rows
 from .layout import history_of
@@ -66,7 +66,7 @@ _PIXELS = 240  # of the longer side of a picture
 def result_header(dataset: Dataset, path: str) -> str:
     """Return the header of a result: title, file, steps, nodes, spacing."""
     sizes, attributes = dataset.sizes, dataset.attrs
-    steps = f"{sizes['step']} load step{'s' * (sizes['step'] != 1)}"
+    steps = counted(sizes["step"], "load step")
     if not attributes.get("complete", True):
         planned = attributes.get("planned_steps")
         steps += f"{f' of {planned}' if planned else ''} (unfinished run)"

@@ -21,7 +21,7 @@ from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
 from ..interior.fields import region
 from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
 from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions, with_places
-from ..text import did_you_mean, text_table
+from ..text import counted, did_you_mean, text_table
 from ..variables import CREEPAGES, FIELDS, SHEAR_LIMIT, TRACTIONS, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .layout import Quantities, history_of, lattice_of, step_of
@@ -251,7 +251,8 @@ class Result:
             Direction of the line from x, rad.
         through : tuple of float, optional
             A point on it (m), from which ``distance`` counts; default: the node next to the center of
-            pressure, DeckError if nothing is in contact.
+            pressure, in a window that repeats that of the largest pressure; DeckError if nothing is in
+            contact.
         """
         along: dict[str, Any] = {"angle": angle, "through": through, "points": points, "source": source}
         return self._nodal(step).section(*names, **along)
@@ -371,9 +372,9 @@ class Result:
         numbers = self.cycle_steps(segment, steps)
         if steps is None and len(numbers) < _FEW_STEPS:
             warn(
-                f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes "
-                f"and phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with "
-                "adaptive steps a smaller solver.step_tolerance",
+                f"fatigue: the cycle {segment!r} has only {counted(len(numbers), 'load step')}, between "
+                "which extremes and phases are lost: give its segments more steps, at least "
+                f"{_FEW_STEPS} in all, or with adaptive steps a smaller solver.step_tolerance",
                 PathWarning,
             )
         of = self._body(body, numbers, SLIPS if "ruiz" in parameters else ())

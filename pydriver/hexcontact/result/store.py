@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..arrays import Banded
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import Lock, begun, flush, make_anew, names_a_run, reading, replacing, require_utf8
+from ..text import counted
 from . import journal as records
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, stress_files, write
@@ -235,7 +236,7 @@ class Store:
         if (left or trials) and not overwrite:
             count, what = (len(trials.solutions), "lattice") if trials else (len(left or ()), "step")
             raise DeckError(
-                f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
+                f"{self.folder} holds {counted(count, f'finished {what}')} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
                 "in Python) starts anew"
             )
@@ -284,9 +285,9 @@ class Store:
         planned, count = self.metadata.planned_steps, len(self.heads)
         finished = records.TrialFolder(self.folder).kept
         if self.heads and planned:
-            finished = f"{count} of {planned} load steps are finished"
+            finished = f"{count} of {counted(planned, 'load step is', 'load steps are')} finished"
         elif self.heads:
-            finished = f"{count} load step{'s are' if count != 1 else ' is'} finished"
+            finished = f"{counted(count, 'load step is', 'load steps are')} finished"
         if not finished:
             return ""
         return (

@@ -12,7 +12,7 @@ from ..core.lattice import Lattice
 from ..errors import StopRun
 from ..result.history_words import describe
 from ..result.step import Step
-from ..text import cut, quantity, visible
+from ..text import counted, cut, quantity, visible
 
 
 class Listener:
@@ -98,7 +98,7 @@ class Lines(Listener):
     def begun(self, title: str, steps: int) -> None:
         """Print the title and the number of steps."""
         self.steps, self._over = steps, False
-        count = f"{steps} load step{'s' * (steps != 1)}" if steps else "load steps chosen during the run"
+        count = counted(steps, "load step") if steps else "load steps chosen during the run"
         self._print(f"{title or 'case'}: {count}")
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:

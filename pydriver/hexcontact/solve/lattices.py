@@ -33,6 +33,7 @@ from ..result.journal import Journal, Solution, TrialFolder, journal_of
 from ..result.layout import Metadata
 from ..result.step import Step
 from ..result.store import Store
+from ..text import counted
 from ..variables import ESTIMATED, LOADS, VARIABLES, spelled
 from .events import Listener
 from .memory_needed import require_memory
@@ -218,7 +219,7 @@ class OnDisk:
         store.interim = False
         with contextlib.closing(store):
             if last is not None:
-                found = f"{len(store.heads)} finished steps on {trial.name} of {self._store.path}"
+                found = f"{counted(len(store.heads), 'finished step')} on {trial.name} of {self._store.path}"
                 check_step(case, last, found)
             before = [*store.heads[:-1], last] if last is not None else []
             solution = _solved(trial, case, self.listener, store.append, before)

@@ -18,7 +18,7 @@ from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
-from ..text import listed, quantity
+from ..text import counted, listed, quantity
 from ..variables import RESIDUALS
 
 _NEAR_SLIDING = 0.99  # share of mu P from which a tangential load may need full slip
@@ -63,8 +63,8 @@ def error(
     planned = f" of {case.planned_steps}" if case.planned_steps else ""
     step = f"step {target.index + 1}{planned}{segment}"
     shown = listed([f"{sign} = {_number(value)}" for sign, value in residuals.items()], "and")
-    tried = f" and halving the step {cuts} time{'s' * (cuts > 1)}" if cuts else ""
-    after = f"after {solution.sweeps} iterations{tried} the residuals are {shown}"
+    tried = f" and halving the step {counted(cuts, 'time')}" if cuts else ""
+    after = f"after {counted(solution.sweeps, 'iteration')}{tried} the residuals are {shown}"
     doubtful, excess, expected = _sliding(case, lattice, solution, target, values)
     if excess:
         return ConvergenceError(f"{step}: gross sliding: {excess}; {after}; {expected}", details)

@@ -22,6 +22,7 @@ from ..result.netcdf import read_output
 from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
+from ..text import counted
 from .events import Listener
 from .run import checked, listeners, metadata_of, run_into, write_stresses
 from .steps import check_step
@@ -204,12 +205,16 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
 
 def _check(case: Problem, store: Store, last: Step | None) -> None:
     """Refuse another case than that of the steps, as after changes in files that its deck names."""
-    found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
+    found = (
+        f"{counted(len(store.heads), 'finished step')} of {store.path}" if last else f"steps of {store.path}"
+    )
     planned = store.metadata.planned_steps
     if last is not None:
         planned = int(last.control.get("load_steps", planned))
     if len(case.load_steps) != planned:
-        raise DeckError(f"the deck now has {len(case.load_steps)} load steps; the {found} are of {planned}")
+        raise DeckError(
+            f"the deck now has {counted(len(case.load_steps), 'load step')}; the {found} are of {planned}"
+        )
     if last is not None:
         check_step(case, last, found)
 
@@ -224,7 +229,7 @@ def _continued(store: Store, case: Problem) -> Metadata:
     ]
     done = f"step {len(store.heads)}"
     if trials := TrialFolder(store.folder):
-        done = f"{len(trials.solutions)} lattices"
+        done = counted(len(trials.solutions), "lattice")
     line = f"{now()} resumed after {done} by hexcontact {__version__}"
     return dataclasses.replace(
         old, deck=new.deck, parameters=new.parameters, resumed=(*old.resumed, ", ".join([line, *changed]))

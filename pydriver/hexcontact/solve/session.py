@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 from ..arrays import DataFrame
-from ..deck.faults import NOWHERE, deck_error
+from ..deck.faults import NOWHERE, Source, deck_error
 from ..deck.keys import Load
 from ..deck.toml import as_toml, load_as_toml, plain
 from ..deck.units import angle_text
@@ -319,7 +319,7 @@ class Session:
                 history.append(Load.model_validate(load))
         history.append(new)
         if problems := history.problems:
-            raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], NOWHERE)
+            raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], Source(data=entry))
         return history
 
     def _described(self, loads: Sequence[dict[str, Any]] | None = None) -> Header:

@@ -39,7 +39,7 @@ from ..deck.units import NUMBER, SPIN, UnitError, to_si
 from ..errors import DeckError, Fault
 from ..problem.checks import checked
 from ..problem.problem import Problem
-from ..text import shown
+from ..text import counted, shown
 from ..variables import VARIABLES
 from . import backends  # noqa: F401 (each registers its key)
 from .backend import KEYS, MOST_CASES, hash_of
@@ -626,9 +626,10 @@ def _shared_by_segments(error: DeckError) -> list[Fault]:
         if name.startswith("load."):
             name = next(part for part in reversed(name.split(".")) if not part.isdecimal())
         found.setdefault((name, fault.sentence or fault.message), []).append(fault)
-    likewise = " (likewise in {} more segments)"
     return [
-        first._replace(message=first.message + likewise.format(len(more)) * bool(more))
+        first._replace(
+            message=first.message + f" (likewise in {counted(len(more), 'more segment')})" * bool(more)
+        )
         for first, *more in found.values()
     ]
 

@@ -26,7 +26,7 @@ from ..deck.toml import read_toml
 from ..errors import DeckError
 from ..solve.events import Bar, Lines, Listener, Listeners
 from ..solve.log import Log
-from ..text import quantity
+from ..text import counted, quantity
 from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
@@ -241,7 +241,7 @@ class Study:
             kind, settings = self.backend(jobs, dask)
             pool = kind(settings, len(missing)) if missing else None
             with listener.following(self.title, len(missing)):
-                cases = f"{len(self)} case{'s' * (len(self) != 1)}"
+                cases = counted(len(self), "case")
                 to_run = "" if len(missing) == len(self) else f", {len(missing)} to run"
                 values: dict[str, Any] = {"title": self.title, "cases": len(self), "missing": len(missing)}
                 listener.said("study", f"{self.title}: {cases}{to_run}", **values, output=self.output)
@@ -325,7 +325,8 @@ class Study:
     def __repr__(self) -> str:
         """Name the study, its parameters and the number of its cases."""
         axes = ", ".join(key for axis in self.plan.axes for key in axis.keys)
-        return f"Study({self.title!r}, {self.file.combine} over {axes}: {len(self)} cases, {self.output})"
+        cases = counted(len(self), "case")
+        return f"Study({self.title!r}, {self.file.combine} over {axes}: {cases}, {self.output})"
 
 
 def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> Dataset:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from ...deck.table_base import meaning, refuse_key
 from ...errors import DeckError
-from ...text import listed
+from ...text import counted, listed
 from ..backend import OptionTable, backend
 
 _BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
@@ -90,7 +90,8 @@ class JobArray:
         words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
         lines = [
             "#!/bin/sh",
-            f"# {len(numbers)} of {self.cases} cases{several}. Afterwards: {shlex.join(words)} --collect",
+            f"# {len(numbers)} of {counted(self.cases, 'case')}{several}. "
+            f"Afterwards: {shlex.join(words)} --collect",
             f"#SBATCH --array={array}",
             *(
                 f"#SBATCH --{key}" + ("" if value is True else f"={_text(str(value))}")

@@ -59,9 +59,8 @@ module hc_options
     real(wp) :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
     !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more
     integer :: max_fits = 3
-    !> Tolerance on coarser lattices, which only have to give a start; the same where steps are searched: a rough surface has other
-    !> contacts on the finer lattice, whose first residual is 0.2 to 0.4 whatever the start
-    real(wp) :: coarse_tolerance = 3.0e-2_wp, rough_tolerance = 0.15_wp
+    !> Tolerance on coarser lattices, which only have to give a start
+    real(wp) :: coarse_tolerance = 3.0e-2_wp
     !> Tolerance on a part of the window: the product over the window contains the errors of single precision
     real(wp) :: part_tolerance = 0.8_wp
     !> Lattices with fewer nodes are left to one thread: the start of the others takes longer than each of the short passes
@@ -164,7 +163,7 @@ module hc_options
     integer :: max_rings = 16
     !> The same factor and power in patches up to that width, where sets of active nodes change without end: the continuations of
     !> many patches meet
-    real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.5_wp, patch_width = 10.0_wp
+    real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.55_wp, patch_width = 10.0_wp
     !> So they do, as on rough surfaces; set by the solver
     logical :: patches = .false.
     !> Ratio of the edges of a cell above which the grid is wider than the window across the contact, by these shares of it on each

@@ -206,9 +206,6 @@ contains
         if (l > 1 .and. .not. allocated(passing)) allocate (passing)
         allocate (state%pressure(level%lattice%extent(1), level%own_rows()), source=0.0_wp)
         coarse_tolerance = self%options%normal%coarse_tolerance
-        if (allocated(passing)) then
-          if (passing%searches) coarse_tolerance = self%options%normal%rough_tolerance
-        end if
         if (allocated(coarse%pressure)) then
           if (is_smooth(level, self%level(l + 1)%space%max(coarse%pressure))) then
             coarse_tolerance = self%options%normal%smooth_tolerance

@@ -202,17 +202,18 @@ def test_plane_problem_of_the_long_contact() -> None:
     """Without mismatch it is Cattaneo's; pressed, the traction keeps to friction, to Spence's stick strip."""
     _, state = plane.sheared_strips(0.0, 0.3, [0.5], 400)
     exact = PlaneCattaneo(0.3, 0.5 * math.pi, 1.0).traction(state.y, 0.15 * 0.5 * math.pi)
-    assert state.stick == pytest.approx((-math.sqrt(0.5), math.sqrt(0.5)), abs=0.01)
+    assert state.y[state.sticks][[0, -1]] == pytest.approx([-math.sqrt(0.5), math.sqrt(0.5)], abs=0.01)
     assert state.traction == pytest.approx(exact / 0.3, abs=0.05)  # in single strips at the kinks
     assert np.abs(state.traction - exact / 0.3).mean() < 2e-3
     for beta in (-0.189, -0.3):
         [state] = plane.sheared_strips(beta, 0.2, [], 400)
-        assert state.stick[1] == pytest.approx(-state.stick[0])
-        assert state.stick[1] == pytest.approx(goodman_stick_ratio_plane(beta, 0.2), abs=0.003)
-        share = np.abs(state.traction) / np.sqrt(1.0 - state.y**2)
+        low, high = state.stick_ends(*plane.GROWN)
+        assert high == pytest.approx(-low)
+        assert high == pytest.approx(goodman_stick_ratio_plane(beta, 0.2), abs=0.003)
+        share = np.abs(state.traction) / state.pressure
         assert share.max() < 1.0 + 1e-12
         # continuous at its ends, where an infinite traction or a jump would stand out
-        assert share[state.y < state.stick[1]][-1] > 0.99
+        assert share[state.sticks][-1] > 0.99
 
 
 def test_plane_contact_that_grows_stays_similar() -> None:
@@ -228,13 +229,15 @@ def test_plane_contact_that_grows_stays_similar() -> None:
 
 
 def test_long_contact_of_dissimilar_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a coarser lattice with fewer steps, which take up to 0.5 %."""
+    """On a coarser lattice with fewer steps: tractions to 0.5 %, ends of stick to 1 %."""
     coarse = {"across": 100, "along": 48, "steps": 12}
     comparison = plane.dissimilar(((-0.3, 0.2),), **coarse)
     rms = [row.computed for row in comparison.rows if "rms" in row.quantity]
     assert len(rms) == 4
     assert max(rms) < 5e-3
-    assert [name for name in failures(comparison) if "rms" not in name] == []
+    ends = [abs(row.computed - row.analytic) for row in comparison.rows if "/b" in row.quantity]
+    assert len(ends) == 7
+    assert max(ends) < 1e-2
     assert judged(comparison) == 2 + 3 * 3
     strips = plane.sheared_strips
     monkeypatch.setattr(plane, "sheared_strips", lambda beta, mu, shares: strips(0.5 * beta, mu, shares))

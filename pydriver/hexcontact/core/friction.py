@@ -439,8 +439,4 @@ def memory_needed(
 ) -> int:
     """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
     window = window_size(method, n_row, n_col, contact)
-    needed = int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))
-    if method != "fft":
-        return needed
-    shared = ranks.count > 1 and flat.shares_window([n_col, n_row])  # else each rank has all fields
-    return needed * ranks.on_node // (ranks.count if shared else 1)
+    return int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))

@@ -119,9 +119,10 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     set_up = contact.memory_needed("fft", *lattice.shape, part="set-up of the operator", **given)
     fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
     needed = case.memory_needed(lattice)
-    if ranks.count > 1 and is_shared(case, lattice):  # the share of this machine
+    if ranks.count > 1:
+        copies, parts = _copies(case, lattice)
         needed, fields, operator, set_up = (
-            part * ranks.on_node // ranks.count for part in (needed, fields, operator, set_up)
+            part * copies // parts for part in (needed, fields, operator, set_up)
         )
     needed += kept
     if case.frictional or method == "direct":
@@ -134,6 +135,13 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
     return _LOADED + needed
+
+
+def _copies(case: Problem, lattice: Lattice) -> tuple[int, int]:
+    """Return how many ranks of this machine hold fields, and among how many these are shared out."""
+    if is_shared(case, lattice):
+        return ranks.on_node, ranks.count
+    return (ranks.on_node if case.frictional and case.method_for(lattice) == "fft" else 1), 1
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:
@@ -156,7 +164,7 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
     """Refuse a window, with the fields of some steps, or a table that does not fit into memory."""
     kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
     needed, there = memory_needed(case, lattice) + kept, memory.available()
-    if ranks.count > 1 and is_shared(case, lattice):  # the least of all machines
+    if ranks.count > 1 and (case.frictional or is_shared(case, lattice)):  # the least of all machines
         there = int(ranks.order(share_of_memory) * ranks.on_node)
     fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
     fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""

@@ -87,14 +87,14 @@ module hc_communicator
       integer, intent(inout), contiguous :: value(:)
     end subroutine add_counts
 
-    !> Take the error of the first rank that has one, on all ranks; the message names the rank.
+    !> Take the error of the first rank that has one, on all ranks; the message names the rank, unless all failed.
     module subroutine agree(self, error)
       class(communicator_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
     end subroutine agree
 
     !> Take rows of a field from their ranks; every rank takes part, each with rows of its own choice.
-    module subroutine fetch(self, words, n_row, own, wanted, values, on_first)
+    module subroutine fetch(self, words, n_row, own, wanted, values)
       class(communicator_t), intent(in) :: self
       !> Words in a row, and number of rows of the field
       integer, intent(in) :: words, n_row
@@ -104,8 +104,6 @@ module hc_communicator
       integer, intent(in) :: wanted(2)
       !> Those rows
       type(c_ptr), intent(in) :: values
-      !> The first rank has all rows; absent: each has its own
-      logical, intent(in), optional :: on_first
     end subroutine fetch
 
     !> Exchange own rows of all columns for all rows of own columns.
@@ -127,8 +125,8 @@ module hc_communicator
     module subroutine tell(self, values, rank)
       class(communicator_t), intent(in) :: self
       integer(int32), intent(in), contiguous :: values(:)
-      !> Rank; absent: each of the others
-      integer, intent(in), optional :: rank
+      !> The other rank
+      integer, intent(in) :: rank
     end subroutine tell
 
     !> Wait, without use of the processor, until the first rank sends words; return their number.

@@ -91,12 +91,13 @@ contains
     integer, parameter :: longest = 480
     character(len=longest) :: message
     character(len=12) :: number
-    integer :: failed, code
+    integer :: least(2), failed, code
 
     if (self%size == 1) return
-    failed = self%size
-    if (allocated(error)) failed = self%rank
-    call MPI_Allreduce(MPI_IN_PLACE, failed, 1, MPI_INTEGER, MPI_MIN, world(self))
+    least = [self%size, 0] ! first rank that failed; whether all did
+    if (allocated(error)) least = [self%rank, 1]
+    call MPI_Allreduce(MPI_IN_PLACE, least, 2, MPI_INTEGER, MPI_MIN, world(self))
+    failed = least(1)
     if (failed == self%size) return
     code = 0
     message = ''
@@ -110,7 +111,8 @@ contains
     if (allocated(error)) deallocate (error)
     allocate (error)
     error%code = code
-    error%message = 'rank '//trim(number)//': '//trim(message)
+    error%message = trim(message)
+    if (least(2) == 0) error%message = 'rank '//trim(number)//': '//error%message
   end procedure agree
 
   !> Send each rank the own rows that it takes.
@@ -123,13 +125,6 @@ contains
     call MPI_Allgather(wanted, 2, MPI_INTEGER, all, 2, MPI_INTEGER, world(self))
     first = self%first_row(n_row, [(r, r=0, self%size - 1)])
     last = self%last_row(n_row, [(r, r=0, self%size - 1)])
-    if (present(on_first)) then
-      if (on_first) then
-        first = 1
-        last = 0
-        last(0) = n_row
-      end if
-    end if
     do r = 0, self%size - 1
       associate (low => max(first(self%rank), all(1, r)), high => min(last(self%rank), all(2, r)))
         sent(r) = max(high - low + 1, 0)
@@ -218,14 +213,7 @@ contains
 
   !> Send words.
   module procedure tell
-    integer :: r
-
-    do r = 1, self%size - 1
-      if (present(rank)) then
-        if (r /= rank) cycle
-      end if
-      call MPI_Send(values, size(values), MPI_INTEGER4, r, told, world(self))
-    end do
+    call MPI_Send(values, size(values), MPI_INTEGER4, rank, told, world(self))
   end procedure tell
 
   !> Look for the words every millisecond: MPI itself waits with the processor busy.

@@ -163,7 +163,7 @@ module hc_options
     integer :: max_rings = 16
     !> The same factor and power in patches up to that width, where sets of active nodes change without end: the continuations of
     !> many patches meet
-    real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.55_wp, patch_width = 10.0_wp
+    real(wp) :: patch_ring_factor = 5.0_wp, patch_ring_power = 0.5_wp, patch_width = 10.0_wp
     !> So they do, as on rough surfaces; set by the solver
     logical :: patches = .false.
     !> Ratio of the edges of a cell above which the grid is wider than the window across the contact, by these shares of it on each

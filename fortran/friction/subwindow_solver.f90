@@ -157,6 +157,7 @@ contains
     call self%problem%extract_part(low, high, problem)
     allocate (self%part)
     call new_frictional_contact(self%part, problem, error, self%threads, self%cache, self%problem%space%scratch, self%ranks)
+    call self%ranks%agree(error)
     if (allocated(error)) deallocate (self%part)
   end subroutine extract_part
 

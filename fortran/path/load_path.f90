@@ -223,6 +223,7 @@ contains
     else
       call solve_step(solver, from, from%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
     end if
+    call solver%problem%space%ranks%agree(error)
   end subroutine solve_part
 
   !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.

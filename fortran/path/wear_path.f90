@@ -489,12 +489,10 @@ contains
 
     pressed%space = space_over(problem%lattice%extent)
     pressed%space%ranks = problem%space%ranks
-    associate (ranks => pressed%space%ranks)
-      call require_memory(energy_ahead_memory(problem%lattice%extent, pressed%space%threads)/ranks%size*ranks%on_node, error, &
-                          pressed%space%threads)
-      call ranks%agree(error)
-    end associate
-    if (allocated(error)) return
+    if (max(problem%space%ranks%size, problem%space%helpers%size) == 1) then ! several ranks have checked it together
+      call require_memory(energy_ahead_memory(problem%lattice%extent, pressed%space%threads), error, pressed%space%threads)
+      if (allocated(error)) return
+    end if
     now = worn_cycle_t(cycle%energy, cycle%path, cycle%state%pressure, merge(cycle%state%gap, 0.0_wp, problem%candidate), &
                        logical(problem%candidate), self%friction, self%steps(1)%target%control(normal) == force_control)
     call new_normal_problem(pressed, problem%lattice, problem%medium, now%gap, logical(problem%candidate), error, &

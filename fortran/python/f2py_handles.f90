@@ -197,7 +197,8 @@ contains
     type(slot_t), pointer, intent(out) :: slot
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> The ranks that share the object call this together, and all of them fail, or none
+    !> The ranks that share the object call this together, and all of them fail, or none; absent for one with friction: no step
+    !> is solved
     logical, intent(in), optional :: together
     logical :: busy, fits
     integer :: place
@@ -225,7 +226,7 @@ contains
     else
       if (any(slot%extent /= extent)) then
         call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
-      else
+      else if (kind /= 'sheared' .or. present(together)) then
         call require_memory(slot%working, error, slot%space%threads)
       end if
       if (present(together)) call slot%ranks%agree(error)

@@ -21,6 +21,7 @@ module hc_f2py_problems
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_wear_ahead, only: energy_ahead_memory
   implicit none
   private
 
@@ -208,6 +209,7 @@ contains
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. options%goodman, &
                                                               space%threads, spectra_of(bodies), lattice%is_periodic())
     call take_window(lattice, bytes/space%ranks%size*together%on_node, options%threads, slot, handle, error)
+    call together%agree(error)
     if (.not. allocated(error)) call new_friction_problem(problem, lattice, bodies, gap, candidate, friction, options%goodman, &
                                                           error, law, space)
     call together%agree(error)
@@ -231,14 +233,18 @@ contains
   end subroutine new_sheared
 
   !> Refuse a load step if there is no memory for further fields beside the solution.
-  subroutine secure_fields(slot, n_field, error)
+  subroutine secure_fields(slot, n_field, error, ahead)
     type(slot_t), intent(in) :: slot
     !> Number of fields
     integer, intent(in) :: n_field
     type(error_t), allocatable, intent(out) :: error
+    !> The pressure after a jump of wear is solved for, too
+    logical, intent(in), optional :: ahead
+    integer(c_int64_t) :: bytes
 
-    call require_memory(slot%working + int(n_field, c_int64_t)*8*product(slot%extent)*slot%ranks%on_node, error, &
-                        slot%space%threads)
+    bytes = int(n_field, c_int64_t)*8*product(slot%extent)
+    if (present(ahead)) bytes = bytes + energy_ahead_memory(slot%lattice%extent, slot%space%threads)/slot%space%ranks%size
+    call require_memory(slot%working + bytes*slot%ranks%on_node, error, slot%space%threads)
     call slot%ranks%agree(error)
   end subroutine secure_fields
 

@@ -1,6 +1,5 @@
 !> Tests of what several ranks do together.
 module ranks_tests
-  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int32
   use hc_precision, only: wp, pi, lk
   use hc_error, only: error_t, status, raise
@@ -127,7 +126,7 @@ contains
     field_sum = alone%sum(field)
   end function field_sum
 
-  !> Each rank takes other rows, of reals and of masks, from all and from the first rank.
+  !> Each rank takes other rows, of reals and of masks.
   subroutine test_rows(error)
     type(error_t), allocatable, intent(out) :: error
     type(field_space_t) :: space
@@ -147,11 +146,6 @@ contains
     if (allocated(error)) return
     call space%fetch(size(field, 2), logical(field(:, rows(1):rows(2)) > 50.0_wp, lk), first, mask)
     call check_true(error, all(mask .eqv. field(:, first:last) > 50.0_wp), 'rows of a mask')
-    if (allocated(error) .or. ranks%size == 1) return
-    some = 0.0_wp
-    if (ranks%rank > 0) field = -1.0_wp
-    call ranks%fetch(10, 23, c_loc(field), [first, last], c_loc(some), on_first=.true.)
-    call check_true(error, all(nint(some) == reshape([(i, i=5*first - 4, 5*last)], shape(some))), 'rows of the first rank')
   end subroutine test_rows
 
   !> The first rank tells each other rank some words, which gives them back.
@@ -189,6 +183,9 @@ contains
     call check_true(error, allocated(found), 'an error')
     if (allocated(error)) return
     call check_true(error, found%code == status%resources .and. found%message == 'rank 1: not enough memory', found%message)
+    if (allocated(error)) return
+    call ranks%agree(found)
+    call check_true(error, found%message == 'rank 1: not enough memory', 'an error of all ranks has no name more')
   end subroutine test_errors
 
   !> A product is that of one rank to the bit: even and odd numbers of rows, like and unlike materials.

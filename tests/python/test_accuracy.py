@@ -309,7 +309,7 @@ def test_interrupted_refinement_goes_on_to_the_same_bits(
     again = hexcontact.resume(path, on_step=solved.append)
     assert len(solved) == 3 * len(sheared.trial_level) - after
     assert same(again, sheared)
-    assert f"resumed after {lattices} lattices" in again.dataset.attrs["history"]
+    assert f"resumed after {lattices} lattice{'s' * (lattices > 1)}" in again.dataset.attrs["history"]
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out.nc"]
 
 

@@ -123,7 +123,7 @@ def _displaced_rows(displaced: int, place: int) -> Array:
 
 
 class Shared(Protocol):
-    """A contact that all ranks share."""
+    """A window that all ranks share."""
 
     def parts(self) -> list[tuple[int, tuple[int, int]]]:
         """Return the ranks that together have all rows, each with the shape of its fields."""
@@ -133,13 +133,13 @@ class Shared(Protocol):
 class SharedFields(Banded):
     """Fields over a window, whose bands are the rows of each rank."""
 
-    def __init__(self, contact: Shared, fields: Mapping[str, Rows]) -> None:
+    def __init__(self, layout: Shared, fields: Mapping[str, Rows]) -> None:
         super().__init__(fields)
-        self.contact, self.taken = contact, fields
+        self.layout, self.taken = layout, fields
 
     def bands(self, name: str) -> Iterator[NDArray[Any]]:
         """Take the rows of one rank after the other."""
-        for rank, shape in self.contact.parts():
+        for rank, shape in self.layout.parts():
             band = self.taken[name](rank, shape)
             yield band.astype(np.int8) if name == "zone" else band
 
@@ -147,7 +147,7 @@ class SharedFields(Banded):
 def joined(fields: Any, more: Any, names: Sequence[str]) -> Mapping[str, NDArray[Any]]:
     """Return fields, and some of others."""
     if isinstance(fields, SharedFields) and isinstance(more, SharedFields):
-        return SharedFields(fields.contact, {**fields.taken, **{name: more.taken[name] for name in names}})
+        return SharedFields(fields.layout, {**fields.taken, **{name: more.taken[name] for name in names}})
     return {**fields, **{name: more[name] for name in names}}
 
 

@@ -147,17 +147,45 @@ def _asked(procedure: Callable[..., Array], *arguments: Any) -> Rows:
     return lambda rank, shape: ranks.ask(rank, procedure, *arguments, shape=shape)
 
 
-class SharedObject:
-    """An object of which each rank has a part."""
+class Layout:
+    """How ranks share the arrays of a window: each has its rows, or all have all of them."""
 
-    def __init__(self, kind: Callable[..., Any] | None = None, *arguments: Any, **named: Any) -> None:
-        self.number = ranks.numbered(self)
+    def __init__(self, lattice: Lattice, by_rows: bool) -> None:
+        self.lattice, self.by_rows = lattice, by_rows
+
+    def own(self) -> Lattice:
+        """Return the nodes of the arrays of this rank."""
+        return ranks.rows(self.lattice) if self.by_rows else self.lattice
+
+    def parts(self) -> list[tuple[int, tuple[int, int]]]:
+        """Return the ranks that together have all rows, each with the shape of its fields."""
+        if not self.by_rows:
+            return [(0, self.lattice.shape)]
+        return [(rank, ranks.rows(self.lattice, rank).shape) for rank in range(ranks.count)]
+
+    def given(self, fields: Mapping[str, NDArray[Any]], name: str = "") -> _Shared:
+        """Give each rank its rows of fields; return them, or one, as the argument of an order."""
+        number = ranks.new_number()
+        for field, values in fields.items():
+            for rank in range(ranks.count):
+                first, after = ranks.span(self.lattice, rank) if self.by_rows else (0, self.lattice.n_row)
+                ranks.give(rank, _take, number, field, np.asarray(values)[..., first:after, :].copy())
+        return _Shared(number, given=True, name=name)
+
+
+class SharedObject:
+    """An object of which each rank has a part; `layout` is that of its arrays."""
+
+    def __init__(
+        self, layout: Layout, kind: Callable[..., Any] | None = None, *arguments: Any, **named: Any
+    ) -> None:
+        self.layout, self.number = layout, ranks.numbered(self)
         if kind is not None:
             ranks.order(_create, self.number, kind, _sent(arguments), named)
 
-    def call(self, contact: SharedFriction, name: str, *arguments: Any, **named: Any) -> Any:
-        """Call a method on all ranks; return its result, with states of a contact as shared ones."""
-        ends = [SharedState(contact), SharedState(contact)]
+    def call(self, layout: Layout, name: str, *arguments: Any, **named: Any) -> Any:
+        """Call a method on all ranks; return its result, with states on a window as shared ones."""
+        ends = [SharedState(layout), SharedState(layout)]
         numbers = [end.number for end in ends]
         found = ranks.order(_call, self.number, name, numbers, _sent(arguments), named)
         for place, each in enumerate(several := found if isinstance(found, list) else [found]):
@@ -166,8 +194,8 @@ class SharedObject:
         return several if isinstance(found, list) else several[0]
 
     def rows(self, name: str) -> Rows:
-        """Return the rows of a field, or of what a method returns."""
-        return _asked(_rows, self.number, name)
+        """Return the rows of a field, or of what a method returns; they keep the object."""
+        return lambda rank, shape: ranks.ask(rank, _rows, self.number, name, shape=shape)
 
 
 def _sent(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -184,25 +212,22 @@ class SharedState(SharedObject):
     touches_rim: bool
     sweeps: int
     normal_load: float
-
-    def __init__(self, contact: SharedFriction) -> None:
-        super().__init__()
-        self.contact, self._numbers = contact, set[str]()
+    _numbers: frozenset[str] = frozenset()
 
     def known(self, numbers: Mapping[str, Any]) -> SharedState:
         """Return the state with its numbers."""
-        self._numbers = {*numbers}
+        self._numbers = frozenset(numbers)
         vars(self).update(numbers)
         return self
 
     def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
         """Return fields, each of which is taken from the ranks at its use, and numbers."""
-        fields = SharedFields(self.contact, {name: self.rows(name) for name in _FIELDS})
+        fields = SharedFields(self.layout, {name: self.rows(name) for name in _FIELDS})
         return fields, {name: value for name, value in vars(self).items() if name in self._numbers}
 
     def as_start(self) -> SharedState:
         """Return what the next load step starts from: the state without the slip of the last one."""
-        start: SharedState = self.call(self.contact, "as_start")
+        start: SharedState = self.call(self.layout, "as_start")
         return start
 
     def gathered(self) -> ContactState:
@@ -214,20 +239,12 @@ class SharedState(SharedObject):
 class SharedFriction(SharedObject):
     """A contact with friction that all ranks share; methods as of `Part`."""
 
-    def __init__(
-        self,
-        gap: Field,
-        friction: Friction,
-        lattice: Lattice,
-        by_rows: bool,
-        **given: Any,
-    ) -> None:
-        self.lattice, self.by_rows = replace(lattice), by_rows
-        super().__init__(_part, gap, friction, self.lattice, by_rows, **given)
+    def __init__(self, gap: Field, friction: Friction, layout: Layout, **given: Any) -> None:
+        super().__init__(layout, _part, gap, friction, layout.lattice, layout.by_rows, **given)
 
     def method(self, name: str, *arguments: Any, **named: Any) -> Any:
         """Call a method of the parts."""
-        return self.call(self, name, *arguments, **named)
+        return self.call(self.layout, name, *arguments, **named)
 
     def virgin(self) -> SharedState:
         """Return the state before the first load."""
@@ -250,32 +267,17 @@ class SharedFriction(SharedObject):
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
-        self.method("wear", self.given({"depth": depth}, "depth"))
+        self.method("wear", self.layout.given({"depth": depth}, "depth"))
 
     def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> SharedState:
         """Return the state with given fields and numbers."""
-        found: SharedState = self.method("assembled", self.given(fields), numbers)
+        found: SharedState = self.method("assembled", self.layout.given(fields), numbers)
         return found
 
-    def given(self, fields: Mapping[str, NDArray[Any]], name: str = "") -> _Shared:
-        """Give each rank its rows of fields; return them, or one, as the argument of an order."""
-        number = ranks.new_number()
-        for field, values in fields.items():
-            for rank in range(ranks.count):
-                first, after = ranks.span(self.lattice, rank) if self.by_rows else (0, self.lattice.n_row)
-                ranks.give(rank, _take, number, field, np.asarray(values)[..., first:after, :].copy())
-        return _Shared(number, given=True, name=name)
 
-    def parts(self) -> list[tuple[int, tuple[int, int]]]:
-        """Return the ranks that together have all rows, each with the shape of its fields."""
-        if not self.by_rows:
-            return [(0, self.lattice.shape)]
-        return [(rank, ranks.rows(self.lattice, rank).shape) for rank in range(ranks.count)]
-
-
-def _part(gap: Field, friction: Any, lattice: Lattice, by_rows: bool, **given: Any) -> Part:
+def _part(gap: Field, friction: Friction, lattice: Lattice, by_rows: bool, **given: Any) -> Part:
     """Return the part of this rank of a contact."""
-    return Part(gap, friction, lattice, ranks.rows(lattice) if by_rows else lattice, **given)
+    return Part(gap, friction, lattice, Layout(lattice, by_rows).own(), **given)
 
 
 class Later:
@@ -292,54 +294,53 @@ class SharedCycles(SharedObject):
     """Cycles of wear of a contact that all ranks share; methods as of `CyclesOfWear`."""
 
     def __init__(self, settings: WearSettings, pair: ElasticPair, steps: Any, state: SharedState) -> None:
-        super().__init__(CyclesOfWear, settings, pair, steps, state)
+        super().__init__(state.layout, CyclesOfWear, settings, pair, steps, state)
 
     def advance(self, contact: SharedFriction) -> WearProgress:
         """Solve the next load step of a cycle."""
-        progress: WearProgress = self.call(contact, "advance", contact)
+        progress: WearProgress = self.call(contact.layout, "advance", contact)
         return progress
 
     def carry(self, contact: SharedFriction, smaller: Lattice) -> None:
         """Go on with a contact on a larger window."""
-        self.call(contact, "carry", contact, smaller)
+        self.call(contact.layout, "carry", contact, smaller)
 
     def reached(self, contact: SharedFriction) -> SharedState:
         """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
-        found: SharedState = self.call(contact, "reached", contact)
+        found: SharedState = self.call(contact.layout, "reached", contact)
         return found
 
     def fields(self, contact: SharedFriction) -> SharedFields:
         """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
         numbers = self.number, contact.number
-        return SharedFields(contact, {name: _asked(_worn_rows, *numbers, name) for name in (*WORN, AHEAD)})
+        taken = {name: _asked(_worn_rows, *numbers, name) for name in (*WORN, AHEAD)}
+        return SharedFields(contact.layout, taken)
 
     def restore(self, state: SharedState, fields: Mapping[str, Array], *numbers: float) -> None:
         """Go on from a solved cycle."""
-        self.call(state.contact, "restore", state, state.contact.given(fields), *numbers)
+        self.call(state.layout, "restore", state, state.layout.given(fields), *numbers)
 
     def restore_end(self, place: int, contact: SharedFriction, *end: Any) -> None:
         """Set the last solution of a load step: cycle, motions, tractions."""
         *numbers, tractions = end
-        self.call(contact, "restore_end", place, contact, *numbers, contact.given({"end": tractions}, "end"))
+        end_of = contact.layout.given({"end": tractions}, "end")
+        self.call(contact.layout, "restore_end", place, contact, *numbers, end_of)
 
     def end(self, place: int, contact: SharedFriction) -> tuple[float, Array, Any]:
         """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
         cycles, motions, _ = ranks.held[self.number].end(place, ranks.held[contact.number])
 
-        def tractions() -> Array:
-            rows = [
-                np.stack(
-                    [
-                        ranks.ask(rank, _end_rows, self.number, contact.number, place, k, shape=shape)
-                        for k in range(6)
-                    ]
-                )
-                for rank, shape in contact.parts()
-            ]
-            found: Any = np.concatenate(rows, axis=1).astype(np.float32)
-            return np.asarray(found.reshape(2, 3, *contact.lattice.shape))
+        shape = 2, 3, *contact.layout.lattice.shape
 
-        return cycles, motions, Later((2, 3, *contact.lattice.shape), "f4", tractions)
+        def tractions() -> Array:
+            found = np.empty((6, *shape[2:]), np.float32)
+            for component, values in enumerate(found):
+                taken = _asked(_end_rows, self.number, contact.number, place, component)
+                rows = SharedFields(contact.layout, {"end": taken})
+                values[:] = rows["end"]
+            return np.asarray(found.reshape(shape))
+
+        return cycles, motions, Later(shape, "f4", tractions)
 
 
 def _worn_rows(number: int, contact: int, name: str) -> Array:

@@ -118,19 +118,19 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     operator = contact.memory_needed("fft", *lattice.shape, part="operator", **given)
     set_up = contact.memory_needed("fft", *lattice.shape, part="set-up of the operator", **given)
     fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
-    needed = case.memory_needed(lattice)
+    needed, ahead = case.memory_needed(lattice), 0
+    if case.deck.wear:
+        ahead = contact.memory_needed("fft", *lattice.shape, threads=given["threads"])
     if ranks.count > 1:
         copies, parts = _copies(case, lattice)
-        needed, fields, operator, set_up = (
-            part * copies // parts for part in (needed, fields, operator, set_up)
+        needed, fields, operator, set_up, ahead = (
+            part * copies // parts for part in (needed, fields, operator, set_up, ahead)
         )
-    needed += kept
+    needed += kept + ahead
     if case.frictional or method == "direct":
         needed += fields + _WRITING
     else:  # the output takes the place of transforms and iterations
         needed += max(fields, _WRITING)
-    if case.deck.wear:
-        needed += contact.memory_needed("fft", *lattice.shape, threads=given["threads"])
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)

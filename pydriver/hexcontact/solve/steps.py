@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._version import __version__
+from ..core import ranks
 from ..core.lattice import Lattice
 from ..errors import DeckError, PathWarning, warn
 from ..problem import plausibility
@@ -102,6 +103,8 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
 def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]) -> Iterator[Step]:
     """Solve step by step; see `steps`."""
     state = path.window.restored(before[-1]) if before else None
+    if before and isinstance(before, list) and ranks.count > 1:  # each rank has its rows of the last step
+        before[-1] = before[-1].head
     segment, begun, reached_by_now = -1, _standing({}), _standing({})
     for step in before:
         if step.history["segment"] != segment + 1:

@@ -62,7 +62,7 @@ class WearPath(GivenPath):
     def after(self, state: ContactState) -> Iterator[Step]:
         """Solve the cycles that wear the surfaces, from the end of the load history or of the last cycle."""
         started, done = time.perf_counter(), 0.0 if self._last is None else self._last.history["wear_cycles"]
-        cycles = self._begun(state)
+        cycles, self._last = self._begun(state), None
         while done < self._wear.cycles:
             now = self._solved(cycles)
             before, state = state, cycles.reached(self.window.contact)

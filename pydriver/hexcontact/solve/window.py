@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 import weakref
@@ -26,7 +27,7 @@ from ..core.shared import (
     SharedSolution,
     rigid,
 )
-from ..core.shared_friction import SharedCycles, SharedFriction, gap_in_rows
+from ..core.shared_friction import Layout, SharedCycles, SharedFriction, gap_in_rows
 from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
@@ -176,7 +177,9 @@ class Window:
             fields["worn_depth"] = self.worn
         if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
             fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
-        return fields | self._displaced(fields)
+        if any(name in DISPLACEMENTS for name in fields_of(self.case)):
+            fields |= self._displaced(fields)
+        return fields
 
     def _displaced(self, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the displacements of the surfaces that the deck names."""
@@ -392,8 +395,7 @@ class FrictionWindow(Window):
         """Return the whole state, and set the worn depth of the step."""
         if (worn := step.fields.get("worn_depth")) is not None:
             self.wear(np.array(worn))
-        found: ContactState = self.contact.assembled(*state_of(step))
-        return found
+        return state_of(step)
 
     # --- history ------------------------------------------------------------------------------------------
 
@@ -423,17 +425,18 @@ class FrictionWindow(Window):
         return area
 
 
-def state_of(step: Step) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return fields and numbers of the state with friction at the end of a step with all its fields."""
+def state_of(step: Step) -> ContactState:
+    """Return the state with friction at the end of a step with all its fields."""
     needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "
             f"{', '.join(sorted(missing))}"
         )
-    fields = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
-    numbers: dict[str, Any] = {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
-    return fields, numbers | {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
+    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    return ContactState(**state)  # a finished step has converged, and away from the rim
 
 
 class SharedFrictionWindow(FrictionWindow):
@@ -449,15 +452,15 @@ class SharedFrictionWindow(FrictionWindow):
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener, self._bodies = listener or Listener(), {}
-        self.by_rows = is_shared(case, lattice)
-        self.friction = case.friction_law(ranks.rows(lattice) if self.by_rows else lattice)
+        self.layout = Layout(dataclasses.replace(lattice), is_shared(case, lattice))
+        self.friction = case.friction_law(self.layout.own())
         self.contact = self._shared(case.plane_gap)
 
     def _shared(self, gap: Any) -> SharedFriction:
         """Return the solver for a gap."""
         case = self.case
         return SharedFriction(
-            *(gap, case.plane_friction, self.lattice, self.by_rows),
+            *(gap, case.plane_friction, self.layout),
             pair=case.solved_pair,
             coupling="goodman" if case.solver.coupling == "goodman" else "full",
             interface=case.interface,
@@ -473,6 +476,11 @@ class SharedFrictionWindow(FrictionWindow):
     def _larger(self, solution: Any) -> Lattice:
         larger: Lattice = self.contact.method("grown", solution)
         return larger
+
+    def restored(self, step: Step) -> Any:
+        """Return the whole state, and set the worn depth of the step."""
+        state = super().restored(step)
+        return None if state is None else self.contact.assembled(*state.parts())
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
@@ -499,10 +507,10 @@ class SharedFrictionWindow(FrictionWindow):
             }
         if math.isnan(self.case.friction_coefficient) and self.friction.limits:
             rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
-        if self.by_rows:
+        if self.layout.by_rows:
             rows |= displaced_rows(self, solution)
-        fields: Any = SharedFields(self.contact, rows)
-        if not self.by_rows and any(name in DISPLACEMENTS for name in fields_of(self.case)):
+        fields: Any = SharedFields(self.layout, rows)
+        if not self.layout.by_rows and any(name in DISPLACEMENTS for name in fields_of(self.case)):
             fields = dict(fields) | self._displaced(fields)
         return dict(fields) if self.steps_held else fields
 

@@ -48,7 +48,7 @@ def fields_held(case: Problem) -> int:
     table = [
         # initial gap of a record; with friction the state before, which the core holds, and holes in the heap
         (True, 10 if friction else 1),
-        (_interpolates(case), 45),  # places of nodes when their gap closed
+        (friction and _interpolates(case), 45),  # places of nodes when their gap closed
         (case.adaptive, 40),  # the path in whole steps, and edges
         (math.isnan(case.friction_coefficient), 6),  # coefficients by node, also on lattices and parts
         (case.deck.wear, 56),  # cycles before and after a jump, their record, the pressure ahead

@@ -276,9 +276,11 @@ def test_a_window_grows_as_in_one_process(deck: str, tmp_path: Path) -> None:
 
 
 @with_mpi
-@pytest.mark.parametrize("again", [1, 4])
-def test_a_run_whose_process_is_killed_resumes_with_another_number(again: int, tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 12"))
+@pytest.mark.parametrize(("again", "deck"), [(1, PRESSED), (4, PRESSED), (2, SHEARED)])
+def test_a_run_whose_process_is_killed_resumes_with_another_number(
+    again: int, deck: str, tmp_path: Path
+) -> None:
+    (tmp_path / "sphere.toml").write_text(deck.replace("steps = 2", "steps = 12"))
     assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
     process = launched(tmp_path, 3, "run", "sphere.toml", "--quiet")
     journal = journal_of(tmp_path / "sphere.nc")
@@ -359,9 +361,10 @@ ranks.ask = asked
 
 
 @with_mpi
-def test_fields_of_bodies_are_those_of_one_process(tmp_path: Path) -> None:
+@pytest.mark.parametrize("deck", [PRESSED, SHEARED], ids=["pressed", "sheared"])
+def test_fields_of_bodies_are_those_of_one_process(deck: str, tmp_path: Path) -> None:
     fields = '[output]\nfields = ["pressure", "displacement_1_z", "displacement_2_y"]\n'
-    (tmp_path / "sphere.toml").write_text(PRESSED + fields)
+    (tmp_path / "sphere.toml").write_text(deck + fields)
     assert inside(tmp_path, "run", "sphere.toml", "--quiet", "--output", "one.nc").returncode == 0
     process = launched(tmp_path, 2, "run", "sphere.toml", "--output", "all.nc")
     out, err = process.communicate(timeout=PATIENCE)

@@ -100,10 +100,11 @@ def _displace(number: int, solution: int, displaced: int, goodman: bool) -> None
     operator, found = ranks.held[number], ranks.held[solution]
     state, shear = found.held, [np.zeros(found.held.shape)] * 2
     alone = [state.view("pressure"), *shear]
-    if hasattr(found, "traction_x"):
+    sheared = hasattr(found, "traction_x")
+    if sheared:
         shear = [found.traction_x, found.traction_y]
     z, x, y = flat.apply_operator_part(operator, [alone[0], *shear])
-    if goodman:
+    if goodman and sheared:
         z = flat.apply_operator_part(operator, alone)[0]
     ranks.held[displaced] = z, x, y
 

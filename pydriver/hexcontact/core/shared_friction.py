@@ -124,7 +124,7 @@ def _take(number: int, name: str, values: NDArray[Any]) -> None:
 
 
 def _rows(number: int, name: str) -> Array:
-    """Return own rows of a field of a state, or what a method of an object returns."""
+    """Return own rows of a field of a state, or the result of a method."""
     found = getattr(ranks.held[number], name)
     return np.asarray(found() if callable(found) else found).astype(float, copy=False)
 
@@ -194,7 +194,7 @@ class SharedObject:
         return several if isinstance(found, list) else several[0]
 
     def rows(self, name: str) -> Rows:
-        """Return the rows of a field, or of what a method returns; they keep the object."""
+        """Return the rows of a field, or of the result of a method; they keep the object."""
         return lambda rank, shape: ranks.ask(rank, _rows, self.number, name, shape=shape)
 
 
@@ -226,7 +226,7 @@ class SharedState(SharedObject):
         return fields, {name: value for name, value in vars(self).items() if name in self._numbers}
 
     def as_start(self) -> SharedState:
-        """Return what the next load step starts from: the state without the slip of the last one."""
+        """Return the start of the next load step: the state without the slip of the last one."""
         start: SharedState = self.call(self.layout, "as_start")
         return start
 

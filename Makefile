@@ -193,7 +193,7 @@ coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMP
 coverage-report:
 	@$(py) -m coverage combine --quiet
 	@$(py) -m coverage report --fail-under=$(COVERED_PYTHON); python=$$?; \
-	$(py) -m gcovr --root . --filter fortran/ --exclude fortran/friction/shared_friction.f90 --gcov-ignore-parse-errors=negative_hits.warn --gcov-suspicious-hits-threshold 0 --fail-under-line $(COVERED_FORTRAN) $(COVERAGE_BUILD) && exit $$python
+	$(py) -m gcovr --root . --filter fortran/ --gcov-ignore-parse-errors=negative_hits.warn --gcov-suspicious-hits-threshold 0 --fail-under-line $(COVERED_FORTRAN) $(COVERAGE_BUILD) && exit $$python
 
 package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build them and use them outside the checkout
 	@$(py) .ci/package.py

@@ -27,6 +27,8 @@ module hc_edge_continuation
 
   !> Marks of active nodes inside the contact, of nodes without a ring, and of the surroundings of the window.
   integer(int16), parameter :: inside = -1_int16, free = huge(0_int16), outside = huge(0_int16) - 1_int16
+  !> Nodes that are passed over at once.
+  integer, parameter :: stride = 32
   !> Nodes in the rings from which on threads share the work.
   integer, parameter :: worth_sharing = 8192
 
@@ -268,19 +270,22 @@ contains
     integer, intent(in), contiguous :: step(:)
     integer(int16), intent(in), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
-    integer :: next(0:self%n_ring), found(-2:2), row, first, col, r, k, n
+    integer :: n_node(0:self%n_ring), cols(n_col), row, first, r, k, n
 
     n = size(mark)/(n_col + 2) - 2
     first = merge(self%rows(1), 1, space%ranks%size == 1)
     allocate (self%start(0:self%n_ring + 1, first:first + n - 1))
-    !$omp parallel do schedule(static) num_threads(space%threads) private(next, col, r)
-    do row = 1, n
-      next = 0
-      do col = 1, n_col
-        r = mark(row*(n_col + 2) + 1 + col)
-        if (r >= 0 .and. r <= self%n_ring) next(r) = next(r) + 1
-      end do
-      self%start(:self%n_ring, first + row - 1) = next
+    !$omp parallel do schedule(static) num_threads(space%threads) private(n_node, cols, r, k, n)
+    do row = first, ubound(self%start, 2)
+      associate (before => (row - first + 1)*(n_col + 2) + 1)
+        call find_marks(mark(before + 1:before + n_col), 0_int16, int(self%n_ring, int16), cols, n)
+        n_node = 0
+        do k = 1, n
+          r = mark(before + cols(k))
+          n_node(r) = n_node(r) + 1
+        end do
+      end associate
+      self%start(:self%n_ring, row) = n_node
     end do
     !$omp end parallel do
     n = 0
@@ -294,31 +299,64 @@ contains
     end do
     if (n >= worth_sharing) self%space = space
     allocate (self%node(n), self%inner(n), self%beside(n), self%outer(n))
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(next, found, col, r, k, n)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(n_node, cols, r, k, n)
     do row = first, ubound(self%start, 2)
-      next = self%start(:self%n_ring, row)
-      do col = 1, n_col
-        associate (place => (row - first + 1)*(n_col + 2) + 1 + col)
-          r = mark(place)
-          if (r < 0 .or. r > self%n_ring) cycle
-          found = 0
-          do k = 1, size(step)
-            ! a ring before, the same and the next one; the rest is not of interest
-            associate (other => max(min(mark(place + step(k)) - r, 2), -2))
-              found(other) = ior(found(other), ishft(1, k))
-            end associate
-          end do
-        end associate
-        n = next(r)
-        next(r) = n + 1
-        self%node(n) = (row - 1)*n_col + col
-        self%inner(n) = int(found(-1), int8)
-        self%beside(n) = int(ior(found(0), 1), int8)
-        self%outer(n) = int(merge(found(1), 0, r < self%n_ring), int8)
-      end do
+      associate (before => (row - first + 1)*(n_col + 2) + 1)
+        call find_marks(mark(before + 1:before + n_col), 0_int16, int(self%n_ring, int16), cols, n)
+        n_node = self%start(:self%n_ring, row) - 1
+        do k = 1, n
+          r = mark(before + cols(k))
+          n_node(r) = n_node(r) + 1
+          self%node(n_node(r)) = (row - 1)*n_col + cols(k)
+          call find_neighbors(self, n_node(r), r, before + cols(k), step, mark)
+        end do
+      end associate
     end do
     !$omp end parallel do
   end subroutine list_rings
+
+  !> Find the marks in a row within some limits.
+  pure subroutine find_marks(mark, low, high, cols, n)
+    !> Marks of the row, and their limits
+    integer(int16), intent(in), contiguous :: mark(:)
+    integer(int16), intent(in) :: low, high
+    !> Their columns, and how many they are
+    integer, intent(inout) :: cols(:)
+    integer, intent(out) :: n
+    integer :: from, col
+
+    n = 0
+    do from = 1, size(mark), stride
+      associate (to => min(from + stride - 1, size(mark)))
+        if (count(mark(from:to) >= low .and. mark(from:to) <= high) == 0) cycle
+        do col = from, to
+          if (mark(col) < low .or. mark(col) > high) cycle
+          n = n + 1
+          cols(n) = col
+        end do
+      end associate
+    end do
+  end subroutine find_marks
+
+  !> Find the neighbors of a node in the ring before, in its own, and in the next one.
+  pure subroutine find_neighbors(self, n, ring, place, step, mark)
+    type(edge_extension_t), intent(inout) :: self
+    !> The node in the list, its ring, and its place among the marks
+    integer, intent(in) :: n, ring, place
+    !> Steps to the neighbors of a node among the marks, and marks of the nodes
+    integer, intent(in), contiguous :: step(:)
+    integer(int16), intent(in), contiguous :: mark(:)
+    integer :: found(-2:2), other, k
+
+    found = 0
+    do k = 1, size(step)
+      other = max(min(mark(place + step(k)) - ring, 2), -2)
+      found(other) = ior(found(other), ishft(1, k))
+    end do
+    self%inner(n) = int(found(-1), int8)
+    self%beside(n) = int(ior(found(0), 1), int8)
+    self%outer(n) = int(merge(found(1), 0, ring < self%n_ring), int8)
+  end subroutine find_neighbors
 
   !> Mark all nodes before there are rings.
   subroutine mark_window(active, space, mark, within)
@@ -367,36 +405,30 @@ contains
     type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
-    integer(int16) :: is_edge(n_col)
-    integer :: n_edge(size(mark)/(n_col + 2) - 2), row, before, col, k, n
+    integer :: n_edge(size(mark)/(n_col + 2) - 2), cols(n_col), row, k, n
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(is_edge, before, col, k)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(cols, k, n)
     do row = 1, size(n_edge)
-      before = row*(n_col + 2) + 1
-      is_edge = 0
-      do k = 1, size(step)
-        do col = 1, n_col
-          is_edge(col) = merge(1_int16, is_edge(col), mark(before + col + step(k)) == free)
+      associate (before => row*(n_col + 2) + 1)
+        call find_marks(mark(before + 1:before + n_col), inside, inside, cols, n)
+        n_edge(row) = 0
+        do k = 1, n
+          if (.not. any(mark(before + cols(k) + step) == free)) cycle
+          mark(before + cols(k)) = 0
+          n_edge(row) = n_edge(row) + 1
         end do
-      end do
-      do col = 1, n_col
-        is_edge(col) = merge(is_edge(col), 0_int16, mark(before + col) == inside)
-      end do
-      do col = 1, n_col
-        mark(before + col) = mark(before + col) + is_edge(col)
-      end do
-      n_edge(row) = count(is_edge == 1)
+      end associate
     end do
     !$omp end parallel do
     allocate (edge(sum(n_edge)))
     n = 0
     do row = 1, size(n_edge)
       if (n_edge(row) == 0) cycle
-      do k = row*(n_col + 2) + 2, (row + 1)*(n_col + 2) - 1
-        if (mark(k) /= 0) cycle
-        n = n + 1
-        edge(n) = k
-      end do
+      associate (before => row*(n_col + 2) + 1)
+        call find_marks(mark(before + 1:before + n_col), 0_int16, 0_int16, cols, k)
+        edge(n + 1:n + k) = before + cols(:k)
+      end associate
+      n = n + k
     end do
   end subroutine find_edge
 

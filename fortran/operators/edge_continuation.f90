@@ -46,6 +46,9 @@ module hc_edge_continuation
     !> By these bits: fall from ring to ring over the number of steps (bits, ring), and 1 over the number
     real(sp), allocatable :: fall(:, :)
     real(sp) :: mean(0:127) = 0.0_sp
+    !> By them, the first steps, by a factor of 1 or 0, and the bits of the others: without branches for most nodes
+    integer :: first(3, 0:127) = 0, others(0:127) = 0
+    real(sp) :: taken(3, 0:127) = 0.0_sp
     !> Times that a ring is smoothed
     integer :: smoothings = 0
     !> Space of the rings
@@ -252,8 +255,14 @@ contains
     self%n_ring = nint(found(1))
     self%smoothings = options%smoothings
     allocate (self%fall(0:127, self%n_ring))
-    do bits = 1, 127
+    do bits = 1, 2**size(self%step) - 1
       self%mean(bits) = 1.0_sp/popcnt(bits)
+      self%others(bits) = bits
+      do r = 1, min(popcnt(bits), size(self%first, 1))
+        self%first(r, bits) = self%step(trailz(self%others(bits)) + 1)
+        self%taken(r, bits) = 1.0_sp
+        self%others(bits) = iand(self%others(bits), self%others(bits) - 1)
+      end do
       do r = 1, self%n_ring
         self%fall(bits, r) = real(profile(r, self%n_ring)/profile(r - 1, self%n_ring)/popcnt(bits), sp)
       end do
@@ -405,17 +414,20 @@ contains
     type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
-    integer :: n_edge(size(mark)/(n_col + 2) - 2), cols(n_col), row, k, n
+    integer :: n_edge(size(mark)/(n_col + 2) - 2), cols(n_col), row, i, k, n
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(cols, k, n)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(cols, i, k, n)
     do row = 1, size(n_edge)
       associate (before => row*(n_col + 2) + 1)
         call find_marks(mark(before + 1:before + n_col), inside, inside, cols, n)
         n_edge(row) = 0
         do k = 1, n
-          if (.not. any(mark(before + cols(k) + step) == free)) cycle
-          mark(before + cols(k)) = 0
-          n_edge(row) = n_edge(row) + 1
+          do i = 1, size(step)
+            if (mark(before + cols(k) + step(i)) /= free) cycle
+            mark(before + cols(k)) = 0
+            n_edge(row) = n_edge(row) + 1
+            exit
+          end do
         end do
       end associate
     end do
@@ -687,7 +699,9 @@ contains
     integer :: bits
 
     bits = neighbors
-    total = 0.0_sp
+    total = self%taken(1, bits)*field(node + self%first(1, bits)) + self%taken(2, bits)*field(node + self%first(2, bits)) &
+            + self%taken(3, bits)*field(node + self%first(3, bits))
+    bits = self%others(bits)
     do while (bits /= 0)
       total = total + field(node + self%step(trailz(bits) + 1))
       bits = iand(bits, bits - 1)

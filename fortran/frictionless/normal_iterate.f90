@@ -340,13 +340,20 @@ contains
     !> First and last column of each run, and their number
     integer, intent(inout), contiguous :: run(:, :)
     integer, intent(out) :: n_run
-    integer :: from, to, col
+    integer :: from, to, col, n
 
     n_run = 0
     do from = 1, size(known), worth_a_run
       to = min(from + worth_a_run - 1, size(known))
-      if (count(known(from:to)) == 0) cycle
+      n = count(known(from:to))
+      if (n == 0) cycle
       do col = from, to
+        if (n == to - from + 1 .and. n_run > 0) then
+          if (run(2, n_run) == from - 1) then
+            run(2, n_run) = to
+            exit
+          end if
+        end if
         if (.not. known(col)) cycle
         if (n_run == 0) then
           n_run = 1

@@ -29,26 +29,35 @@ module hc_edge_continuation
   integer(int16), parameter :: inside = -1_int16, free = huge(0_int16), outside = huge(0_int16) - 1_int16
   !> Nodes that are passed over at once.
   integer, parameter :: stride = 32
+  !> Nodes of a ring in rows that are passed over together.
+  integer, parameter :: worth_a_block = 64
   !> Nodes in the rings from which on threads share the work.
   integer, parameter :: worth_sharing = 8192
+
+  !> Steps to some of the neighbors as bits: their number, one over it, and the bits without the one, two and three lowest.
+  integer :: bit
+  integer, parameter :: bits_of(0:127) = [(bit, bit=0, 127)], n_bits(0:127) = popcnt(bits_of)
+  real(sp), parameter :: mean(0:127) = 1.0_sp/max(n_bits, 1)
+  integer, parameter, dimension(0:127) :: but_one = iand(bits_of, bits_of - 1), but_two = iand(but_one, but_one - 1), &
+                                          others = iand(but_two, but_two - 1)
+  !> The three lowest as numbers of steps, and 1 where there are as many, else 0: sums without branches for most nodes.
+  integer, parameter :: lowest(0:127, 3) = reshape([trailz(bits_of) + 1, trailz(but_one) + 1, trailz(but_two) + 1], [128, 3])
+  real(sp), parameter :: taken(0:127, 3) = reshape([min(n_bits, 1), min(n_bits/2, 1), min(n_bits/3, 1)], [128, 3])
 
   !> Nodes of the rings and their neighbors; the active nodes at the edge are ring 0.
   type :: edge_extension_t
     private
     !> Number of rings
     integer :: n_ring = 0
-    !> Nodes, row by row and in each by rings, and where each ring begins (0:n_ring + 1, row)
+    !> Nodes, in blocks of rows and in each by rings, and where each ring begins (0:n_ring + 1, block)
     integer, allocatable :: node(:), start(:, :)
     !> Steps from a node to itself and to its neighbors
     integer, allocatable :: step(:)
     !> Of each node, a bit for each step: those to the ring before, those in the same ring, and those to the next one
     integer(int8), allocatable :: inner(:), beside(:), outer(:)
-    !> By these bits: fall from ring to ring over the number of steps (bits, ring), and 1 over the number
+    !> By these bits: fall from ring to ring over the number of steps (bits, ring), and the first steps
     real(sp), allocatable :: fall(:, :)
-    real(sp) :: mean(0:127) = 0.0_sp
-    !> By them, the first steps, by a factor of 1 or 0, and the bits of the others: without branches for most nodes
-    integer :: first(3, 0:127) = 0, others(0:127) = 0
-    real(sp) :: taken(3, 0:127) = 0.0_sp
+    integer :: first(3, 0:127) = 0
     !> Times that a ring is smoothed
     integer :: smoothings = 0
     !> Space of the rings
@@ -88,8 +97,8 @@ contains
     real(wp), intent(in), optional :: by_width
     logical(lk), pointer, contiguous :: around(:, :), until(:, :)
     integer(int16), allocatable :: mark(:)
-    integer, allocatable :: edge(:), step(:)
-    integer :: n_ring
+    integer, allocatable :: list(:), step(:)
+    integer :: n_ring, n_edge
 
     self%step = [0, neighbor_steps(size(active, 1))]
     step = neighbor_steps(size(active, 1) + 2)                                 ! among marks, with a column more on each side
@@ -110,10 +119,10 @@ contains
       until => null()                                                          ! the same as absent
       if (present(within)) until => within(:, self%rows(1):self%rows(2))
       call mark_window(around, space, mark, until)
-      call find_edge(size(active, 1), mark, step, space, edge)
-      n_ring = number_of_rings(options, space%count(active), size(edge))
-      if (present(by_width)) n_ring = int(by_width*space%count(active)/max(size(edge), 1))
-      call find_rings(self, size(active, 1), n_ring, step, edge, mark, space, options)
+      call find_edge(size(active, 1), mark, step, list, n_edge)
+      n_ring = number_of_rings(options, space%count(active), n_edge)
+      if (present(by_width)) n_ring = int(by_width*space%count(active)/max(n_edge, 1))
+      call find_rings(self, size(active, 1), n_ring, step, list, n_edge, mark, space, options)
     end if
   end subroutine new_edge_extension
 
@@ -168,8 +177,8 @@ contains
     logical(lk), intent(in), contiguous, optional :: within(:, :)
     logical(lk), allocatable :: wider(:, :), around(:, :)
     integer(int16), allocatable :: mark(:)
-    integer, allocatable :: edge(:)
-    integer :: counts(3), n_ring
+    integer, allocatable :: list(:)
+    integer :: counts(3), n_ring, n_edge
 
     self%fields = space
     self%own = 0
@@ -180,15 +189,15 @@ contains
     call take_rows(self, active, 1, wider)
     if (present(within)) call take_rows(self, within, 1, around)
     call mark_window(wider, space, mark, around)
-    call find_edge(size(active, 1), mark, step, space, edge)
-    counts = [count(active), count(is_own(self, size(active, 1), edge)), 0]
+    call find_edge(size(active, 1), mark, step, list, n_edge)
+    counts = [count(active), count(is_own(self, size(active, 1), list(:n_edge))), 0]
     call space%ranks%add_counts(counts)
     n_ring = number_of_rings(options, counts(1), counts(2))
     call take_rows(self, active, n_ring*(options%smoothings + 2) + 1, wider)
     if (present(within)) call take_rows(self, within, n_ring*(options%smoothings + 2) + 1, around)
     call mark_window(wider, space, mark, around)
-    call find_edge(size(active, 1), mark, step, space, edge)
-    call find_rings(self, size(active, 1), n_ring, step, edge, mark, space, options)
+    call find_edge(size(active, 1), mark, step, list, n_edge)
+    call find_rings(self, size(active, 1), n_ring, step, list, n_edge, mark, space, options)
   end subroutine share_rings
 
   !> Take own rows and some more on each side, as far as the window goes.
@@ -217,154 +226,128 @@ contains
   end function is_own
 
   !> Grow the rings from the nodes at the edge.
-  subroutine find_rings(self, n_col, most_rings, step, edge, mark, space, options)
+  subroutine find_rings(self, n_col, most_rings, step, list, n_edge, mark, space, options)
     type(edge_extension_t), intent(inout) :: self
     !> Number of columns, and of rings, unless they fill the window before
     integer, intent(in) :: n_col, most_rings
-    !> Steps to the neighbors of a node, and nodes at the edge, among the marks
-    integer, intent(in), contiguous :: step(:), edge(:)
+    !> Steps to the neighbors of a node among the marks
+    integer, intent(in), contiguous :: step(:)
+    !> Nodes at the edge, to which those of the rings are added, as places in the marks, and the number of those at the edge
+    integer, intent(inout) :: list(:)
+    integer, intent(in) :: n_edge
     !> Marks of the nodes, one column and row around the window included: `inside` or 0 on active nodes, the ring on those of
     !> the rings, `free` elsewhere and `outside` around
     integer(int16), intent(inout), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
-    integer, allocatable :: list(:)
-    integer :: r, n, from, to, bits
-    real(wp) :: found(1)
+    integer, allocatable :: first(:)
+    integer :: r, n
+    real(wp) :: found(1), by_number(0:7)
+    real(wp), parameter :: number(0:7) = [(real(max(r, 1), wp), r=0, 7)]
 
-    ! room for as many nodes as there can be: what is not used takes no memory
-    allocate (list(size(mark)))
-    to = size(edge)
-    list(:to) = edge
-    from = 1
+    n = n_edge
+    first = [1, n + 1]
     found = 0.0_wp
     do r = 1, most_rings
-      n = to
-      call add_ring(list, from, to, step, int(r, int16), mark, n)
-      from = to + 1
-      to = n
+      call add_ring(list, first(r), first(r + 1) - 1, step, int(r, int16), mark, n)
       if (space%ranks%size == 1) then
-        if (to < from) exit
+        if (n < first(r + 1)) exit
         found = r
-      else if (any(is_own(self, n_col, list(from:to)))) then
+      else if (any(is_own(self, n_col, list(first(r + 1):n)))) then
         found = r
       end if
+      first = [first, n + 1]
     end do
-    deallocate (list)
     call space%most(found)
     self%n_ring = nint(found(1))
     self%smoothings = options%smoothings
     allocate (self%fall(0:127, self%n_ring))
-    do bits = 1, 2**size(self%step) - 1
-      self%mean(bits) = 1.0_sp/popcnt(bits)
-      self%others(bits) = bits
-      do r = 1, min(popcnt(bits), size(self%first, 1))
-        self%first(r, bits) = self%step(trailz(self%others(bits)) + 1)
-        self%taken(r, bits) = 1.0_sp
-        self%others(bits) = iand(self%others(bits), self%others(bits) - 1)
-      end do
-      do r = 1, self%n_ring
-        self%fall(bits, r) = real(profile(r, self%n_ring)/profile(r - 1, self%n_ring)/popcnt(bits), sp)
-      end do
+    do r = 1, self%n_ring
+      by_number = profile(r, self%n_ring)/profile(r - 1, self%n_ring)/number
+      self%fall(:, r) = real(by_number(n_bits), sp)
     end do
-    call list_rings(self, n_col, step, mark, space)
+    do r = 1, size(lowest, 2)
+      self%first(r, :) = self%step(merge(min(lowest(:, r), size(self%step)), 1, n_bits >= r))
+    end do
+    call list_rings(self, n_col, list, first, step, mark, space)
   end subroutine find_rings
 
-  !> List the nodes of the rings, row by row, with their neighbors.
-  subroutine list_rings(self, n_col, step, mark, space)
+  !> List the nodes of the rings by blocks of rows, with their neighbors.
+  subroutine list_rings(self, n_col, list, first, step, mark, space)
     type(edge_extension_t), intent(inout) :: self
     !> Number of columns
     integer, intent(in) :: n_col
+    !> Nodes as places in the marks, ring by ring, and where each ring begins
+    integer, intent(in) :: list(:), first(0:)
     !> Steps to the neighbors of a node among the marks, and marks of the nodes
     integer, intent(in), contiguous :: step(:)
     integer(int16), intent(in), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
-    integer :: n_node(0:self%n_ring), cols(n_col), row, first, r, k, n
+    integer, allocatable :: before(:, :)
+    integer :: width, n_row, height, shift, b, r, k, n
 
-    n = size(mark)/(n_col + 2) - 2
-    first = merge(self%rows(1), 1, space%ranks%size == 1)
-    allocate (self%start(0:self%n_ring + 1, first:first + n - 1))
-    !$omp parallel do schedule(static) num_threads(space%threads) private(n_node, cols, r, k, n)
-    do row = first, ubound(self%start, 2)
-      associate (before => (row - first + 1)*(n_col + 2) + 1)
-        call find_marks(mark(before + 1:before + n_col), 0_int16, int(self%n_ring, int16), cols, n)
-        n_node = 0
-        do k = 1, n
-          r = mark(before + cols(k))
-          n_node(r) = n_node(r) + 1
-        end do
-      end associate
-      self%start(:self%n_ring, row) = n_node
-    end do
-    !$omp end parallel do
-    n = 0
-    do row = first, ubound(self%start, 2)
-      do r = 0, self%n_ring
-        k = self%start(r, row)
-        self%start(r, row) = n + 1
-        n = n + k
-      end do
-      self%start(self%n_ring + 1, row) = n + 1
-    end do
+    width = n_col + 2
+    n_row = size(mark)/width - 2
+    n = first(self%n_ring + 1) - 1
+    height = int(max(min(worth_a_block*(self%n_ring + 1)*real(n_row)/max(n, 1), real(n_row)), 1.0))
     if (n >= worth_sharing) self%space = space
+    allocate (before(0:self%n_ring, (n_row + height - 1)/height), source=0)
+    allocate (self%start(0:self%n_ring + 1, size(before, 2)))
+    do r = 0, self%n_ring
+      do k = first(r), first(r + 1) - 1
+        b = ((list(k) - 1)/width - 1)/height + 1
+        before(r, b) = before(r, b) + 1
+      end do
+    end do
+    k = 1
+    do b = 1, size(before, 2)
+      do r = 0, self%n_ring
+        self%start(r, b) = k
+        k = k + before(r, b)
+        before(r, b) = self%start(r, b) - 1
+      end do
+      self%start(self%n_ring + 1, b) = k
+    end do
     allocate (self%node(n), self%inner(n), self%beside(n), self%outer(n))
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(n_node, cols, r, k, n)
-    do row = first, ubound(self%start, 2)
-      associate (before => (row - first + 1)*(n_col + 2) + 1)
-        call find_marks(mark(before + 1:before + n_col), 0_int16, int(self%n_ring, int16), cols, n)
-        n_node = self%start(:self%n_ring, row) - 1
-        do k = 1, n
-          r = mark(before + cols(k))
-          n_node(r) = n_node(r) + 1
-          self%node(n_node(r)) = (row - 1)*n_col + cols(k)
-          call find_neighbors(self, n_node(r), r, before + cols(k), step, mark)
-        end do
-      end associate
+    do r = 0, self%n_ring
+      do k = first(r), first(r + 1) - 1
+        b = ((list(k) - 1)/width - 1)/height + 1
+        before(r, b) = before(r, b) + 1
+        self%node(before(r, b)) = list(k)
+      end do
+    end do
+    ! from places in the marks to nodes of the window
+    shift = merge(self%rows(1) - 2, -1, space%ranks%size == 1)*n_col - 1
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(b)
+    do k = 1, n
+      call find_neighbors(self, k, step, mark)
+      b = (self%node(k) - 1)/width
+      self%node(k) = self%node(k) - b*width + b*n_col + shift
     end do
     !$omp end parallel do
   end subroutine list_rings
 
-  !> Find the marks in a row within some limits.
-  pure subroutine find_marks(mark, low, high, cols, n)
-    !> Marks of the row, and their limits
-    integer(int16), intent(in), contiguous :: mark(:)
-    integer(int16), intent(in) :: low, high
-    !> Their columns, and how many they are
-    integer, intent(inout) :: cols(:)
-    integer, intent(out) :: n
-    integer :: from, col
-
-    n = 0
-    do from = 1, size(mark), stride
-      associate (to => min(from + stride - 1, size(mark)))
-        if (count(mark(from:to) >= low .and. mark(from:to) <= high) == 0) cycle
-        do col = from, to
-          if (mark(col) < low .or. mark(col) > high) cycle
-          n = n + 1
-          cols(n) = col
-        end do
-      end associate
-    end do
-  end subroutine find_marks
-
   !> Find the neighbors of a node in the ring before, in its own, and in the next one.
-  pure subroutine find_neighbors(self, n, ring, place, step, mark)
+  pure subroutine find_neighbors(self, n, step, mark)
     type(edge_extension_t), intent(inout) :: self
-    !> The node in the list, its ring, and its place among the marks
-    integer, intent(in) :: n, ring, place
+    !> The node in the list, there as a place in the marks
+    integer, intent(in) :: n
     !> Steps to the neighbors of a node among the marks, and marks of the nodes
     integer, intent(in), contiguous :: step(:)
     integer(int16), intent(in), contiguous :: mark(:)
     integer :: found(-2:2), other, k
 
     found = 0
-    do k = 1, size(step)
-      other = max(min(mark(place + step(k)) - ring, 2), -2)
-      found(other) = ior(found(other), ishft(1, k))
-    end do
+    associate (place => self%node(n))
+      do k = 1, size(step)
+        other = max(min(int(mark(place + step(k))) - mark(place), 2), -2)
+        found(other) = ior(found(other), ishft(1, k))
+      end do
+      if (mark(place) == self%n_ring) found(1) = 0
+    end associate
     self%inner(n) = int(found(-1), int8)
     self%beside(n) = int(ior(found(0), 1), int8)
-    self%outer(n) = int(merge(found(1), 0, ring < self%n_ring), int8)
+    self%outer(n) = int(found(1), int8)
   end subroutine find_neighbors
 
   !> Mark all nodes before there are rings.
@@ -404,43 +387,40 @@ contains
   end function profile
 
   !> Mark the active nodes with a neighbor that is not; a node at the rim of the window has none there.
-  subroutine find_edge(n_col, mark, step, space, edge)
+  pure subroutine find_edge(n_col, mark, step, edge, n)
     !> Number of columns
     integer, intent(in) :: n_col
     !> Marks of all nodes, and steps to the neighbors of a node
     integer(int16), intent(inout), contiguous :: mark(:)
     integer, intent(in) :: step(:)
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    !> The nodes, as places in the marks
+    !> The nodes, as places in the marks, in room for as many as there are marks: what is not used takes no memory
     integer, allocatable, intent(out) :: edge(:)
-    integer :: n_edge(size(mark)/(n_col + 2) - 2), cols(n_col), row, i, k, n
+    !> Their number
+    integer, intent(out) :: n
+    integer :: row, first, last, n_free, place, i
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(cols, i, k, n)
-    do row = 1, size(n_edge)
-      associate (before => row*(n_col + 2) + 1)
-        call find_marks(mark(before + 1:before + n_col), inside, inside, cols, n)
-        n_edge(row) = 0
-        do k = 1, n
+    allocate (edge(size(mark)))
+    n = 0
+    do row = 1, size(mark)/(n_col + 2) - 2
+      do first = row*(n_col + 2) + 2, (row + 1)*(n_col + 2) - 1, stride
+        last = min(first + stride - 1, (row + 1)*(n_col + 2) - 1)
+        if (count(mark(first:last) == inside) == 0) cycle
+        n_free = 0
+        do i = -1, 1
+          n_free = n_free + count(mark(first - 1 + i*(n_col + 2):last + 1 + i*(n_col + 2)) == free)
+        end do
+        if (n_free == 0) cycle
+        do place = first, last
+          if (mark(place) /= inside) cycle
           do i = 1, size(step)
-            if (mark(before + cols(k) + step(i)) /= free) cycle
-            mark(before + cols(k)) = 0
-            n_edge(row) = n_edge(row) + 1
+            if (mark(place + step(i)) /= free) cycle
+            mark(place) = 0
+            n = n + 1
+            edge(n) = place
             exit
           end do
         end do
-      end associate
-    end do
-    !$omp end parallel do
-    allocate (edge(sum(n_edge)))
-    n = 0
-    do row = 1, size(n_edge)
-      if (n_edge(row) == 0) cycle
-      associate (before => row*(n_col + 2) + 1)
-        call find_marks(mark(before + 1:before + n_col), 0_int16, 0_int16, cols, k)
-        edge(n + 1:n + k) = before + cols(:k)
-      end associate
-      n = n + k
+      end do
     end do
   end subroutine find_edge
 
@@ -555,7 +535,7 @@ contains
   !> Continue a field in the rows of the rings, or fold it.
   !>
   !> A ring takes several stages, each of which needs the neighboring rows of the stage before. In one thread the stages follow each
-  !> other a row apart, so that the rows that they need are still in the cache.
+  !> other a block apart, so that the rows that they need are still in the cache.
   subroutine pass_rings(self, folds, field, own, first)
     class(edge_extension_t), intent(in) :: self
     !> Fold it
@@ -567,34 +547,34 @@ contains
     !> Height of the continuation in the first ring; absent: 1
     real(sp), intent(in), optional :: first
     real(sp), allocatable :: value(:), before(:)
-    integer :: n_stage, stage, time, row
+    integer :: n_stage, stage, time, block
 
     if (self%n_ring == 0) return                                               ! or not set up: zero beyond the edge
     allocate (value(size(self%node)))
     if (present(own)) allocate (before(size(self%node)))
     n_stage = self%n_ring*(2*self%smoothings + 1)
     if (folds) n_stage = n_stage + 1
-    associate (low => lbound(self%start, 2), high => ubound(self%start, 2))
+    associate (n_block => size(self%start, 2))
       if (self%space%threads == 1) then
-        do time = low, high + n_stage - 1
-          do stage = max(time - high, 0), min(time - low, n_stage - 1)
-            call pass_row(stage, time - stage)
+        do time = 1, n_block + n_stage - 1
+          do stage = max(time - n_block, 0), min(time, n_stage) - 1
+            call pass_block(stage, time - stage)
           end do
         end do
       else
-        !$omp parallel num_threads(self%space%threads) private(stage, row)
+        !$omp parallel num_threads(self%space%threads) private(stage, block)
         do stage = 0, n_stage - 1
           !$omp do schedule(static)
-          do row = low, high
-            call pass_row(stage, row)
+          do block = 1, n_block
+            call pass_block(stage, block)
           end do
           !$omp end do
         end do
         !$omp end parallel
       end if
       if (.not. (folds .and. present(own))) return
-      do row = low, high
-        do stage = self%start(1, row), self%start(self%n_ring + 1, row) - 1
+      do block = 1, n_block
+        do stage = self%start(1, block), self%start(self%n_ring + 1, block) - 1
           field(self%node(stage)) = before(stage)
         end do
       end do
@@ -602,23 +582,23 @@ contains
 
   contains
 
-    !> Do one stage in one row.
-    subroutine pass_row(stage, row)
-      integer, intent(in) :: stage, row
+    !> Do one stage in one block.
+    subroutine pass_block(stage, block)
+      integer, intent(in) :: stage, block
       if (folds) then
-        call fold_row(self, stage, row, field, value, before, own, first)
+        call fold_block(self, stage, block, field, value, before, own, first)
       else
-        call extend_row(self, stage, row, field, value, before, own, first)
+        call extend_block(self, stage, block, field, value, before, own, first)
       end if
-    end subroutine pass_row
+    end subroutine pass_block
 
   end subroutine pass_rings
 
-  !> Do a stage of the continuation in a row: the mean of the ring before, or a mean along the ring, found or put into the field.
-  pure subroutine extend_row(self, stage, row, field, value, before, own, first)
+  !> Do a stage of the continuation in a block: the mean of the ring before, or a mean along the ring, found or put into the field.
+  pure subroutine extend_block(self, stage, block, field, value, before, own, first)
     type(edge_extension_t), intent(in) :: self
-    !> Stage, from 0, and row
-    integer, intent(in) :: stage, row
+    !> Stage, from 0, and block
+    integer, intent(in) :: stage, block
     !> Field over the window; of the nodes of the rings, new values and those of the field before
     real(sp), intent(inout), contiguous :: field(:), value(:)
     real(sp), intent(inout), contiguous, optional :: before(:)
@@ -626,31 +606,38 @@ contains
     real(sp), intent(in), contiguous, optional :: own(:)
     real(sp), intent(in), optional :: first
     integer :: ring, part, k
-    logical :: last
 
     ring = stage/(2*self%smoothings + 1) + 1
     part = modulo(stage, 2*self%smoothings + 1)
-    last = part == 2*self%smoothings
-    do k = self%start(ring, row), self%start(ring + 1, row) - 1
+    associate (from => self%start(ring, block), to => self%start(ring + 1, block) - 1)
       if (part == 0) then
-        if (present(own)) before(k) = field(self%node(k))
-        value(k) = self%fall(self%inner(k), ring)*sum_over(self, field, self%node(k), self%inner(k))
-        if (ring == 1 .and. present(first)) value(k) = first*value(k)
+        if (present(own)) before(from:to) = field(self%node(from:to))
+        call sum_over(self, from, to, self%inner, field, value)
+        do k = from, to
+          value(k) = self%fall(self%inner(k), ring)*value(k)
+        end do
+        if (ring == 1 .and. present(first)) value(from:to) = first*value(from:to)
       else if (modulo(part, 2) == 1) then
-        value(k) = self%mean(self%beside(k))*sum_over(self, field, self%node(k), self%beside(k))
-        cycle
+        call sum_over(self, from, to, self%beside, field, value)
+        return
       end if
-      field(self%node(k)) = value(k)
-      if (last .and. present(own)) field(self%node(k)) = before(k) + (1.0_sp - own(self%node(k)))*value(k)
-    end do
-  end subroutine extend_row
+      do k = from, to
+        if (part > 0) value(k) = mean(self%beside(k))*value(k)
+        field(self%node(k)) = value(k)
+      end do
+      if (part < 2*self%smoothings .or. .not. present(own)) return
+      do k = from, to
+        field(self%node(k)) = before(k) + (1.0_sp - own(self%node(k)))*value(k)
+      end do
+    end associate
+  end subroutine extend_block
 
-  !> Do a stage of the transpose in a row: what the next ring hands back is added, smoothed along the ring, and made ready for the
+  !> Do a stage of the transpose in a block: what the next ring hands back is added, smoothed along the ring, and made ready for the
   !> ring before.
-  pure subroutine fold_row(self, stage, row, field, value, before, own, first)
+  pure subroutine fold_block(self, stage, block, field, value, before, own, first)
     type(edge_extension_t), intent(in) :: self
-    !> Stage, from 0, and row
-    integer, intent(in) :: stage, row
+    !> Stage, from 0, and block
+    integer, intent(in) :: stage, block
     !> Field over the window; of the nodes of the rings, new values and those that the field has afterwards
     real(sp), intent(inout), contiguous :: field(:), value(:)
     real(sp), intent(inout), contiguous, optional :: before(:)
@@ -661,51 +648,60 @@ contains
 
     ring = self%n_ring - stage/(2*self%smoothings + 1)
     part = modulo(stage, 2*self%smoothings + 1)
-    do k = self%start(ring, row), self%start(ring + 1, row) - 1
-      associate (node => self%node(k))
-        if (part == 0) then
-          value(k) = field(node) + sum_over(self, field, node, self%outer(k))
-          if (ring == 0) then
-            field(node) = value(k)
-            cycle
-          end if
-          if (present(own)) then
-            before(k) = value(k)
-            value(k) = (1.0_sp - own(node))*value(k)
-          end if
-          if (ring == 1 .and. present(first)) value(k) = first*value(k)
-        else if (modulo(part, 2) == 1) then
-          value(k) = sum_over(self, field, node, self%beside(k))
-          cycle
+    associate (from => self%start(ring, block), to => self%start(ring + 1, block) - 1)
+      if (modulo(part, 2) == 1) then
+        call sum_over(self, from, to, self%beside, field, value)
+        return
+      end if
+      if (part == 0) then
+        call sum_over(self, from, to, self%outer, field, value)
+        do k = from, to
+          value(k) = field(self%node(k)) + value(k)
+        end do
+        if (ring > 0 .and. present(own)) then
+          before(from:to) = value(from:to)
+          value(from:to) = (1.0_sp - own(self%node(from:to)))*value(from:to)
         end if
-        if (part < 2*self%smoothings) then
-          field(node) = self%mean(self%beside(k))*value(k)
+        if (ring == 1 .and. present(first)) value(from:to) = first*value(from:to)
+      end if
+      do k = from, to
+        if (ring == 0) then
+          field(self%node(k)) = value(k)
+        else if (part < 2*self%smoothings) then
+          field(self%node(k)) = mean(self%beside(k))*value(k)
         else
-          field(node) = self%fall(self%inner(k), ring)*value(k)
+          field(self%node(k)) = self%fall(self%inner(k), ring)*value(k)
         end if
-      end associate
-    end do
-  end subroutine fold_row
+      end do
+    end associate
+  end subroutine fold_block
 
-  !> Sum a field over some neighbors of a node.
-  pure real(sp) function sum_over(self, field, node, neighbors) result(total)
+  !> Sum a field over some neighbors of each node.
+  pure subroutine sum_over(self, from, to, neighbors, field, total)
     type(edge_extension_t), intent(in) :: self
-    !> Field over the window
+    !> First and last node
+    integer, intent(in) :: from, to
+    !> Neighbours of each node, as bits
+    integer(int8), intent(in), contiguous :: neighbors(:)
+    !> Field over the window, and the sums
     real(sp), intent(in), contiguous :: field(:)
-    !> The node
-    integer, intent(in) :: node
-    !> Its neighbors, as bits
-    integer(int8), intent(in) :: neighbors
-    integer :: bits
+    real(sp), intent(inout), contiguous :: total(:)
+    real(sp) :: one
+    integer :: k, bits
 
-    bits = neighbors
-    total = self%taken(1, bits)*field(node + self%first(1, bits)) + self%taken(2, bits)*field(node + self%first(2, bits)) &
-            + self%taken(3, bits)*field(node + self%first(3, bits))
-    bits = self%others(bits)
-    do while (bits /= 0)
-      total = total + field(node + self%step(trailz(bits) + 1))
-      bits = iand(bits, bits - 1)
+    do k = from, to
+      bits = neighbors(k)
+      associate (node => self%node(k))
+        one = taken(bits, 1)*field(node + self%first(1, bits)) + taken(bits, 2)*field(node + self%first(2, bits)) &
+              + taken(bits, 3)*field(node + self%first(3, bits))
+        bits = others(bits)
+        do while (bits /= 0)
+          one = one + field(node + self%step(trailz(bits) + 1))
+          bits = iand(bits, bits - 1)
+        end do
+      end associate
+      total(k) = one
     end do
-  end function sum_over
+  end subroutine sum_over
 
 end module hc_edge_continuation

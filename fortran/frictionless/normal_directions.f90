@@ -20,14 +20,16 @@ contains
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        call residual_row(to - from + 1, 1.0_wp/now%w_unit, now%approach, level%initial_gap(from:to, row), now%w(from:to, row), &
-                          now%active(from:to, row), now%r(from:to, row, 1))
-      end associate
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          call residual_row(to - from + 1, 1.0_wp/now%w_unit, now%approach, level%initial_gap(from:to, row), now%w(from:to, row), &
+                            now%active(from:to, row), now%r(from:to, row, 1))
+        end associate
+      end do
     end do
     !$omp end parallel do
   end subroutine find_residual
@@ -41,7 +43,7 @@ contains
     real(wp), dimension(size(now%p, 2)) :: part, punch
     real(wp) :: mean, step_length
     real(sp) :: lack
-    integer :: row
+    integer :: row, k
 
     step_length = level%options%normal%step_length
     if (level%lattice%slenderness() > level%options%preconditioner%slender) step_length = level%options%normal%slender_step
@@ -49,9 +51,12 @@ contains
     if (now%by_load) then
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%p, 2)
-        associate (from => now%span(1, row), to => now%span(2, row))
-          call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), part(row))
-        end associate
+        part(row) = 0.0_wp
+        do k = 1, now%n_run(row)
+          associate (from => now%run(1, k, row), to => now%run(2, k, row))
+            call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), part(row))
+          end associate
+        end do
       end do
       !$omp end parallel do
       mean = level%space%total(part)/now%punch_sum
@@ -67,9 +72,11 @@ contains
     lack = real((now%pressures/now%p_unit - level%space%total(part))/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        now%d(from:to, row, 1) = now%d(from:to, row, 1) + lack*now%punch(from:to, row)
-      end associate
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          now%d(from:to, row, 1) = now%d(from:to, row, 1) + lack*now%punch(from:to, row)
+        end associate
+      end do
     end do
     !$omp end parallel do
   end subroutine projected_step
@@ -97,14 +104,18 @@ contains
     real(wp), dimension(size(now%p, 2)) :: sum_z, part, punch
     real(wp) :: mean, off, lack, uncut
     real(sp) :: back
-    integer :: row, try
+    integer :: row, k, try
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), &
-                     now%kd(from:to, row, 1), part(row))
-      end associate
+      sum_z(row) = 0.0_wp
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), &
+                       now%kd(from:to, row, 1), part(row))
+        end associate
+      end do
     end do
     !$omp end parallel do
     mean = 0.0_wp
@@ -113,14 +124,17 @@ contains
     if (curved > 0.0_wp) back = max(real(-level%space%total(part)/curved, sp), 0.0_sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        where (now%active(from:to, row))
-          now%z(from:to, row, 1) = now%z(from:to, row, 1) + back*now%d(from:to, row, 1)
-        else where
-          now%z(from:to, row, 1) = 0.0_sp
-        end where
-        part(row) = dot_single(to - from + 1, now%r(from:to, row, 1), now%z(from:to, row, 1))
-      end associate
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          where (now%active(from:to, row))
+            now%z(from:to, row, 1) = now%z(from:to, row, 1) + back*now%d(from:to, row, 1)
+          else where
+            now%z(from:to, row, 1) = 0.0_sp
+          end where
+          part(row) = part(row) + dot_single(to - from + 1, now%r(from:to, row, 1), now%z(from:to, row, 1))
+        end associate
+      end do
     end do
     !$omp end parallel do
     uncut = length*level%space%total(part)
@@ -144,22 +158,24 @@ contains
     real(wp), intent(in) :: length, off
     !> By rows: sums of p + d, and of the punch where it is positive
     real(wp), intent(out), contiguous :: part(:), punch(:)
-    integer :: row
+    integer :: row, k
 
-    punch = 0.0_wp
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      now%d(:, row, 1) = 0.0_sp
-      associate (from => now%span(1, row), to => now%span(2, row))
-        associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
-                   z => now%z(from:to, row, 1))
-          if (now%by_load) then
-            call projected_row(now%p_unit, p, active, d, part(row), [length, off], z, now%punch(from:to, row), punch(row))
-          else
-            call projected_row(now%p_unit, p, active, d, part(row), [length, 0.0_wp], z)
-          end if
+      part(row) = 0.0_wp
+      punch(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          associate (p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+                     z => now%z(from:to, row, 1))
+            if (now%by_load) then
+              call projected_row(now%p_unit, p, active, d, part(row), [length, off], z, now%punch(from:to, row), punch(row))
+            else
+              call projected_row(now%p_unit, p, active, d, part(row), [length, 0.0_wp], z)
+            end if
+          end associate
         end associate
-      end associate
+      end do
     end do
     !$omp end parallel do
   end subroutine cut
@@ -171,15 +187,18 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
     real(wp) :: part(size(now%p, 2))
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        ! the gap may be infinite where nothing can touch
-        part(row) = sum((now%approach - level%initial_gap(from:to, row) - now%w(from:to, row))*now%d(from:to, row, 1), &
-                        mask=abs(now%d(from:to, row, 1)) > 0.0_sp)
-      end associate
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          ! the gap may be infinite where nothing can touch
+          part(row) = part(row) + sum((now%approach - level%initial_gap(from:to, row) - now%w(from:to, row)) &
+                                      *now%d(from:to, row, 1), mask=abs(now%d(from:to, row, 1)) > 0.0_sp)
+        end associate
+      end do
     end do
     !$omp end parallel do
     steepness = level%space%total(part)/now%w_unit
@@ -197,13 +216,18 @@ contains
     real(wp) :: share
     real(sp) :: back, mean
     logical :: anew
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), now%r(from:to, row, 1), part(row))
-      end associate
+      sum_z(row) = 0.0_wp
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), &
+                       now%r(from:to, row, 1), part(row))
+        end associate
+      end do
     end do
     !$omp end parallel do
     call recurrence%last_share(level%space%total(part), share, anew)
@@ -212,11 +236,12 @@ contains
     if (now%by_load) mean = real(level%space%total(sum_z)/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      if (anew) now%d(:, row, 1) = 0.0_sp
-      associate (from => now%span(1, row), to => now%span(2, row))
-        call direction_row(to - from + 1, back, now%z(from:to, row, 1), now%active(from:to, row), now%d(from:to, row, 1))
-        if (now%by_load) now%d(from:to, row, 1) = now%d(from:to, row, 1) - mean*now%punch(from:to, row)
-      end associate
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          call direction_row(to - from + 1, back, now%z(from:to, row, 1), now%active(from:to, row), now%d(from:to, row, 1))
+          if (now%by_load) now%d(from:to, row, 1) = now%d(from:to, row, 1) - mean*now%punch(from:to, row)
+        end associate
+      end do
     end do
     !$omp end parallel do
   end subroutine next_direction
@@ -271,15 +296,18 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
     real(wp) :: part(size(now%p, 2))
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
-        if (allocated(now%compliance)) part(row) = part(row) + now%p_unit/now%w_unit &
-                                                   *sum(now%compliance(from:to, row)*real(now%d(from:to, row, 1), wp)**2)
-      end associate
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          part(row) = part(row) + sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
+          if (allocated(now%compliance)) part(row) = part(row) + now%p_unit/now%w_unit &
+                                                     *sum(now%compliance(from:to, row)*real(now%d(from:to, row, 1), wp)**2)
+        end associate
+      end do
     end do
     !$omp end parallel do
     curvature = level%space%total(part)
@@ -292,7 +320,7 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
     real(wp) :: part(size(now%p, 2)), steepness
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)

@@ -13,12 +13,14 @@ module hc_normal_iterate
   private
 
   public :: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, linearize_law, add_springs, &
-            find_punch_pressure, advance, missing_load, fit_load, remove_tension
+            find_punch_pressure, advance, missing_load, fit_load, pulls
 
   !> Steps of Newton's method for the size of a pressure of which only the shape is known, under a compliant law.
   integer, parameter :: start_steps = 8
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
+  !> Columns between two runs from which on passing over them pays.
+  integer, parameter :: worth_a_run = 16
 
   !> Present state of an iteration; fields are (n_col, n_row).
   !>
@@ -36,8 +38,8 @@ module hc_normal_iterate
     real(sp), allocatable :: punch(:, :)
     real(wp) :: punch_sum = 0.0_wp
     logical(lk), allocatable :: active(:, :)
-    !> Columns between which the active nodes of each row lie, now and before: no pressure outside
-    integer, allocatable :: span(:, :)
+    !> Runs of columns in which the active nodes of each row lie, now and before, and how many they are: no pressure outside
+    integer, allocatable :: run(:, :, :), n_run(:)
     real(wp) :: approach = 0.0_wp
     !> Unit of the pressure in single precision [Pa], and of the closing of the gap [m]
     real(wp) :: p_unit = 1.0_wp, w_unit = 1.0_wp
@@ -68,17 +70,21 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
-    integer :: row
+    integer :: row, k
 
     if (allocated(now%offset)) now%w = now%w - now%offset
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        overlap(row) = sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
-                           mask=now%active(from:to, row))
-        resistance(row) = dot_product(now%p(from:to, row), now%w(from:to, row))
-        if (allocated(now%offset)) overlap(row) = overlap(row) - dot_product(now%p(from:to, row), now%offset(from:to, row))
-      end associate
+      overlap(row) = 0.0_wp
+      resistance(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          overlap(row) = overlap(row) + sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
+                                            mask=now%active(from:to, row))
+          resistance(row) = resistance(row) + dot_product(now%p(from:to, row), now%w(from:to, row))
+          if (allocated(now%offset)) overlap(row) = overlap(row) - dot_product(now%p(from:to, row), now%offset(from:to, row))
+        end associate
+      end do
     end do
     !$omp end parallel do
     factor = level%space%total(overlap)/level%space%total(resistance)
@@ -99,32 +105,32 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: weight(size(now%p, 2)), moment(size(now%p, 2)), w, l, u
-    integer :: col, row
+    integer :: col, row, k
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, w, l, u)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(w, l, u)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        w = 0.0_wp
-        l = 0.0_wp
+      w = 0.0_wp
+      l = 0.0_wp
+      do k = 1, now%n_run(row)
         ! the gap may be infinite where nothing can touch
         if (allocated(now%punch)) then
           !$omp simd private(u) reduction(+: w, l)
-          do col = from, to
+          do col = now%run(1, k, row), now%run(2, k, row)
             u = now%punch(col, row)
             w = w + u
             l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         else
           !$omp simd private(u) reduction(+: w, l)
-          do col = from, to
+          do col = now%run(1, k, row), now%run(2, k, row)
             u = now%p(col, row)
             w = w + u
             l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         end if
-        weight(row) = w
-        moment(row) = l
-      end associate
+      end do
+      weight(row) = w
+      moment(row) = l
     end do
     !$omp end parallel do
     now%approach = level%space%total(moment)/level%space%total(weight)
@@ -272,44 +278,94 @@ contains
     logical(lk), allocatable, intent(inout) :: next(:, :)
     logical(lk), allocatable :: swap(:, :)
     logical(lk), pointer, contiguous :: active(:)
-    integer :: row
+    real(wp) :: part(size(now%p, 2))
+    integer :: known(size(now%p, 2)), n(1), row, k
 
     call move_alloc(now%active, swap)
     call move_alloc(next, now%active)
     call move_alloc(swap, next)
     now%n_active = now%n_next
-    call find_span(now, level%space)
+    call find_runs(now, level%space)
     active(1:size(now%active)) => now%active
     if (.not. allocated(now%compliance)) call level%preconditioner%set_active(active)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp
-      if (.not. allocated(now%punch)) cycle
-      where (.not. now%active(:, row)) now%punch(:, row) = 0.0_sp
     end do
     !$omp end parallel do
     if (.not. allocated(now%punch)) return
-    now%punch_sum = level%space%sum(now%punch)
-    ! nodes that came back are not in it
-    if (2*level%space%count(logical(now%punch > 0.0_sp, lk)) < now%n_active) deallocate (now%punch)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      part(row) = 0.0_wp
+      known(row) = 0
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          where (.not. now%active(from:to, row)) now%punch(from:to, row) = 0.0_sp
+          part(row) = part(row) + sum(real(now%punch(from:to, row), wp))
+          known(row) = known(row) + count(now%punch(from:to, row) > 0.0_sp)
+        end associate
+      end do
+    end do
+    !$omp end parallel do
+    now%punch_sum = level%space%total(part)
+    n = sum(known)
+    call level%space%ranks%add_counts(n)
+    if (2*n(1) < now%n_active) deallocate (now%punch)                          ! nodes that came back are not in it
   end subroutine set_active
 
-  !> Find the columns between which the active nodes of each row lie, those of earlier sets included.
-  subroutine find_span(now, space)
+  !> Find the runs of columns that the active nodes of each row lie in, those of earlier sets included.
+  subroutine find_runs(now, space)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    integer :: row
+    logical(lk) :: known(size(now%active, 1))
+    integer :: row, k
 
-    !$omp parallel do schedule(static) num_threads(space%threads)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(known)
     do row = 1, size(now%active, 2)
-      if (.not. any(now%active(:, row))) cycle
-      now%span(1, row) = min(now%span(1, row), findloc(now%active(:, row), .true., dim=1))
-      now%span(2, row) = max(now%span(2, row), findloc(now%active(:, row), .true., dim=1, back=.true.))
+      known = now%active(:, row)
+      do k = 1, now%n_run(row)
+        known(now%run(1, k, row):now%run(2, k, row)) = .true.
+      end do
+      call list_runs(known, now%run(:, :, row), now%n_run(row))
     end do
     !$omp end parallel do
-  end subroutine find_span
+  end subroutine find_runs
+
+  !> List the runs of some columns; runs close to each other are one.
+  pure subroutine list_runs(known, run, n_run)
+    !> The columns
+    logical(lk), intent(in), contiguous :: known(:)
+    !> First and last column of each run, and their number
+    integer, intent(inout), contiguous :: run(:, :)
+    integer, intent(out) :: n_run
+    integer :: from, to, col, n
+
+    n_run = 0
+    do from = 1, size(known), worth_a_run
+      to = min(from + worth_a_run - 1, size(known))
+      n = count(known(from:to))
+      if (n == 0) cycle
+      do col = from, to
+        if (n == to - from + 1 .and. n_run > 0) then
+          if (run(2, n_run) == from - 1) then
+            run(2, n_run) = to
+            exit
+          end if
+        end if
+        if (.not. known(col)) cycle
+        if (n_run == 0) then
+          n_run = 1
+          run(1, 1) = col
+        else if (col - run(2, n_run) > worth_a_run) then
+          n_run = n_run + 1
+          run(1, n_run) = col
+        end if
+        run(2, n_run) = col
+      end do
+    end do
+  end subroutine list_runs
 
   !> Estimate the pressure of a rigid punch over the active nodes, nowhere negative.
   subroutine find_punch_pressure(level, now)
@@ -349,24 +405,27 @@ contains
     logical, intent(in) :: follows
     real(wp) :: step, closing, moment(size(now%p, 2)), change(1)
     real(sp) :: largest
-    integer :: row
+    integer :: row, k
 
     step = share*now%p_unit
     closing = share*now%w_unit
     largest = 0.0_sp
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        if (follows) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
-        ! springs may be many times softer than the bodies: theirs is computed in double precision
-        if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
-                                                             - now%compliance(from:to, row)*now%p(from:to, row)
-        call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
-        ! nodes that left the set carry no pressure after a whole step, not even a residue in single precision
-        if (share >= 1.0_wp) where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
-        if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
-                                                             + now%compliance(from:to, row)*now%p(from:to, row)
-      end associate
+      moment(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          if (follows) moment(row) = moment(row) + dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
+          ! springs may be many times softer than the bodies: theirs is computed in double precision
+          if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
+                                                               - now%compliance(from:to, row)*now%p(from:to, row)
+          call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
+          ! nodes that left the set carry no pressure after a whole step, not even a residue in single precision
+          if (share >= 1.0_wp) where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
+          if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
+                                                               + now%compliance(from:to, row)*now%p(from:to, row)
+        end associate
+      end do
       call add_row(size(now%p, 1), closing, now%kd(:, row, 1), now%w(:, row))
       largest = max(largest, largest_of(size(now%p, 1), now%kd(:, row, 1)))
     end do
@@ -377,28 +436,25 @@ contains
     if (follows) now%approach = now%approach + closing*level%space%total(moment)/now%punch_sum
   end subroutine advance
 
-  !> Set tension to zero: it is within the tolerance.
-  subroutine remove_tension(level, now, pulls)
+  !> Is there tension?
+  logical function pulls(level, now)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
-    type(normal_iterate_t), intent(inout) :: now
-    !> There was some
-    logical, intent(out) :: pulls
-    integer :: row, n(1)
+    type(normal_iterate_t), intent(in) :: now
+    integer :: row, k, n(1)
 
     n = 0
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(+: n)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        n = n + count(now%p(from:to, row) < 0.0_wp)
-        now%p(from:to, row) = max(now%p(from:to, row), 0.0_wp)
-      end associate
+      do k = 1, now%n_run(row)
+        n = n + count(now%p(now%run(1, k, row):now%run(2, k, row), row) < 0.0_wp)
+      end do
     end do
     !$omp end parallel do
     call level%space%ranks%add_counts(n)
     pulls = n(1) > 0
-  end subroutine remove_tension
+  end function pulls
 
   !> Compute the difference between the prescribed load and the sum of the pressures, which is rounding error.
   real(wp) function missing_load(level, now)
@@ -442,14 +498,14 @@ contains
 
     n = level%own_extent()
     if (allocated(now%active)) then
-      if (any(shape(now%active) /= n)) deallocate (now%d, now%active, now%span)
+      if (any(shape(now%active) /= n)) deallocate (now%d, now%active, now%run, now%n_run)
     end if
     if (allocated(now%punch)) deallocate (now%punch)
     if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
     if (allocated(now%w)) deallocate (now%w)                                   ! of a solution that failed
     stat = 0
     if (.not. allocated(now%active)) then
-      allocate (now%d(n(1), n(2), 1), now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+      allocate (now%d(n(1), n(2), 1), now%active(n(1), n(2)), now%run(2, n(1)/worth_a_run + 1, n(2)), now%n_run(n(2)), stat=stat)
     end if
     call level%take_fields(now%r, now%z, now%kd)
     if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
@@ -479,9 +535,8 @@ contains
     now%closing_error = 0.0_wp
     scale = 1.0_wp
     if (now%by_load) scale = now%target/(level%lattice%cell_area()*level%space%sum(now%p))
-    now%span(1, :) = n(1) + 1
-    now%span(2, :) = 0
-    call find_span(now, level%space)
+    now%n_run = 0
+    call find_runs(now, level%space)
     now%p_unit = scale*largest
     now%w_unit = now%p_unit*level%preconditioner%unit
     !$omp parallel do schedule(static) num_threads(level%space%threads)

@@ -29,7 +29,7 @@ module hc_normal_lattice_solver
     no_progress
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t, set_start, rescale, find_approach, classify, set_active, &
-    linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
+    linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, pulls
   use hc_normal_directions, only: find_residual, projected_step, searched_step, next_direction, next_sprung_direction, &
     curvature, find_sprung_step
   implicit none
@@ -80,7 +80,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    logical :: pulls, everywhere
+    logical :: everywhere
     integer :: row, stat
 
     level%flexibility%applications = 0.0_wp
@@ -108,8 +108,15 @@ contains
       call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return
       state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
-      call remove_tension(level, now, pulls)
-      if (pulls .and. level%exact) call find_closing(level, now, error)
+      if (pulls(level, now)) then
+        ! it is within the tolerance
+        !$omp parallel do schedule(static) num_threads(level%space%threads)
+        do row = 1, size(now%p, 2)
+          now%p(:, row) = max(now%p(:, row), 0.0_wp)
+        end do
+        !$omp end parallel do
+        if (level%exact) call find_closing(level, now, error)
+      end if
       if (allocated(error)) return
       call add_springs(level, now, -1)
       !$omp parallel do schedule(static) num_threads(level%space%threads)
@@ -265,7 +272,7 @@ contains
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
       ! without tension, or after it was taken away
-      found = level%space%count(logical(now%p < 0.0_wp, lk)) == 0
+      found = .not. pulls(level, now)
       if (found .or. progress%step == searched .or. progress%emptied) then
         call search_step(level, now, progress, found)
       end if
@@ -319,14 +326,17 @@ contains
     !> Rounding errors of single precision
     real(wp), parameter :: rounding = 1.0e-6_wp
     real(wp) :: fall(1), part(size(now%p, 2))
-    integer :: row
+    integer :: row, k
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        part(row) = maxval(-now%p_unit*now%d(from:to, row, 1)/max(now%p(from:to, row), tiny(1.0_wp)), &
-                           mask=now%d(from:to, row, 1) < 0.0_sp)
-      end associate
+      part(row) = 0.0_wp
+      do k = 1, now%n_run(row)
+        associate (from => now%run(1, k, row), to => now%run(2, k, row))
+          part(row) = max(part(row), maxval(-now%p_unit*now%d(from:to, row, 1)/max(now%p(from:to, row), tiny(1.0_wp)), &
+                                            mask=now%d(from:to, row, 1) < 0.0_sp))
+        end associate
+      end do
     end do
     !$omp end parallel do
     fall = max(maxval(part), epsilon(1.0_wp))

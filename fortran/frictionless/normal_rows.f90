@@ -98,17 +98,17 @@ contains
     end do
   end subroutine residual_row
 
-  !> Sum a field over the active nodes of a row, and its product with another one.
+  !> Add up a field over the active nodes of a row, and its product with another one.
   pure subroutine sum_row(n, field, active, total, other, product)
     !> Number of nodes
     integer, intent(in) :: n
     real(sp), intent(in) :: field(n)
     logical(lk), intent(in) :: active(n)
     !> The sum
-    real(wp), intent(out) :: total
+    real(wp), intent(inout) :: total
     real(sp), intent(in), optional :: other(n)
     !> Sum of the products
-    real(wp), intent(out), optional :: product
+    real(wp), intent(inout), optional :: product
     real(sp) :: part(n), value
     integer :: col
 
@@ -116,12 +116,11 @@ contains
       value = field(col)
       part(col) = merge(value, 0.0_sp, active(col))
     end do
-    total = 0.0_wp
     !$omp simd reduction(+: total)
     do col = 1, n
       total = total + part(col)
     end do
-    if (present(other)) product = dot_single(n, other, part)
+    if (present(other)) product = product + dot_single(n, other, part)
   end subroutine sum_row
 
   !> Compute d = max(p + length z - off punch, 0) - p at the active nodes of a row, -p at the others.
@@ -132,16 +131,16 @@ contains
     logical(lk), intent(in), contiguous :: active(:)
     !> The direction
     real(sp), intent(out), contiguous :: d(:)
-    !> Sum of p + d
-    real(wp), intent(out) :: total
+    !> Sum of p + d, to which those of the row are added
+    real(wp), intent(inout) :: total
     !> Length of the step, and share of the pressure of a punch that is taken off
     real(wp), intent(in) :: step(2)
     !> The direction
     real(sp), intent(in), contiguous :: z(:)
     !> The pressure of a punch; absent: none is taken off
     real(sp), intent(in), optional, contiguous :: punch(:)
-    !> Sum of the punch where p + d is positive
-    real(wp), intent(out), optional :: punch_total
+    !> Sum of the punch where p + d is positive, likewise
+    real(wp), intent(inout), optional :: punch_total
     real(wp), dimension(size(d)) :: before, aim
     integer :: carries(size(d)), col
 
@@ -151,7 +150,6 @@ contains
     before = pressure/unit
     aim = before + step(1)*z
     if (present(punch)) aim = aim - step(2)*punch
-    total = 0.0_wp
     !$omp simd reduction(+: total)
     do col = 1, size(d)
       aim(col) = carries(col)*max(aim(col), 0.0_wp)
@@ -159,7 +157,6 @@ contains
       d(col) = real(aim(col) - before(col), sp)
     end do
     if (.not. present(punch_total)) return
-    punch_total = 0.0_wp
     !$omp simd reduction(+: punch_total)
     do col = 1, size(d)
       punch_total = punch_total + merge(real(punch(col), wp), 0.0_wp, aim(col) > 0.0_wp)

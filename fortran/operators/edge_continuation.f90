@@ -13,6 +13,7 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
 module hc_edge_continuation
+  use, intrinsic :: iso_fortran_env, only: int8, int16
   use hc_precision, only: wp, sp, lk
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbor_steps
@@ -24,22 +25,39 @@ module hc_edge_continuation
 
   public :: edge_extension_t, new_edge_extension
 
-  !> Marks of nodes without a ring, and of the surroundings of the window.
-  integer, parameter :: free = huge(0), outside = huge(0) - 1
+  !> Marks of active nodes inside the contact, of nodes without a ring, and of the surroundings of the window.
+  integer(int16), parameter :: inside = -1_int16, free = huge(0_int16), outside = huge(0_int16) - 1_int16
+  !> Nodes that are passed over at once.
+  integer, parameter :: stride = 32
+  !> Nodes of a ring in rows that are passed over together.
+  integer, parameter :: worth_a_block = 64
   !> Nodes in the rings from which on threads share the work.
   integer, parameter :: worth_sharing = 8192
 
-  !> Neighbours of the nodes of the rings.
+  !> Steps to some of the neighbors as bits: their number, one over it, and the bits without the one, two and three lowest.
+  integer :: bit
+  integer, parameter :: bits_of(0:127) = [(bit, bit=0, 127)], n_bits(0:127) = popcnt(bits_of)
+  real(sp), parameter :: mean(0:127) = 1.0_sp/max(n_bits, 1)
+  integer, parameter, dimension(0:127) :: but_one = iand(bits_of, bits_of - 1), but_two = iand(but_one, but_one - 1), &
+                                          others = iand(but_two, but_two - 1)
+  !> The three lowest as numbers of steps, and 1 where there are as many, else 0: sums without branches for most nodes.
+  integer, parameter :: lowest(0:127, 3) = reshape([trailz(bits_of) + 1, trailz(but_one) + 1, trailz(but_two) + 1], [128, 3])
+  real(sp), parameter :: taken(0:127, 3) = reshape([min(n_bits, 1), min(n_bits/2, 1), min(n_bits/3, 1)], [128, 3])
+
+  !> Nodes of the rings and their neighbors; the active nodes at the edge are ring 0.
   type :: edge_extension_t
     private
-    !> Nodes of the rings, ring by ring, and where each ring begins
-    integer, allocatable :: node(:), ring(:)
-    !> Neighbours in the ring before, as nodes (6, n), and how many they are
-    integer, allocatable :: inner(:, :), n_inner(:)
-    !> Neighbours in the same ring and the node itself, as places in the list (7, n), and how many they are
-    integer, allocatable :: beside(:, :), n_beside(:)
-    !> Fall from ring to ring over the number of neighbors in the ring before; 1 over the number of those in the same ring
-    real(sp), allocatable :: fall(:), mean(:)
+    !> Number of rings
+    integer :: n_ring = 0
+    !> Nodes, in blocks of rows and in each by rings, and where each ring begins (0:n_ring + 1, block)
+    integer, allocatable :: node(:), start(:, :)
+    !> Steps from a node to itself and to its neighbors
+    integer, allocatable :: step(:)
+    !> Of each node, a bit for each step: those to the ring before, those in the same ring, and those to the next one
+    integer(int8), allocatable :: inner(:), beside(:), outer(:)
+    !> By these bits: fall from ring to ring over the number of steps (bits, ring), and the first steps
+    real(sp), allocatable :: fall(:, :)
+    integer :: first(3, 0:127) = 0
     !> Times that a ring is smoothed
     integer :: smoothings = 0
     !> Space of the rings
@@ -56,7 +74,7 @@ module hc_edge_continuation
     procedure :: extend
     !> The transpose: add loads on the rings to the active nodes
     procedure :: fold
-    procedure, private :: extend_rings, fold_rings
+    procedure, private :: pass_rings
   end type edge_extension_t
 
 contains
@@ -78,11 +96,16 @@ contains
     !> Rings by the width of the contact, in nodes, on one rank; absent: those of `options`
     real(wp), intent(in), optional :: by_width
     logical(lk), pointer, contiguous :: around(:, :), until(:, :)
-    integer, allocatable :: mark(:), frontier(:), step(:)
-    integer :: n_ring
+    integer(int16), allocatable :: mark(:)
+    integer, allocatable :: list(:), step(:)
+    integer :: n_ring, n_edge
 
-    step = neighbor_steps(size(active, 1) + 2)
-    if (present(near)) step = pack(step, near)
+    self%step = [0, neighbor_steps(size(active, 1))]
+    step = neighbor_steps(size(active, 1) + 2)                                 ! among marks, with a column more on each side
+    if (present(near)) then
+      self%step = pack(self%step, [.true., near])
+      step = pack(step, near)
+    end if
     if (space%ranks%size > 1) then
       call share_rings(self, active, space, options, step, within)
     else
@@ -96,10 +119,10 @@ contains
       until => null()                                                          ! the same as absent
       if (present(within)) until => within(:, self%rows(1):self%rows(2))
       call mark_window(around, space, mark, until)
-      call find_edge(around, mark, step, space, frontier)
-      n_ring = number_of_rings(options, space%count(active), size(frontier))
-      if (present(by_width)) n_ring = int(by_width*space%count(active)/max(size(frontier), 1))
-      call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
+      call find_edge(size(active, 1), mark, step, list, n_edge)
+      n_ring = number_of_rings(options, space%count(active), n_edge)
+      if (present(by_width)) n_ring = int(by_width*space%count(active)/max(n_edge, 1))
+      call find_rings(self, size(active, 1), n_ring, step, list, n_edge, mark, space, options)
     end if
   end subroutine new_edge_extension
 
@@ -134,9 +157,9 @@ contains
 
     allocate (field(size(active)))
     field = reshape(merge(1.0_sp, 0.0_sp, active), [size(active)])
-    call self%extend_rings(field)
+    call self%pass_rings(.false., field)
     allocate (self%lines)
-    call new_line_means(self%lines, active, reshape(field, shape(active)), across, (size(self%ring) - 1)/2, real(share, sp), &
+    call new_line_means(self%lines, active, reshape(field, shape(active)), across, self%n_ring/2, real(share, sp), &
                         self%fields%threads)
   end subroutine set_floor
 
@@ -153,8 +176,9 @@ contains
     !> Nodes beyond which there are no rings (n_col, own rows); absent: all of the window
     logical(lk), intent(in), contiguous, optional :: within(:, :)
     logical(lk), allocatable :: wider(:, :), around(:, :)
-    integer, allocatable :: mark(:), frontier(:)
-    integer :: counts(3), n_ring
+    integer(int16), allocatable :: mark(:)
+    integer, allocatable :: list(:)
+    integer :: counts(3), n_ring, n_edge
 
     self%fields = space
     self%own = 0
@@ -165,15 +189,15 @@ contains
     call take_rows(self, active, 1, wider)
     if (present(within)) call take_rows(self, within, 1, around)
     call mark_window(wider, space, mark, around)
-    call find_edge(wider, mark, step, space, frontier)
-    counts = [count(active), count(is_own(self, size(active, 1), frontier)), 0]
+    call find_edge(size(active, 1), mark, step, list, n_edge)
+    counts = [count(active), count(is_own(self, size(active, 1), list(:n_edge))), 0]
     call space%ranks%add_counts(counts)
     n_ring = number_of_rings(options, counts(1), counts(2))
     call take_rows(self, active, n_ring*(options%smoothings + 2) + 1, wider)
     if (present(within)) call take_rows(self, within, n_ring*(options%smoothings + 2) + 1, around)
     call mark_window(wider, space, mark, around)
-    call find_edge(wider, mark, step, space, frontier)
-    call find_rings(self, size(active, 1), n_ring, step, frontier, mark, space, options)
+    call find_edge(size(active, 1), mark, step, list, n_edge)
+    call find_rings(self, size(active, 1), n_ring, step, list, n_edge, mark, space, options)
   end subroutine share_rings
 
   !> Take own rows and some more on each side, as far as the window goes.
@@ -202,78 +226,129 @@ contains
   end function is_own
 
   !> Grow the rings from the nodes at the edge.
-  subroutine find_rings(self, n_col, most_rings, step, frontier, mark, space, options)
+  subroutine find_rings(self, n_col, most_rings, step, list, n_edge, mark, space, options)
     type(edge_extension_t), intent(inout) :: self
     !> Number of columns, and of rings, unless they fill the window before
     integer, intent(in) :: n_col, most_rings
-    !> Steps to the neighbors of a node
+    !> Steps to the neighbors of a node among the marks
     integer, intent(in), contiguous :: step(:)
-    !> Nodes at the edge
-    integer, allocatable, intent(inout) :: frontier(:)
-    !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
-    !> those of the rings, `free` elsewhere and `outside` around
-    integer, intent(inout), contiguous :: mark(:)
+    !> Nodes at the edge, to which those of the rings are added, as places in the marks, and the number of those at the edge
+    integer, intent(inout) :: list(:)
+    integer, intent(in) :: n_edge
+    !> Marks of the nodes, one column and row around the window included: `inside` or 0 on active nodes, the ring on those of
+    !> the rings, `free` elsewhere and `outside` around
+    integer(int16), intent(inout), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
-    integer, allocatable :: next(:), node(:)
-    integer :: n_ring, width, before, r, n, k
-    real(wp) :: fall, found(1)
+    integer, allocatable :: first(:)
+    integer :: r, n
+    real(wp) :: found(1), by_number(0:7)
+    real(wp), parameter :: number(0:7) = [(real(max(r, 1), wp), r=0, 7)]
+
+    n = n_edge
+    first = [1, n + 1]
+    found = 0.0_wp
+    do r = 1, most_rings
+      call add_ring(list, first(r), first(r + 1) - 1, step, int(r, int16), mark, n)
+      if (space%ranks%size == 1) then
+        if (n < first(r + 1)) exit
+        found = r
+      else if (any(is_own(self, n_col, list(first(r + 1):n)))) then
+        found = r
+      end if
+      first = [first, n + 1]
+    end do
+    call space%most(found)
+    self%n_ring = nint(found(1))
+    self%smoothings = options%smoothings
+    allocate (self%fall(0:127, self%n_ring))
+    do r = 1, self%n_ring
+      by_number = profile(r, self%n_ring)/profile(r - 1, self%n_ring)/number
+      self%fall(:, r) = real(by_number(n_bits), sp)
+    end do
+    do r = 1, size(lowest, 2)
+      self%first(r, :) = self%step(merge(min(lowest(:, r), size(self%step)), 1, n_bits >= r))
+    end do
+    call list_rings(self, n_col, list, first, step, mark, space)
+  end subroutine find_rings
+
+  !> List the nodes of the rings by blocks of rows, with their neighbors.
+  subroutine list_rings(self, n_col, list, first, step, mark, space)
+    type(edge_extension_t), intent(inout) :: self
+    !> Number of columns
+    integer, intent(in) :: n_col
+    !> Nodes as places in the marks, ring by ring, and where each ring begins
+    integer, intent(in) :: list(:), first(0:)
+    !> Steps to the neighbors of a node among the marks, and marks of the nodes
+    integer, intent(in), contiguous :: step(:)
+    integer(int16), intent(in), contiguous :: mark(:)
+    type(field_space_t), intent(in) :: space
+    integer, allocatable :: before(:, :)
+    integer :: width, n_row, height, shift, b, r, k, n
 
     width = n_col + 2
-    found = 0.0_wp
-    allocate (node(0), self%ring(1))
-    self%ring(1) = 1
-    do r = 1, most_rings
-      call next_ring(frontier, step, mark, size(node), next)
-      if (space%ranks%size > 1) then
-        if (any(is_own(self, n_col, next))) found = r
-      else if (size(next) == 0) then
-        exit
-      end if
-      node = [node, next]
-      self%ring = [self%ring, size(node) + 1]
-      call move_alloc(next, frontier)
-    end do
-
-    if (space%ranks%size > 1) then
-      call space%most(found)
-      self%ring = self%ring(:nint(found(1)) + 1)
-      node = node(:self%ring(size(self%ring)) - 1)
-    end if
-    n = size(node)
-    n_ring = size(self%ring) - 1
-    before = merge(self%rows(1) - 1, 0, space%ranks%size == 1)
-    self%smoothings = options%smoothings
+    n_row = size(mark)/width - 2
+    n = first(self%n_ring + 1) - 1
+    height = int(max(min(worth_a_block*(self%n_ring + 1)*real(n_row)/max(n, 1), real(n_row)), 1.0))
     if (n >= worth_sharing) self%space = space
-    allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%mean(n), self%inner(6, n), &
-              self%beside(7, n))
-    !$omp parallel num_threads(self%space%threads) private(r, k, fall)
-    do r = 1, n_ring
-      fall = profile(r, n_ring)/profile(r - 1, n_ring)
-      !$omp do schedule(static)
-      do k = self%ring(r), self%ring(r + 1) - 1
-        call list_neighbors(node(k), step, mark, self%ring(r:r + 1), self%inner(:, k), self%beside(:, k), &
-                            self%n_inner(k), self%n_beside(k))
-        self%node(k) = in_window(node(k))
-        self%inner(:self%n_inner(k), k) = in_window(self%inner(:self%n_inner(k), k))
-        self%mean(k) = 1.0_sp/self%n_beside(k)
-        self%fall(k) = real(fall/self%n_inner(k), sp)
+    allocate (before(0:self%n_ring, (n_row + height - 1)/height), source=0)
+    allocate (self%start(0:self%n_ring + 1, size(before, 2)))
+    do r = 0, self%n_ring
+      do k = first(r), first(r + 1) - 1
+        b = ((list(k) - 1)/width - 1)/height + 1
+        before(r, b) = before(r, b) + 1
       end do
-      !$omp end do nowait
     end do
-    !$omp end parallel
+    k = 1
+    do b = 1, size(before, 2)
+      do r = 0, self%n_ring
+        self%start(r, b) = k
+        k = k + before(r, b)
+        before(r, b) = self%start(r, b) - 1
+      end do
+      self%start(self%n_ring + 1, b) = k
+    end do
+    allocate (self%node(n), self%inner(n), self%beside(n), self%outer(n))
+    do r = 0, self%n_ring
+      do k = first(r), first(r + 1) - 1
+        b = ((list(k) - 1)/width - 1)/height + 1
+        before(r, b) = before(r, b) + 1
+        self%node(before(r, b)) = list(k)
+      end do
+    end do
+    ! from places in the marks to nodes of the window
+    shift = merge(self%rows(1) - 2, -1, space%ranks%size == 1)*n_col - 1
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(b)
+    do k = 1, n
+      call find_neighbors(self, k, step, mark)
+      b = (self%node(k) - 1)/width
+      self%node(k) = self%node(k) - b*width + b*n_col + shift
+    end do
+    !$omp end parallel do
+  end subroutine list_rings
 
-  contains
+  !> Find the neighbors of a node in the ring before, in its own, and in the next one.
+  pure subroutine find_neighbors(self, n, step, mark)
+    type(edge_extension_t), intent(inout) :: self
+    !> The node in the list, there as a place in the marks
+    integer, intent(in) :: n
+    !> Steps to the neighbors of a node among the marks, and marks of the nodes
+    integer, intent(in), contiguous :: step(:)
+    integer(int16), intent(in), contiguous :: mark(:)
+    integer :: found(-2:2), other, k
 
-    !> Return the place in the window of a place in the marks.
-    elemental integer function in_window(place)
-      integer, intent(in) :: place
-      integer :: row
-      row = (place - 1)/width
-      in_window = place - 1 - row*width + (row - 1 + before)*n_col
-    end function in_window
-
-  end subroutine find_rings
+    found = 0
+    associate (place => self%node(n))
+      do k = 1, size(step)
+        other = max(min(int(mark(place + step(k))) - mark(place), 2), -2)
+        found(other) = ior(found(other), ishft(1, k))
+      end do
+      if (mark(place) == self%n_ring) found(1) = 0
+    end associate
+    self%inner(n) = int(found(-1), int8)
+    self%beside(n) = int(ior(found(0), 1), int8)
+    self%outer(n) = int(found(1), int8)
+  end subroutine find_neighbors
 
   !> Mark all nodes before there are rings.
   subroutine mark_window(active, space, mark, within)
@@ -282,7 +357,7 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Marks of the nodes, with those around the window
-    integer, allocatable, intent(out) :: mark(:)
+    integer(int16), allocatable, intent(out) :: mark(:)
     !> Nodes that are not outside (n_col, n_row); absent: all of the window
     logical(lk), intent(in), optional :: within(:, :)
     integer :: row, width, start
@@ -295,7 +370,7 @@ contains
     do row = 1, size(active, 2)
       start = row*width + 1
       mark(start) = outside
-      mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
+      mark(start + 1:start + width - 2) = merge(inside, free, active(:, row))
       if (present(within)) then
         where (.not. (active(:, row) .or. within(:, row))) mark(start + 1:start + width - 2) = outside
       end if
@@ -311,130 +386,68 @@ contains
     profile = 1.0_wp - sqrt(real(ring, wp)/(n_ring + 1))
   end function profile
 
-  !> Find the active nodes with a neighbor that is not; a node at the rim of the window has none there.
-  subroutine find_edge(active, mark, step, space, edge)
-    !> Active nodes (n_col, n_row)
-    logical(lk), intent(in), contiguous :: active(:, :)
+  !> Mark the active nodes with a neighbor that is not; a node at the rim of the window has none there.
+  pure subroutine find_edge(n_col, mark, step, edge, n)
+    !> Number of columns
+    integer, intent(in) :: n_col
     !> Marks of all nodes, and steps to the neighbors of a node
-    integer, intent(in), contiguous :: mark(:)
+    integer(int16), intent(inout), contiguous :: mark(:)
     integer, intent(in) :: step(:)
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    !> The nodes, as places in the marks
+    !> The nodes, as places in the marks, in room for as many as there are marks: what is not used takes no memory
     integer, allocatable, intent(out) :: edge(:)
-    type :: places_t
-      integer, allocatable :: node(:)
-    end type places_t
-    type(places_t) :: edge_of(size(active, 2))
-    integer :: row, n
+    !> Their number
+    integer, intent(out) :: n
+    integer :: row, first, last, n_free, place, i
 
+    allocate (edge(size(mark)))
     n = 0
-    !$omp parallel do schedule(static) num_threads(space%threads) reduction(+: n)
-    do row = 1, size(active, 2)
-      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, edge_of(row)%node)
-      n = n + size(edge_of(row)%node)
-    end do
-    !$omp end parallel do
-    allocate (edge(n))
-    n = 0
-    do row = 1, size(active, 2)
-      associate (node => edge_of(row)%node)
-        edge(n + 1:n + size(node)) = node
-        n = n + size(node)
-      end associate
+    do row = 1, size(mark)/(n_col + 2) - 2
+      do first = row*(n_col + 2) + 2, (row + 1)*(n_col + 2) - 1, stride
+        last = min(first + stride - 1, (row + 1)*(n_col + 2) - 1)
+        if (count(mark(first:last) == inside) == 0) cycle
+        n_free = 0
+        do i = -1, 1
+          n_free = n_free + count(mark(first - 1 + i*(n_col + 2):last + 1 + i*(n_col + 2)) == free)
+        end do
+        if (n_free == 0) cycle
+        do place = first, last
+          if (mark(place) /= inside) cycle
+          do i = 1, size(step)
+            if (mark(place + step(i)) /= free) cycle
+            mark(place) = 0
+            n = n + 1
+            edge(n) = place
+            exit
+          end do
+        end do
+      end do
     end do
   end subroutine find_edge
 
-  !> List the nodes of a row at the edge.
-  pure subroutine list_edge(active, mark, step, before, node)
-    !> Active nodes of the row
-    logical(lk), intent(in), contiguous :: active(:)
-    !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
-    integer, intent(in), contiguous :: mark(:)
-    integer, intent(in) :: step(:), before
-    !> The nodes
-    integer, allocatable, intent(out) :: node(:)
-    integer :: is_edge(size(active)), col, k, low, high, found
+  !> Add the nodes next to a ring that have no ring yet to the list.
+  pure subroutine add_ring(list, from, to, step, ring, mark, n)
+    !> Nodes of the rings, as places in the marks
+    integer, intent(inout) :: list(:)
+    !> First and last node of the ring before, and steps to the neighbors of a node
+    integer, intent(in) :: from, to, step(:)
+    !> Number of the new ring
+    integer(int16), intent(in) :: ring
+    !> Marks of all nodes
+    integer(int16), intent(inout) :: mark(:)
+    !> Nodes in the list
+    integer, intent(inout) :: n
+    integer :: i, k, near
 
-    call find_span(active, low, high)
-    do col = low, high
-      is_edge(col) = 0
-    end do
-    do k = 1, size(step)
-      do col = low, high
-        is_edge(col) = merge(1, is_edge(col), mark(before + col + step(k)) == free)
-      end do
-    end do
-    found = 0
-    do col = low, high
-      is_edge(col) = merge(is_edge(col), 0, active(col))
-      found = found + is_edge(col)
-    end do
-    allocate (node(found))
-    found = 0
-    do col = low, high
-      if (is_edge(col) == 0) cycle
-      found = found + 1
-      node(found) = before + col
-    end do
-  end subroutine list_edge
-
-  !> Find the nodes next to a ring that have no ring yet.
-  pure subroutine next_ring(ring, step, mark, listed, next)
-    !> Nodes of the ring before, and steps to the neighbors of a node
-    integer, intent(in) :: ring(:), step(:)
-    !> Marks of all nodes; those of the new ring get their place in the list
-    integer, intent(inout) :: mark(:)
-    !> Nodes that are in the list already
-    integer, intent(in) :: listed
-    !> Nodes of the new ring
-    integer, allocatable, intent(out) :: next(:)
-    integer, allocatable :: found(:)
-    integer :: i, k, n, near
-
-    allocate (found(size(step)*size(ring)))
-    n = 0
-    do i = 1, size(ring)
+    do i = from, to
       do k = 1, size(step)
-        near = ring(i) + step(k)
+        near = list(i) + step(k)
         if (mark(near) /= free) cycle
         n = n + 1
-        mark(near) = listed + n
-        found(n) = near
+        mark(near) = ring
+        list(n) = near
       end do
     end do
-    next = found(:n)
-  end subroutine next_ring
-
-  !> List the neighbors of a node in the ring before and in its own.
-  pure subroutine list_neighbors(node, step, mark, first, inner, beside, n_inner, n_beside)
-    !> The node, and steps to its neighbors
-    integer, intent(in) :: node, step(:)
-    !> Marks of all nodes
-    integer, intent(in) :: mark(:)
-    !> First marks of its own ring and of the next
-    integer, intent(in) :: first(2)
-    !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
-    integer, intent(out) :: inner(6), beside(7)
-    !> Their numbers
-    integer, intent(out) :: n_inner, n_beside
-    integer :: k, near
-
-    n_inner = 0
-    n_beside = 1
-    beside(1) = mark(node)
-    do k = 1, size(step)
-      near = node + step(k)
-      if (mark(near) < first(1)) then
-        ! no neighbor is further in than the ring before
-        n_inner = n_inner + 1
-        inner(n_inner) = near
-      else if (mark(near) < first(2)) then
-        n_beside = n_beside + 1
-        beside(n_beside) = mark(near)
-      end if
-    end do
-  end subroutine list_neighbors
+  end subroutine add_ring
 
   !> Continue a field beyond the active nodes.
   subroutine extend(self, field, own, first)
@@ -450,17 +463,17 @@ contains
 
     if (self%fields%ranks%size == 1) then
       if (.not. allocated(self%lines) .or. present(own)) then
-        call self%extend_rings(field, own, first)
+        call self%pass_rings(.false., field, own, first)
         return
       end if
       allocate (mean, source=self%lines%mean(field))
-      call self%extend_rings(field)
+      call self%pass_rings(.false., field)
       call self%lines%add(mean, field)
       return
     end if
     call widen(self, field, wider)
     if (present(own)) call widen(self, own, wider_own)                         ! absent if it is not allocated
-    call self%extend_rings(wider, wider_own, first)
+    call self%pass_rings(.false., wider, wider_own, first)
     call narrow(self, wider, field)
   end subroutine extend
 
@@ -491,53 +504,6 @@ contains
     field = wider(start + 1:start + size(field))
   end subroutine narrow
 
-  !> Continue a field in the rows of the rings.
-  subroutine extend_rings(self, field, own, first)
-    class(edge_extension_t), intent(in) :: self
-    !> Field over the window (n)
-    real(sp), intent(inout), contiguous :: field(:)
-    !> Share of their own value at the nodes of the rings, to which the rest of the continuation is added: absent, 0 (n)
-    real(sp), intent(in), optional, contiguous :: own(:)
-    !> Height of the continuation in the first ring; absent: 1
-    real(sp), intent(in), optional :: first
-    real(sp), allocatable :: value(:), smooth(:)
-    integer :: r, k, s
-
-    if (.not. allocated(self%node)) return                                     ! not set up: zero beyond the edge
-    allocate (value(size(self%node)), smooth(size(self%node)))
-    !$omp parallel num_threads(self%space%threads) private(r, k, s)
-    do r = 1, size(self%ring) - 1
-      associate (from => self%ring(r), to => self%ring(r + 1) - 1)
-        call add_up(from, to, self%inner, self%n_inner, field, value, self%fall)
-        if (r == 1 .and. present(first)) then
-          !$omp do schedule(static)
-          do k = from, to
-            value(k) = first*value(k)
-          end do
-          !$omp end do
-        end if
-        do s = 1, self%smoothings
-          call add_up(from, to, self%beside, self%n_beside, value, smooth, self%mean)
-          !$omp do schedule(static)
-          do k = from, to
-            value(k) = smooth(k)
-          end do
-          !$omp end do
-        end do
-        !$omp do schedule(static)
-        do k = from, to
-          if (present(own)) then
-            field(self%node(k)) = field(self%node(k)) + (1.0_sp - own(self%node(k)))*value(k)
-          else
-            field(self%node(k)) = value(k)
-          end if
-        end do
-        !$omp end do
-      end associate
-    end do
-    !$omp end parallel
-  end subroutine extend_rings
-
   !> Apply the transpose of `extend`; the values on the rings have no meaning afterwards, but for those of `own`.
   subroutine fold(self, field, own, first)
     class(edge_extension_t), intent(in) :: self
@@ -552,124 +518,190 @@ contains
 
     if (self%fields%ranks%size == 1) then
       if (.not. allocated(self%lines) .or. present(own)) then
-        call self%fold_rings(field, own, first)
+        call self%pass_rings(.true., field, own, first)
         return
       end if
       allocate (share, source=self%lines%share(field))
-      call self%fold_rings(field)
+      call self%pass_rings(.true., field)
       call self%lines%hand_back(share, field)
       return
     end if
     call widen(self, field, wider)
     if (present(own)) call widen(self, own, wider_own)
-    call self%fold_rings(wider, wider_own, first)
+    call self%pass_rings(.true., wider, wider_own, first)
     call narrow(self, wider, field)
   end subroutine fold
 
-  !> Fold a field in the rows of the rings.
-  subroutine fold_rings(self, field, own, first)
+  !> Continue a field in the rows of the rings, or fold it.
+  !>
+  !> A ring takes several stages, each of which needs the neighboring rows of the stage before. In one thread the stages follow each
+  !> other a block apart, so that the rows that they need are still in the cache.
+  subroutine pass_rings(self, folds, field, own, first)
     class(edge_extension_t), intent(in) :: self
+    !> Fold it
+    logical, intent(in) :: folds
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
-    !> Share of their own value at the nodes of the rings: absent, 0 (n)
+    !> Share of their own value at the nodes of the rings, to which the rest of the continuation is added: absent, 0 (n)
     real(sp), intent(in), optional, contiguous :: own(:)
     !> Height of the continuation in the first ring; absent: 1
     real(sp), intent(in), optional :: first
-    real(sp), allocatable :: value(:), share(:)
-    integer :: r, k, s
+    real(sp), allocatable :: value(:), before(:)
+    integer :: n_stage, stage, time, block
 
-    if (.not. allocated(self%node)) return
-    allocate (value(size(self%node)), share(size(self%node)))
-    !$omp parallel num_threads(self%space%threads) private(r, k, s)
-    do r = size(self%ring) - 1, 1, -1
-      associate (from => self%ring(r), to => self%ring(r + 1) - 1)
-        call take_up(from, to, self%node, field, value)
-        if (present(own) .or. (r == 1 .and. present(first))) then
-          !$omp do schedule(static)
-          do k = from, to
-            if (present(own)) value(k) = (1.0_sp - own(self%node(k)))*value(k)
-            if (r == 1 .and. present(first)) value(k) = first*value(k)
+    if (self%n_ring == 0) return                                               ! or not set up: zero beyond the edge
+    allocate (value(size(self%node)))
+    if (present(own)) allocate (before(size(self%node)))
+    n_stage = self%n_ring*(2*self%smoothings + 1)
+    if (folds) n_stage = n_stage + 1
+    associate (n_block => size(self%start, 2))
+      if (self%space%threads == 1) then
+        do time = 1, n_block + n_stage - 1
+          do stage = max(time - n_block, 0), min(time, n_stage) - 1
+            call pass_block(stage, time - stage)
           end do
-          !$omp end do
-        end if
-        do s = 1, self%smoothings
-          !$omp do schedule(static)
-          do k = from, to
-            share(k) = self%mean(k)*value(k)
-          end do
-          !$omp end do
-          call add_up(from, to, self%beside, self%n_beside, share, value)
         end do
-        !$omp single
-        call spread_out(from, to, self%inner, self%n_inner, self%fall, value, field)
-        !$omp end single
-      end associate
-    end do
-    !$omp end parallel
-  end subroutine fold_rings
+      else
+        !$omp parallel num_threads(self%space%threads) private(stage, block)
+        do stage = 0, n_stage - 1
+          !$omp do schedule(static)
+          do block = 1, n_block
+            call pass_block(stage, block)
+          end do
+          !$omp end do
+        end do
+        !$omp end parallel
+      end if
+      if (.not. (folds .and. present(own))) return
+      do block = 1, n_block
+        do stage = self%start(1, block), self%start(self%n_ring + 1, block) - 1
+          field(self%node(stage)) = before(stage)
+        end do
+      end do
+    end associate
 
-  !> Take the values of a field at the nodes of a ring, by the threads of a parallel region.
-  subroutine take_up(from, to, node, field, value)
+  contains
+
+    !> Do one stage in one block.
+    subroutine pass_block(stage, block)
+      integer, intent(in) :: stage, block
+      if (folds) then
+        call fold_block(self, stage, block, field, value, before, own, first)
+      else
+        call extend_block(self, stage, block, field, value, before, own, first)
+      end if
+    end subroutine pass_block
+
+  end subroutine pass_rings
+
+  !> Do a stage of the continuation in a block: the mean of the ring before, or a mean along the ring, found or put into the field.
+  pure subroutine extend_block(self, stage, block, field, value, before, own, first)
+    type(edge_extension_t), intent(in) :: self
+    !> Stage, from 0, and block
+    integer, intent(in) :: stage, block
+    !> Field over the window; of the nodes of the rings, new values and those of the field before
+    real(sp), intent(inout), contiguous :: field(:), value(:)
+    real(sp), intent(inout), contiguous, optional :: before(:)
+    !> See `pass_rings`
+    real(sp), intent(in), contiguous, optional :: own(:)
+    real(sp), intent(in), optional :: first
+    integer :: ring, part, k
+
+    ring = stage/(2*self%smoothings + 1) + 1
+    part = modulo(stage, 2*self%smoothings + 1)
+    associate (from => self%start(ring, block), to => self%start(ring + 1, block) - 1)
+      if (part == 0) then
+        if (present(own)) before(from:to) = field(self%node(from:to))
+        call sum_over(self, from, to, self%inner, field, value)
+        do k = from, to
+          value(k) = self%fall(self%inner(k), ring)*value(k)
+        end do
+        if (ring == 1 .and. present(first)) value(from:to) = first*value(from:to)
+      else if (modulo(part, 2) == 1) then
+        call sum_over(self, from, to, self%beside, field, value)
+        return
+      end if
+      do k = from, to
+        if (part > 0) value(k) = mean(self%beside(k))*value(k)
+        field(self%node(k)) = value(k)
+      end do
+      if (part < 2*self%smoothings .or. .not. present(own)) return
+      do k = from, to
+        field(self%node(k)) = before(k) + (1.0_sp - own(self%node(k)))*value(k)
+      end do
+    end associate
+  end subroutine extend_block
+
+  !> Do a stage of the transpose in a block: what the next ring hands back is added, smoothed along the ring, and made ready for the
+  !> ring before.
+  pure subroutine fold_block(self, stage, block, field, value, before, own, first)
+    type(edge_extension_t), intent(in) :: self
+    !> Stage, from 0, and block
+    integer, intent(in) :: stage, block
+    !> Field over the window; of the nodes of the rings, new values and those that the field has afterwards
+    real(sp), intent(inout), contiguous :: field(:), value(:)
+    real(sp), intent(inout), contiguous, optional :: before(:)
+    !> See `pass_rings`
+    real(sp), intent(in), contiguous, optional :: own(:)
+    real(sp), intent(in), optional :: first
+    integer :: ring, part, k
+
+    ring = self%n_ring - stage/(2*self%smoothings + 1)
+    part = modulo(stage, 2*self%smoothings + 1)
+    associate (from => self%start(ring, block), to => self%start(ring + 1, block) - 1)
+      if (modulo(part, 2) == 1) then
+        call sum_over(self, from, to, self%beside, field, value)
+        return
+      end if
+      if (part == 0) then
+        call sum_over(self, from, to, self%outer, field, value)
+        do k = from, to
+          value(k) = field(self%node(k)) + value(k)
+        end do
+        if (ring > 0 .and. present(own)) then
+          before(from:to) = value(from:to)
+          value(from:to) = (1.0_sp - own(self%node(from:to)))*value(from:to)
+        end if
+        if (ring == 1 .and. present(first)) value(from:to) = first*value(from:to)
+      end if
+      do k = from, to
+        if (ring == 0) then
+          field(self%node(k)) = value(k)
+        else if (part < 2*self%smoothings) then
+          field(self%node(k)) = mean(self%beside(k))*value(k)
+        else
+          field(self%node(k)) = self%fall(self%inner(k), ring)*value(k)
+        end if
+      end do
+    end associate
+  end subroutine fold_block
+
+  !> Sum a field over some neighbors of each node.
+  pure subroutine sum_over(self, from, to, neighbors, field, total)
+    type(edge_extension_t), intent(in) :: self
     !> First and last node
     integer, intent(in) :: from, to
-    !> Their places in the field
-    integer, intent(in), contiguous :: node(:)
+    !> Neighbours of each node, as bits
+    integer(int8), intent(in), contiguous :: neighbors(:)
+    !> Field over the window, and the sums
     real(sp), intent(in), contiguous :: field(:)
-    !> The values
-    real(sp), intent(inout), contiguous :: value(:)
-    integer :: k
-
-    !$omp do schedule(static)
-    do k = from, to
-      value(k) = field(node(k))
-    end do
-    !$omp end do
-  end subroutine take_up
-
-  !> Add values at the nodes of a ring to some places of a field; several nodes to the same one, always in the same order.
-  pure subroutine spread_out(from, to, places, n_places, factor, value, field)
-    !> First and last node
-    integer, intent(in) :: from, to
-    !> Places of each node, and how many they are
-    integer, intent(in), contiguous :: places(:, :), n_places(:)
-    !> Values and their factors
-    real(sp), intent(in), contiguous :: factor(:), value(:)
-    real(sp), intent(inout), contiguous :: field(:)
-    real(sp) :: one
-    integer :: k, i
-
-    do k = from, to
-      one = factor(k)*value(k)
-      do i = 1, n_places(k)
-        field(places(i, k)) = field(places(i, k)) + one
-      end do
-    end do
-  end subroutine spread_out
-
-  !> Sum at nodes of a ring over some places, by the threads of a parallel region.
-  subroutine add_up(from, to, places, n_places, value, total, factor)
-    !> First and last node
-    integer, intent(in) :: from, to
-    !> Places of each node, and how many they are
-    integer, intent(in), contiguous :: places(:, :), n_places(:)
-    !> Values at the places, and their sums
-    real(sp), intent(in), contiguous :: value(:)
     real(sp), intent(inout), contiguous :: total(:)
-    !> Factor of each sum; absent: 1
-    real(sp), intent(in), contiguous, optional :: factor(:)
     real(sp) :: one
-    integer :: k, i
+    integer :: k, bits
 
-    !$omp do schedule(static)
     do k = from, to
-      one = 0.0_sp
-      do i = 1, n_places(k)
-        one = one + value(places(i, k))
-      end do
-      if (present(factor)) one = factor(k)*one
+      bits = neighbors(k)
+      associate (node => self%node(k))
+        one = taken(bits, 1)*field(node + self%first(1, bits)) + taken(bits, 2)*field(node + self%first(2, bits)) &
+              + taken(bits, 3)*field(node + self%first(3, bits))
+        bits = others(bits)
+        do while (bits /= 0)
+          one = one + field(node + self%step(trailz(bits) + 1))
+          bits = iand(bits, bits - 1)
+        end do
+      end associate
       total(k) = one
     end do
-    !$omp end do
-  end subroutine add_up
+  end subroutine sum_over
 
 end module hc_edge_continuation

@@ -77,20 +77,25 @@ contains
     call residual_row(5, 2.0_wp, 1.5_wp, h, w, active, r)
     call check(error, real(r, wp), [1.0_wp, -1.0_wp, 7.0_wp, 7.0_wp, 7.0_wp], 0.0_wp, 'r')
     if (allocated(error)) return
+    total = 1.0_wp                                                             ! to which those of the row are added
+    product = 1.0_wp
     call sum_row(5, z, active, total, r, product)
-    call check(error, [total, product], [-7.0_wp, 9.0_wp], 0.0_wp, 'sums')
+    call check(error, [total, product], [-6.0_wp, 10.0_wp], 0.0_wp, 'sums')
     if (allocated(error)) return
     d = 2.0_sp
     call direction_row(5, 0.5_sp, z, active, d)
     call check(error, real(d, wp), [2.0_wp, -7.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'direction')
     if (allocated(error)) return
 
+    total = 0.0_wp
     call projected_row(0.5_wp, p, active, d, total, [0.0_wp, 0.0_wp], z)
     call check(error, [real(d, wp), total], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.0_wp], 0.0_wp, 'no step')
     if (allocated(error)) return
+    total = 0.0_wp
     call projected_row(0.5_wp, p, active, d, total, [0.5_wp, 0.0_wp], z)
     call check(error, [real(d, wp), total], [0.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 4.5_wp], 0.0_wp, 'step')
     if (allocated(error)) return
+    total = 0.0_wp
     call projected_row(0.5_wp, p, active, d, total, [0.5_wp, -0.5_wp], z, punch)
     call check(error, [real(d, wp), total], [1.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.5_wp], 0.0_wp, 'step by load')
   end subroutine test_rows

@@ -13,7 +13,6 @@ import numpy as np
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import nodal_residuals
-from ..core.shared import SharedSolution
 from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
@@ -101,7 +100,7 @@ def _holds_a_shift(case: Problem, lattice: Lattice, solution: Any, target: LoadS
     """Return whether a window that repeats is to be shifted, touches everywhere, and cannot slip."""
     shifted = any(motion.control != "force" for motion in (target.x, target.y))
     stuck = case.frictional and math.isinf(case.friction_coefficient) and lattice.periodic and shifted
-    return stuck and not isinstance(solution, SharedSolution) and bool((solution.pressure > 0.0).all())
+    return stuck and bool((solution.pressure > 0.0).all())
 
 
 def _number(value: float) -> str:
@@ -199,10 +198,6 @@ def _worst(
     """Return the largest residual and its node."""
     sign = max(residuals, key=lambda name: residuals[name])
     value = residuals[sign]
-    if isinstance(solution, SharedSolution):  # whose nodes are not here
-        if not solution.normal_load > 0.0:
-            return Worst(sign, value, what=_LOST)
-        return Worst(sign, value, what=_missed(sign, solution, values) if sign == "R_P" else "")
     if not (solution.pressure > 0).any():
         return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):

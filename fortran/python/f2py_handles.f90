@@ -184,11 +184,12 @@ contains
     if (allocated(slot%state%slip_increment)) deallocate (slot%state%slip_increment)
   end subroutine free_slip
 
-  !> Look up an operator or a problem and mark it as in use.
-  subroutine enter(handle, kind, extent, slot, error, together)
+  !> Look up an operator or a problem and mark it as in use. The ranks that share it call this together to work with it, and all
+  !> of them fail, or none.
+  subroutine enter(handle, kind, extent, slot, error)
     !> Its handle
     integer(c_int64_t), intent(in) :: handle
-    !> Name of the pointer to it
+    !> Name of its kind in procedures.toml
     character(len=*), intent(in) :: kind
     !> Number of columns and rows of the arrays
     integer, intent(in) :: extent(2)
@@ -196,8 +197,6 @@ contains
     type(slot_t), pointer, intent(out) :: slot
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> The ranks that share the object call this together to work with it, and all of them fail, or none
-    logical, intent(in), optional :: together
     logical :: busy, fits
     integer :: place
 
@@ -225,10 +224,10 @@ contains
     else
       if (any(slot%extent /= extent)) then
         call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
-      else if (present(together)) then
+      else if (kind /= 'problem') then
         call require_memory(slot%working, error, slot%space%threads)
       end if
-      if (present(together)) call slot%ranks%agree(error)
+      if (kind /= 'problem') call slot%ranks%agree(error)
       if (allocated(error)) call leave(slot)
     end if
   end subroutine enter

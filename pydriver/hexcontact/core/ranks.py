@@ -164,15 +164,9 @@ def least(value: float) -> float:
     return float(flat.least_of_ranks(value))
 
 
-def span(lattice: Lattice, of: int) -> tuple[int, int]:
-    """Return the first row of a rank, from 0 on, and the row after its last one."""
-    first, after = flat.rows_of_rank(of, lattice.n_row)
-    return int(first), int(after)
-
-
 def rows(lattice: Lattice, of: int | None = None) -> Lattice:
     """Return the window of the rows of a rank, by default this one."""
-    first, after = span(lattice, rank if of is None else of)
+    first, after = map(int, flat.rows_of_rank(rank if of is None else of, lattice.n_row))
     return replace(lattice, row_first=lattice.row_first + first, n_row=after - first)
 
 

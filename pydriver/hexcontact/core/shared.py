@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Banded, Mask
+from ..arrays import Array, Banded
 from ..variables import WORN
 from . import ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
-from .friction import FrictionalContact, FrictionLaw
+from .friction import FrictionalContact
 from .lattice import Lattice
 from .measures import is_unbounded, measures
 from .steps import AHEAD
@@ -26,26 +26,6 @@ from .steps import AHEAD
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
 _STATES = NormalSolution, Displacement
-
-
-class Field(Protocol):
-    """A quantity over the plane."""
-
-    def over(self, lattice: Lattice) -> Array:
-        """Return the values at the nodes of a window."""
-        ...
-
-    def share(self, touching: Mask, lattice: Lattice) -> Array:
-        """Return the part of a cell that each node bears at ends of surfaces."""
-        ...
-
-
-class Friction(Protocol):
-    """Friction over the plane."""
-
-    def over(self, lattice: Lattice) -> FrictionLaw:
-        """Return the law at the nodes of a window."""
-        ...
 
 
 class Layout(NamedTuple):
@@ -101,12 +81,12 @@ def rigid(rank: int, shape: tuple[int, int]) -> Array:
     return np.zeros(shape)
 
 
-def gap_in_rows(field: Field, layout: Layout) -> Rows:
+def gap_in_rows(field: Any, layout: Layout) -> Rows:
     """Return the rows of a gap over a window, which each rank evaluates."""
     return lambda rank, shape: ranks.ask(rank, _over, field, layout.nodes(rank), shape=shape)
 
 
-def _over(field: Field, lattice: Lattice) -> Array:
+def _over(field: Any, lattice: Lattice) -> Array:
     """Return a gap in some rows, NaN where nothing can touch."""
     values = field.over(lattice)
     return np.where(np.isfinite(values), values, np.nan)
@@ -116,9 +96,9 @@ def _over(field: Field, lattice: Lattice) -> Array:
 
 
 class _Part(Contact):
-    """The part of this rank of a contact: its rows, or all."""
+    """The part of this rank of a contact, its rows or all, from gap and friction as fields over the plane."""
 
-    def __init__(self, layout: Layout, gap: Field, friction: Friction | None = None, **given: Any) -> None:
+    def __init__(self, layout: Layout, gap: Any, friction: Any = None, **given: Any) -> None:
         own = layout.nodes()
         with ranks.agreed():
             values = _over(gap, own)
@@ -229,18 +209,15 @@ class _Shared:
         """Call a method on all ranks; return its result, with states on a window as shared ones."""
         window = next((each.layout for each in arguments if isinstance(each, SharedObject)), self.layout)
         ends = [SharedState(window), SharedState(window)]
-        given = [end.number for end in ends], self._sent(arguments)
+        given = [end.number for end in ends], [*map(self._sent, arguments)]
         found = ranks.order(_call, self.number, name, *given, named)
         several = tuple(
             ends.pop(0).known(each) if isinstance(each, _STATES) else each for each in _each(found)
         )
         return several if type(found) is tuple else several[0]
 
-    def _sent(self, arguments: Sequence[Any]) -> list[Any]:
-        """Return arguments as they are sent to other ranks: fields over the window by rows."""
-        return [self._sent_one(each) for each in arguments]
-
-    def _sent_one(self, value: Any) -> Any:
+    def _sent(self, value: Any) -> Any:
+        """Return an argument as it is sent to other ranks: fields over the window by rows."""
         if isinstance(value, _Shared):
             return _Held(value.number)
         if isinstance(value, np.ndarray) and value.shape[-2:] == self.layout.lattice.shape:
@@ -263,7 +240,7 @@ class SharedObject(_Shared):
 
     def __init__(self, layout: Layout, kind: Callable[..., Any], *arguments: Any, **named: Any) -> None:
         super().__init__(layout)
-        ranks.order(_create, self.number, kind, self._sent(arguments), named)
+        ranks.order(_create, self.number, kind, [*map(self._sent, arguments)], named)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         """Return a method that all ranks call."""

@@ -92,14 +92,14 @@ module hc_communicator
     end subroutine agree
 
     !> Take rows of a field from their ranks; every rank takes part, each with rows of its own choice.
-    module subroutine fetch(self, words, n_row, own, wanted, values)
+    module subroutine fetch(self, words, n_row, own, bounds, values)
       class(communicator_t), intent(in) :: self
       !> Words in a row, and number of rows of the field
       integer, intent(in) :: words, n_row
       !> Rows of this rank
       type(c_ptr), intent(in) :: own
       !> First and last row for this rank; none if the last is less
-      integer, intent(in) :: wanted(2)
+      integer, intent(in) :: bounds(2)
       !> Those rows
       type(c_ptr), intent(in) :: values
     end subroutine fetch

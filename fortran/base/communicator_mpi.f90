@@ -122,7 +122,7 @@ contains
     integer(int32), pointer, contiguous :: source(:), target(:)
     type(MPI_Datatype) :: row
 
-    call MPI_Allgather(wanted, 2, MPI_INTEGER, all, 2, MPI_INTEGER, world(self))
+    call MPI_Allgather(bounds, 2, MPI_INTEGER, all, 2, MPI_INTEGER, world(self))
     first = self%first_row(n_row, [(r, r=0, self%size - 1)])
     last = self%last_row(n_row, [(r, r=0, self%size - 1)])
     do r = 0, self%size - 1
@@ -130,9 +130,9 @@ contains
         sent(r) = max(high - low + 1, 0)
         from(r) = merge(low - first(self%rank), 0, sent(r) > 0)
       end associate
-      associate (low => max(first(r), wanted(1)), high => min(last(r), wanted(2)))
+      associate (low => max(first(r), bounds(1)), high => min(last(r), bounds(2)))
         received(r) = max(high - low + 1, 0)
-        onto(r) = merge(low - wanted(1), 0, received(r) > 0)
+        onto(r) = merge(low - bounds(1), 0, received(r) > 0)
       end associate
     end do
     call c_f_pointer(own, source, [1])

@@ -383,8 +383,7 @@ class NormalContact(Contact):
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
         springs, count = checked(interface=interface, threads=threads)
-        given = *self._surfaces, springs, own is not None, count
-        del self._surfaces
+        given = *vars(self).pop("_surfaces"), springs, own is not None, count
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(

@@ -216,8 +216,7 @@ class FrictionalContact(Contact):
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
         law = _checked_law(friction_coefficient, shear_limit, self.own).at_nodes(self.own)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
-        given = *self._surfaces, law, springs, own is not None, count, coupling == "goodman"
-        del self._surfaces
+        given = *vars(self).pop("_surfaces"), law, springs, own is not None, count, coupling == "goodman"
         self._create(flat.create_sheared, method_code(method, iteration), *given)
 
     def virgin(self) -> ContactState:

@@ -98,12 +98,12 @@ def _over(field: Any, lattice: Lattice) -> Array:
 class _Part(Contact):
     """The part of this rank of a contact, its rows or all, from gap and friction as fields over the plane."""
 
-    def __init__(self, layout: Layout, gap: Any, friction: Any = None, **given: Any) -> None:
+    def __init__(self, layout: Layout, gap: Any, **given: Any) -> None:
         own = layout.nodes()
         with ranks.agreed():
             values = _over(gap, own)
-            if friction is not None:
-                self.law = given["friction_coefficient"] = friction.over(own)
+            if "friction_coefficient" in given:
+                self.law = given["friction_coefficient"] = given["friction_coefficient"].over(own)
             given |= {"candidate": np.isfinite(values), "rim_warning": False, "own": own}
             super().__init__(layout.lattice, initial_gap=values, **given)
         self.share = gap.share

@@ -90,10 +90,10 @@ def error(
 def _residuals(case: Problem, solution: Any, target: LoadStep) -> dict[str, float]:
     """Return the residuals with a bound, by the symbol of the theory."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
-    wanted = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
+    bounded = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
     if not case.frictional:
-        wanted = {"R_n": True, "R_P": z}
-    return {sign: float(getattr(solution, RESIDUALS[sign])) for sign, shown in wanted.items() if shown}
+        bounded = {"R_n": True, "R_P": z}
+    return {sign: float(getattr(solution, RESIDUALS[sign])) for sign, shown in bounded.items() if shown}
 
 
 def _holds_a_shift(case: Problem, lattice: Lattice, solution: Any, target: LoadStep) -> bool:
@@ -132,13 +132,13 @@ def _sliding(
             f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
             "that touch at x = y = 0",
         )
-    wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
-    wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
+    loads = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
+    loads += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
     motions = ", ".join(motion for _, motion in [*target.drives.values()][1:])
     expected = f"expected a smaller load, or a prescribed motion in its place ({motions})"
-    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
+    return True, f"friction cannot carry the {listed(loads, 'and the')}{known}", expected
 
 
 def _center(lattice: Lattice, solution: Any) -> tuple[float, float]:
@@ -228,10 +228,10 @@ def _missed(sign: str, solution: Any, values: tuple[float, ...]) -> str:
     return _instead(f"tangential load along {'xy'[axis]}", carried[axis], values[1 + axis], "N")
 
 
-def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
+def _instead(name: str, carried: float, expected: float, unit: str) -> str:
     return (
         f"the {name} that the tractions carry is {quantity(carried, unit)} instead of "
-        f"{quantity(wanted, unit)}, off by {quantity(abs(carried - wanted), unit, 2)}"
+        f"{quantity(expected, unit)}, off by {quantity(abs(carried - expected), unit, 2)}"
     )
 
 

@@ -81,7 +81,7 @@ class Window:
         if target is None:
             self.friction = self.case.friction_law(self.lattice)
         self.gap: Any = gap if self.case.moves else None
-        self.contact = self._solver(gap)
+        self.contact = self._solver(gap, self.case.frictional)
         # of surfaces that move, and of nodes that cannot touch, the core has another one
         if target is None and (self.case.moves or not self.candidate.all()):
             self._own_gap = self._where_touching(gap)
@@ -97,15 +97,15 @@ class Window:
             self._lent = weakref.ref(gap)
         return gap
 
-    def _solver(self, gap: Any) -> Any:
-        """Return the solver for an initial gap (inf where nothing can touch)."""
-        return self._pressed(gap)
-
-    def _pressed(self, gap: Any) -> Any:
-        """Return the solver without friction."""
-        method = self.case.method_for(self.lattice)
-        given = self.lattice, self.case.solved_pair, gap, self.candidate
-        return NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
+    def _solver(self, gap: Any, frictional: bool) -> Any:
+        """Return a solver for an initial gap (inf where nothing can touch)."""
+        case, solver = self.case, self.case.solver
+        given = self.lattice, case.solved_pair, gap, self.candidate
+        how: dict[str, Any] = {"method": case.method_for(self.lattice), "interface": case.interface}
+        if not frictional:
+            return NormalContact(*given, rim_warning=False, **how)
+        how |= {"coupling": solver.coupling, "iteration": solver.iteration}
+        return FrictionalContact(*given, friction_coefficient=self.friction, rim_warning=False, **how)
 
     def advance(self, state: Any, target: LoadStep, values: tuple[float, ...]) -> Any:
         """Solve a load step from the state at its beginning, None before the first load.
@@ -278,12 +278,15 @@ class SharedWindow(Window):
         if target is None:
             self.layout = Layout(self.lattice, is_shared(self.case, self.lattice))
             self.friction = self.case.friction_law(self.layout.nodes())
-        self.contact = self._solver(self.case.gap_in(target))
+        self.contact = self._solver(self.case.gap_in(target), self.case.frictional)
 
-    def _pressed(self, gap: Any) -> SharedObject:
-        layout = Layout(self.lattice, ranks.share(self.lattice))
-        given = {"pair": self.case.solved_pair, "interface": self.case.interface}
-        return SharedObject(layout, NormalPart, layout, gap, **given)
+    def _solver(self, gap: Any, frictional: bool) -> SharedObject:
+        how = {"pair": self.case.solved_pair, "interface": self.case.interface}
+        if not frictional:
+            layout = Layout(self.lattice, ranks.share(self.lattice))
+            return SharedObject(layout, NormalPart, layout, gap, **how)
+        how |= {"friction_coefficient": self.case.plane_friction, "coupling": self.case.solver.coupling}
+        return SharedObject(self.layout, FrictionPart, self.layout, gap, **how)
 
     def _larger(self, solution: Any) -> Lattice:
         larger: Lattice = self.contact.grown(solution)
@@ -341,20 +344,6 @@ class FrictionWindow(Window):
 
     state = STATE[True]
 
-    def _solver(self, gap: Array) -> FrictionalContact:
-        return FrictionalContact(
-            self.lattice,
-            self.case.solved_pair,
-            gap,
-            self.candidate,
-            friction_coefficient=self.friction,
-            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
-            method=self.case.method_for(self.lattice),
-            iteration="dissertation" if self.case.solver.iteration == "dissertation" else "newton",
-            interface=self.case.interface,
-            rim_warning=False,
-        )
-
     def advance(
         self,
         state: ContactState | None,
@@ -379,8 +368,7 @@ class FrictionWindow(Window):
     def how(self) -> dict[str, Any]:
         """Entry of nodes and tolerance of the solver."""
         solver = self.case.solver
-        entry = "interpolated" if solver.entry == "interpolated" else "implicit"
-        return {"entry": entry, "tolerance": solver.tolerance}
+        return {"entry": solver.entry, "tolerance": solver.tolerance}
 
     def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
         """Return cycles that wear the surfaces."""
@@ -428,7 +416,7 @@ class FrictionWindow(Window):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        solver, cell = self._pressed(self.initial_gap), self.lattice.cell_area
+        solver, cell = self._solver(self.initial_gap, frictional=False), self.lattice.cell_area
         solved = (solver.solve(**drive, tolerance=_ROUGHLY) for drive in self.case.largest_drives)
         return max([cell, *(cell * int((each.parts()[0]["zone"] > 0).sum()) for each in solved)])
 
@@ -449,14 +437,6 @@ def state_of(step: Step) -> ContactState:
 
 class SharedFrictionWindow(SharedWindow, FrictionWindow):
     """Contact with friction whose rows all ranks share."""
-
-    def _solver(self, gap: Any) -> Any:
-        return SharedObject(
-            *(self.layout, FrictionPart, self.layout, gap, self.case.plane_friction),
-            pair=self.case.solved_pair,
-            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
-            interface=self.case.interface,
-        )
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""

@@ -69,14 +69,15 @@ contains
       slot%lattice = lattice
       slot%extent = [lattice%extent(1), n_own]
       slot%ranks = together
-      slot%space = field_space_t()
       ! the constructors refuse another number
-      if (threads >= 0 .and. threads <= most_threads) slot%space = space_over(lattice%extent, threads)
-      if (n_own < lattice%extent(2)) slot%space%ranks = together%over(lattice%extent)
-      needed = bytes/slot%space%ranks%size*together%on_node
-      ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
-      slot%working = 4*needed/5
-      call require_memory(needed, error, slot%space%threads)
+      if (threads >= 0 .and. threads <= most_threads) then
+        slot%space = space_over(lattice%extent, threads)
+        if (n_own < lattice%extent(2)) slot%space%ranks = together%over(lattice%extent)
+        needed = bytes/slot%space%ranks%size*together%on_node
+        ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
+        slot%working = 4*needed/5
+        call require_memory(needed, error, slot%space%threads)
+      end if
     end if
     call together%agree(error)
   end subroutine take_window

@@ -210,7 +210,7 @@ class FlexibilityOperator(Handle):
         threads: int = 0,
         own: Lattice | None = None,
     ) -> None:
-        self.own = lattice if own is None else own
+        self.lattice, self.own = lattice, lattice if own is None else own
         given = method_code(method), lattice, pair, self.own.n_row
         self._create(flat.create_operator, *given, *checked(threads=threads))
 

@@ -40,10 +40,8 @@ module hc_communicator
     procedure, non_overridable :: fetch
     !> Columns of transformed rows, and back
     procedure, non_overridable :: to_columns, to_rows
-    !> Words of the first rank on other ranks, which wait for them
-    procedure, non_overridable :: tell, wait_for_words, hear
-    !> Words of another rank on the first one
-    procedure, non_overridable :: give, take
+    !> Words of another rank
+    procedure, non_overridable :: send_words, wait_for_words, receive_words
   end type communicator_t
 
   !> Transformed rows, and the columns that each rank works on; in words of four bytes.
@@ -94,14 +92,14 @@ module hc_communicator
     end subroutine agree
 
     !> Take rows of a field from their ranks; every rank takes part, each with rows of its own choice.
-    module subroutine fetch(self, words, n_row, own, wanted, values)
+    module subroutine fetch(self, words, n_row, own, bounds, values)
       class(communicator_t), intent(in) :: self
       !> Words in a row, and number of rows of the field
       integer, intent(in) :: words, n_row
       !> Rows of this rank
       type(c_ptr), intent(in) :: own
       !> First and last row for this rank; none if the last is less
-      integer, intent(in) :: wanted(2)
+      integer, intent(in) :: bounds(2)
       !> Those rows
       type(c_ptr), intent(in) :: values
     end subroutine fetch
@@ -121,13 +119,13 @@ module hc_communicator
       type(c_ptr), intent(in) :: columns, rows
     end subroutine to_rows
 
-    !> Send words of the first rank to another one.
-    module subroutine tell(self, values, rank)
+    !> Send words to another rank, which receives them.
+    module subroutine send_words(self, values, rank)
       class(communicator_t), intent(in) :: self
       integer(int32), intent(in), contiguous :: values(:)
       !> The other rank
       integer, intent(in) :: rank
-    end subroutine tell
+    end subroutine send_words
 
     !> Wait, without use of the processor, until the first rank sends words; return their number.
     module subroutine wait_for_words(self, n)
@@ -135,24 +133,12 @@ module hc_communicator
       integer, intent(out) :: n
     end subroutine wait_for_words
 
-    !> Receive the words that were waited for.
-    module subroutine hear(self, values)
-      class(communicator_t), intent(in) :: self
-      integer(int32), intent(out), contiguous :: values(:)
-    end subroutine hear
-
-    !> Send words to the first rank, which takes them.
-    module subroutine give(self, values)
-      class(communicator_t), intent(in) :: self
-      integer(int32), intent(in), contiguous :: values(:)
-    end subroutine give
-
-    !> Receive words that another rank gives.
-    module subroutine take(self, values, rank)
+    !> Receive words that another rank sends.
+    module subroutine receive_words(self, values, rank)
       class(communicator_t), intent(in) :: self
       integer(int32), intent(out), contiguous :: values(:)
       integer, intent(in) :: rank
-    end subroutine take
+    end subroutine receive_words
   end interface
 
 contains

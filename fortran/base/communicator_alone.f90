@@ -44,8 +44,8 @@ contains
   end procedure to_rows
 
   !> There is no other rank.
-  module procedure tell
-  end procedure tell
+  module procedure send_words
+  end procedure send_words
 
   !> No other rank sends anything.
   module procedure wait_for_words
@@ -53,17 +53,8 @@ contains
   end procedure wait_for_words
 
   !> No words come.
-  module procedure hear
+  module procedure receive_words
     values = 0
-  end procedure hear
-
-  !> The first rank is this one.
-  module procedure give
-  end procedure give
-
-  !> No words come.
-  module procedure take
-    values = 0
-  end procedure take
+  end procedure receive_words
 
 end submodule hc_communicator_alone

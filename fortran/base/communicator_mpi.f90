@@ -9,8 +9,8 @@ submodule (hc_communicator) hc_communicator_mpi
     MPI_Type_contiguous, MPI_Type_create_subarray, MPI_Type_free
   implicit none
 
-  !> Tags of words of the first rank, and of those for it.
-  integer, parameter :: told = 1, given_back = 2
+  !> Tag of words.
+  integer, parameter :: tag = 1
 
   interface
     !> Sleep (POSIX)
@@ -122,7 +122,7 @@ contains
     integer(int32), pointer, contiguous :: source(:), target(:)
     type(MPI_Datatype) :: row
 
-    call MPI_Allgather(wanted, 2, MPI_INTEGER, all, 2, MPI_INTEGER, world(self))
+    call MPI_Allgather(bounds, 2, MPI_INTEGER, all, 2, MPI_INTEGER, world(self))
     first = self%first_row(n_row, [(r, r=0, self%size - 1)])
     last = self%last_row(n_row, [(r, r=0, self%size - 1)])
     do r = 0, self%size - 1
@@ -130,9 +130,9 @@ contains
         sent(r) = max(high - low + 1, 0)
         from(r) = merge(low - first(self%rank), 0, sent(r) > 0)
       end associate
-      associate (low => max(first(r), wanted(1)), high => min(last(r), wanted(2)))
+      associate (low => max(first(r), bounds(1)), high => min(last(r), bounds(2)))
         received(r) = max(high - low + 1, 0)
-        onto(r) = merge(low - wanted(1), 0, received(r) > 0)
+        onto(r) = merge(low - bounds(1), 0, received(r) > 0)
       end associate
     end do
     call c_f_pointer(own, source, [1])
@@ -212,9 +212,9 @@ contains
   end subroutine exchange
 
   !> Send words.
-  module procedure tell
-    call MPI_Send(values, size(values), MPI_INTEGER4, rank, told, world(self))
-  end procedure tell
+  module procedure send_words
+    call MPI_Send(values, size(values), MPI_INTEGER4, rank, tag, world(self))
+  end procedure send_words
 
   !> Look for the words every millisecond: MPI itself waits with the processor busy.
   module procedure wait_for_words
@@ -224,26 +224,16 @@ contains
     integer(c_int) :: ignored
 
     do
-      call MPI_Iprobe(0, told, world(self), there, about)
+      call MPI_Iprobe(0, tag, world(self), there, about)
       if (there) exit
       ignored = usleep(millisecond)
     end do
     call MPI_Get_count(about, MPI_INTEGER4, n)
   end procedure wait_for_words
 
-  !> Receive words of the first rank.
-  module procedure hear
-    call MPI_Recv(values, size(values), MPI_INTEGER4, 0, told, world(self), MPI_STATUS_IGNORE)
-  end procedure hear
-
-  !> Send words to the first rank.
-  module procedure give
-    call MPI_Send(values, size(values), MPI_INTEGER4, 0, given_back, world(self))
-  end procedure give
-
-  !> Receive words of another rank.
-  module procedure take
-    call MPI_Recv(values, size(values), MPI_INTEGER4, rank, given_back, world(self), MPI_STATUS_IGNORE)
-  end procedure take
+  !> Receive words.
+  module procedure receive_words
+    call MPI_Recv(values, size(values), MPI_INTEGER4, rank, tag, world(self), MPI_STATUS_IGNORE)
+  end procedure receive_words
 
 end submodule hc_communicator_mpi

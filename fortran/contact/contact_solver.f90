@@ -19,6 +19,8 @@ module hc_contact_solver
     procedure(solve_step), deferred :: solve_step
     !> The normal part of the problem: lattice, gap and candidates
     procedure(solver_problem), deferred :: normal_part
+    !> Gap before loading, without the wear
+    procedure :: copy_gap
   end type contact_solver_t
 
   !> A method of solving one with friction.
@@ -34,8 +36,6 @@ module hc_contact_solver
     !> Another gap before loading
     procedure :: set_gap
     procedure :: normal_part
-    !> Gap before loading, without the wear
-    procedure :: copy_gap
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure(solver_displacements), deferred :: displacements
   end type friction_solver_t
@@ -113,16 +113,18 @@ contains
   end subroutine set_gap
 
   !> Copy the gap before loading, without the wear.
-  pure subroutine copy_gap(self, gap)
-    class(friction_solver_t), intent(in) :: self
+  subroutine copy_gap(self, gap)
+    class(contact_solver_t), intent(in), target :: self
     !> The gap (n_col, n_row) [m]
     real(wp), intent(out), contiguous :: gap(:, :)
+    class(normal_problem_t), pointer :: problem
 
-    if (allocated(self%unworn_gap)) then
-      gap = self%unworn_gap
-    else
-      gap = self%problem%initial_gap
-    end if
+    problem => self%normal_part()
+    gap = problem%initial_gap
+    select type (self)
+    class is (friction_solver_t)
+      if (allocated(self%unworn_gap)) gap = self%unworn_gap
+    end select
   end subroutine copy_gap
 
 end module hc_contact_solver

@@ -166,7 +166,7 @@ contains
     integer, intent(in) :: n_row
     !> Own rows of the field (n_col, own rows)
     real(wp), intent(in), contiguous, target :: own(:, :)
-    !> First of the rows that are wanted, and their values (n_col, number of rows)
+    !> First of the rows to be fetched, and their values (n_col, number of rows)
     integer, intent(in) :: first
     real(wp), intent(out), contiguous, target :: values(:, :)
 

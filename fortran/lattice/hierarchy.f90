@@ -245,13 +245,13 @@ contains
     !> Field (n_col, own rows)
     real(wp), intent(inout), contiguous :: field(:, :)
     real(wp), allocatable :: rows(:, :)
-    integer :: own(2), wanted(2)
+    integer :: own(2), both(2)
 
     own = self%space%own_rows(self%lattice%extent(2))
-    wanted = [max(own(1), low(2)), min(own(2), low(2) + part%lattice%extent(2) - 1)]
-    allocate (rows(part%lattice%extent(1), max(wanted(2) - wanted(1) + 1, 0)))
-    call part%space%fetch(part%lattice%extent(2), values, wanted(1) - low(2) + 1, rows)
-    field(low(1):low(1) + size(rows, 1) - 1, wanted(1) - own(1) + 1:wanted(2) - own(1) + 1) = rows
+    both = [max(own(1), low(2)), min(own(2), low(2) + part%lattice%extent(2) - 1)]
+    allocate (rows(part%lattice%extent(1), max(both(2) - both(1) + 1, 0)))
+    call part%space%fetch(part%lattice%extent(2), values, both(1) - low(2) + 1, rows)
+    field(low(1):low(1) + size(rows, 1) - 1, both(1) - own(1) + 1:both(2) - own(1) + 1) = rows
   end subroutine paste
 
   !> Set up the same problem on the part of its window between some columns and rows.

@@ -43,11 +43,11 @@ module hc_f2py_handles
     !> Columns and rows of the arrays: those of the window, or own rows of a problem that ranks share
     integer :: extent(2) = 0
     type(field_space_t) :: space
-    !> Ranks that call procedures of a problem with friction together
+    !> Ranks that call its procedures together
     type(communicator_t) :: ranks = communicator_t()
     class(flexibility_t), pointer :: operator => null()
-    !> Solvers without and with friction
-    class(contact_solver_t), pointer :: pressed => null()
+    !> A solver, and the same one if it is with friction
+    class(contact_solver_t), pointer :: solver => null()
     class(friction_solver_t), pointer :: sheared => null()
     type(contact_state_t), pointer :: state => null()
     type(wear_path_t), pointer :: wear => null()
@@ -166,8 +166,7 @@ contains
     call unlock(handle_table)
     if (.not. associated(slot)) return
     if (associated(slot%operator)) deallocate (slot%operator)
-    if (associated(slot%pressed)) deallocate (slot%pressed)
-    if (associated(slot%sheared)) deallocate (slot%sheared)
+    if (associated(slot%solver)) deallocate (slot%solver)
     if (associated(slot%state)) deallocate (slot%state)
     if (associated(slot%wear)) deallocate (slot%wear)
     deallocate (slot)
@@ -185,11 +184,12 @@ contains
     if (allocated(slot%state%slip_increment)) deallocate (slot%state%slip_increment)
   end subroutine free_slip
 
-  !> Look up an operator or a problem and mark it as in use.
-  subroutine enter(handle, kind, extent, slot, error, together)
+  !> Look up an operator or a problem and mark it as in use. The ranks that share it call this together to work with it, and all
+  !> of them fail, or none.
+  subroutine enter(handle, kind, extent, slot, error)
     !> Its handle
     integer(c_int64_t), intent(in) :: handle
-    !> Name of the pointer to it
+    !> Name of its kind in procedures.toml
     character(len=*), intent(in) :: kind
     !> Number of columns and rows of the arrays
     integer, intent(in) :: extent(2)
@@ -197,9 +197,6 @@ contains
     type(slot_t), pointer, intent(out) :: slot
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> The ranks that share the object call this together, and all of them fail, or none; absent for one with friction: no step
-    !> is solved
-    logical, intent(in), optional :: together
     logical :: busy, fits
     integer :: place
 
@@ -212,7 +209,8 @@ contains
       slot => entries(place)%slot
       busy = slot%busy
       if (kind == 'operator') fits = associated(slot%operator)
-      if (kind == 'pressed') fits = associated(slot%pressed)
+      if (kind == 'problem') fits = associated(slot%solver)
+      if (kind == 'pressed') fits = associated(slot%solver) .and. .not. associated(slot%sheared)
       if (kind == 'sheared') fits = associated(slot%sheared)
       if (fits) slot%busy = .true.
     end if
@@ -226,10 +224,10 @@ contains
     else
       if (any(slot%extent /= extent)) then
         call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
-      else if (kind /= 'sheared' .or. present(together)) then
+      else if (kind /= 'problem') then
         call require_memory(slot%working, error, slot%space%threads)
       end if
-      if (present(together)) call slot%ranks%agree(error)
+      if (kind /= 'problem') call slot%ranks%agree(error)
       if (allocated(error)) call leave(slot)
     end if
   end subroutine enter

@@ -25,7 +25,7 @@ module hc_f2py_problems
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_pressed_part, new_sheared, sheared_options_t, secure_fields, entry_fields, wear_fields
+  public :: new_operator, new_pressed, new_sheared, solver_options_t, secure_fields, entry_fields, wear_fields
   public :: new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
@@ -35,50 +35,64 @@ module hc_f2py_problems
   !> Fields that the entry of nodes takes, and those of a cycle of wear with its states
   integer, parameter :: entry_fields = 45, wear_fields = 60
 
-  !> How a problem with friction is solved.
-  type :: sheared_options_t
-    !> Shear tractions do not move the pressure
-    logical :: goodman = .false.
+  !> How a problem is solved.
+  type :: solver_options_t
     !> All ranks call its procedures together, each with its rows of the arrays or all with all of them
     logical :: shared = .false.
     integer :: threads = 0
-  end type sheared_options_t
+    !> Shear tractions do not move the pressure
+    logical :: goodman = .false.
+  end type solver_options_t
 
 contains
 
   !> Take a slot with its window, and refuse a problem for which there is no memory.
-  subroutine take_window(lattice, bytes, threads, slot, handle, error)
+  subroutine take_window(lattice, n_own, shared, bytes, threads, slot, handle, error)
     type(lattice_t), intent(in) :: lattice
-    !> Memory of the problem, that of solving it included
+    !> Rows of the arrays: all, or those of this rank
+    integer, intent(in) :: n_own
+    !> All ranks call this together
+    logical, intent(in) :: shared
+    !> Memory of the problem on one rank, that of solving it included
     integer(c_int64_t), intent(in) :: bytes
     integer, intent(in) :: threads
     type(slot_t), pointer, intent(out) :: slot
     integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks that share the problem
     type(error_t), allocatable, intent(out) :: error
+    type(communicator_t) :: together
+    integer(c_int64_t) :: needed
 
+    if (shared) together = ranks
     call take_slot(slot, handle, error)
-    if (allocated(error)) return
-    slot%lattice = lattice
-    slot%extent = lattice%extent
-    slot%space = field_space_t()
-    ! the constructors refuse another number
-    if (threads < 0 .or. threads > most_threads) return
-    slot%space = space_over(lattice%extent, threads)
-    ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
-    slot%working = 4*bytes/5
-    call require_memory(bytes, error, slot%space%threads)
+    if (.not. allocated(error)) then
+      slot%lattice = lattice
+      slot%extent = [lattice%extent(1), n_own]
+      slot%ranks = together
+      ! the constructors refuse another number
+      if (threads >= 0 .and. threads <= most_threads) then
+        slot%space = space_over(lattice%extent, threads)
+        if (n_own < lattice%extent(2)) slot%space%ranks = together%over(lattice%extent)
+        needed = bytes/slot%space%ranks%size*together%on_node
+        ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
+        slot%working = 4*needed/5
+        call require_memory(needed, error, slot%space%threads)
+      end if
+    end if
+    call together%agree(error)
   end subroutine take_window
 
   !> Create a flexibility operator over a window.
-  subroutine new_operator(method, lattice, bodies, threads, handle, error, shared)
+  subroutine new_operator(method, lattice, bodies, n_own, threads, handle, error)
     integer, intent(in) :: method, threads
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
+    !> Rows of the arrays: all, or those of this rank; then all ranks call this
+    integer, intent(in) :: n_own
     !> Handle of the operator
     integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks that share the operator
     type(error_t), allocatable, intent(out) :: error
-    !> By FFT, on rows that all ranks share; all call this
-    logical, intent(in), optional :: shared
     type(slot_t), pointer :: slot
     type(field_space_t) :: space
     type(dense_flexibility_t), pointer :: dense
@@ -90,12 +104,9 @@ contains
     if (method == fft_based) bytes = fft_setup_memory(lattice%extent, spectra_of(bodies)) &
                                      + fft_memory(lattice%extent, .false., space%threads, spectra_of(bodies), &
                                                   periodic=lattice%is_periodic())
-    if (present(shared)) space%ranks = ranks
-    call take_window(lattice, bytes/space%ranks%size*space%ranks%on_node, threads, slot, handle, error)
+    call take_window(lattice, n_own, n_own < lattice%extent(2), bytes, threads, slot, handle, error)
     if (.not. allocated(error)) call check_operator(lattice, bodies, error, threads)
-    call space%ranks%agree(error)
     if (.not. allocated(error)) then
-      slot%space%ranks = space%ranks
       if (method == fft_based) then
         allocate (fft)
         slot%operator => fft
@@ -110,17 +121,19 @@ contains
   end subroutine new_operator
 
   !> Create a frictionless contact problem.
-  subroutine new_pressed(method, lattice, bodies, gap, candidate, law, threads, handle, error)
-    integer, intent(in) :: method, threads
+  subroutine new_pressed(method, lattice, bodies, gap, candidate, law, options, handle, error)
+    integer, intent(in) :: method
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
-    !> Gap before loading [m]
+    !> Gap before loading (n_col, n_row or own rows) [m]
     real(wp), intent(in) :: gap(:, :)
-    !> Nodes that may come into contact
+    !> Nodes that may come into contact (n_col, n_row or own rows)
     logical, intent(in) :: candidate(:, :)
     class(normal_law_t), intent(in) :: law
+    type(solver_options_t), intent(in) :: options
     !> Handle of the problem
     integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure, on all ranks that share the problem
     type(error_t), allocatable, intent(out) :: error
     type(slot_t), pointer :: slot
     type(field_space_t) :: space
@@ -128,54 +141,24 @@ contains
     type(normal_contact_t), pointer :: fft
     integer(c_int64_t) :: bytes
 
-    space = space_over(lattice%extent, threads)
+    space = space_over(lattice%extent, options%threads)
     bytes = dense_fields*lattice%size()
     if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
-    call take_window(lattice, bytes, threads, slot, handle, error)
+    call take_window(lattice, size(gap, 2), options%shared, bytes, options%threads, slot, handle, error)
     if (.not. allocated(error)) then
       if (method == fft_based) then
         allocate (fft)
-        slot%pressed => fft
-        call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law)
+        slot%solver => fft
+        call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, options%threads, kernel_cache, law=law, &
+                                ranks=slot%space%ranks)
       else
         allocate (dense)
-        slot%pressed => dense
+        slot%solver => dense
         call new_direct_contact(dense, slot%lattice, bodies, gap, candidate, error, law=law)
       end if
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_pressed
-
-  !> Create a frictionless contact problem whose rows all ranks share; all call this.
-  subroutine new_pressed_part(lattice, bodies, gap, candidate, law, threads, handle, error)
-    integer, intent(in) :: threads
-    type(lattice_t), intent(in) :: lattice
-    class(elastic_medium_t), intent(in) :: bodies
-    !> Own rows of the gap before loading [m]
-    real(wp), intent(in) :: gap(:, :)
-    !> Nodes of them that may come into contact
-    logical, intent(in) :: candidate(:, :)
-    class(normal_law_t), intent(in) :: law
-    !> Handle of the problem
-    integer(c_int64_t), intent(out) :: handle
-    !> Allocated on failure, on all ranks
-    type(error_t), allocatable, intent(out) :: error
-    type(slot_t), pointer :: slot
-    type(field_space_t) :: space
-    type(normal_contact_t), pointer :: fft
-    integer(c_int64_t) :: bytes
-
-    space = space_over(lattice%extent, threads)
-    bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
-    call take_window(lattice, bytes/ranks%size*ranks%on_node, threads, slot, handle, error)
-    call ranks%agree(error)
-    if (.not. allocated(error)) then
-      allocate (fft)
-      slot%pressed => fft
-      call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, threads, kernel_cache, law=law, ranks=ranks)
-    end if
-    if (allocated(error)) call free_object(handle)
-  end subroutine new_pressed_part
 
   !> Create a contact problem with friction.
   subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, options, handle, error)
@@ -188,7 +171,7 @@ contains
     logical, intent(in) :: candidate(:, :)
     class(friction_law_t), intent(in) :: friction
     class(normal_law_t), intent(in) :: law
-    type(sheared_options_t), intent(in) :: options
+    type(solver_options_t), intent(in) :: options
     !> Handle of the problem
     integer(c_int64_t), intent(out) :: handle
     !> Allocated on failure, on all ranks that share the problem
@@ -198,36 +181,32 @@ contains
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
     type(field_space_t) :: space
-    type(communicator_t) :: together
     integer(c_int64_t) :: bytes
 
-    if (options%shared) together = ranks
     space = space_over(lattice%extent, options%threads)
-    if (size(gap, 2) < lattice%extent(2)) space%ranks = together%over(lattice%extent)
     bytes = dense_fields*lattice%size()
     ! of the largest contact there can be, with all loads prescribed
     if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. options%goodman, &
                                                               space%threads, spectra_of(bodies), lattice%is_periodic())
-    call take_window(lattice, bytes/space%ranks%size*together%on_node, options%threads, slot, handle, error)
-    call together%agree(error)
-    if (.not. allocated(error)) call new_friction_problem(problem, lattice, bodies, gap, candidate, friction, options%goodman, &
-                                                          error, law, space)
-    call together%agree(error)
+    call take_window(lattice, size(gap, 2), options%shared, bytes, options%threads, slot, handle, error)
     if (.not. allocated(error)) then
-      slot%ranks = together
-      slot%space%ranks = space%ranks
-      slot%extent = shape(gap)
+      space%ranks = slot%space%ranks
+      call new_friction_problem(problem, lattice, bodies, gap, candidate, friction, options%goodman, error, law, space)
+      call slot%ranks%agree(error)
+    end if
+    if (.not. allocated(error)) then
       if (method == fft_based) then
         allocate (fft)
         slot%sheared => fft
-        call new_windowed_friction(fft, problem, error, options%threads, kernel_cache, together)
-        call together%agree(error)
+        call new_windowed_friction(fft, problem, error, options%threads, kernel_cache, slot%ranks)
+        call slot%ranks%agree(error)
       else
         allocate (dense)
         slot%sheared => dense
         problem%options%direct%as_written = method == as_written
         call new_direct_friction(dense, problem, error)
       end if
+      slot%solver => slot%sheared
     end if
     if (allocated(error)) call free_object(handle)
   end subroutine new_sheared

@@ -19,8 +19,9 @@ becomes a Fortran procedure, whose arguments f2py can wrap and of which it count
 and a Python function `mindlin_traction(spheres, r, load)` with this sentence and these units as docstring.
 
 An argument is `kind name(shape) [unit] = default`. The kind is real (if left out), int, long, single, flag
-(with a shape a mask), text, a record of [records], or one of [kinds]: an object of several flat arguments.
-The default of a number of a record is its component in Fortran, if this has another name.
+(with a shape a mask), text, a record of [records], or an object: of several flat arguments ([kinds]), or
+behind a handle ([objects]). The default of a number of a record is its component in Fortran, if this has
+another name.
 Python has the axes of Fortran in reverse order; `*` stands for points of any shape. An array that is taken
 and given changes in place; a record that is given under the name of an object is read from it. A procedure
 with an `error` ends with a status, which becomes an exception. `gil = true` holds the interpreter's lock.
@@ -72,6 +73,20 @@ def kind_of(name: str, record: dict[str, str]) -> dict[str, Any]:
         "local": f"type({record['type']}) :: {{0}}",
         "set": "\n".join(made),
         "found": f"{{0}}_found = [{', '.join(kind[1].format(place) for kind, place, _ in numbers)}]",
+    }
+
+
+def object_of(name: str, where: str) -> dict[str, Any]:
+    """Return an object behind a handle as a kind, by its class and its pointer in a slot."""
+    kind, pointer = where.split()
+    return {
+        "flat": "long handle",
+        "counts": "n_col={0}.own.n_col, n_row={0}.own.n_row",
+        "python": "{0}._handle",
+        "local": f"type(slot_t), pointer :: {{0}}_slot\nclass({kind}), pointer :: {{0}}",
+        "set": f"call enter({{0}}_handle, '{name}', [n_col, n_row], {{0}}_slot, error)\n"
+        f"if (.not. allocated(error)) {{0}} => {{0}}_slot%{pointer}",
+        "after": "call leave({0}_slot)",
     }
 
 
@@ -180,6 +195,7 @@ def main(source: str, fortran: str, python: str, built: str = "") -> None:
     """Write both files; the one of Python keeps what the core was built with."""
     table = tomllib.loads(Path(source).read_text())
     kinds = table["kinds"] | {name: kind_of(name, record) for name, record in table["records"].items()}
+    kinds |= {name: object_of(name, where) for name, where in table["objects"].items()}
     rows = [Procedure(name, row, kinds) for name, row in table["procedures"].items()]
     text = ["module hc_flat\n  use iso_c_binding, only: c_double, c_float, c_int, c_int64_t"]
     text += [listed(f"  use {module}, only: {names}") for module, names in table["use"].items()]

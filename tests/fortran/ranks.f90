@@ -148,7 +148,7 @@ contains
     call check_true(error, all(mask .eqv. field(:, first:last) > 50.0_wp), 'rows of a mask')
   end subroutine test_rows
 
-  !> The first rank tells each other rank some words, which gives them back.
+  !> The first rank sends each other rank some words, which sends them back.
   subroutine test_words(error)
     type(error_t), allocatable, intent(out) :: error
     integer(int32) :: words(3)
@@ -156,15 +156,15 @@ contains
 
     do r = 1, ranks%size - 1
       if (ranks%rank == 0) then
-        call ranks%tell([1_int32, 2_int32, int(r, int32)], r)
-        call ranks%take(words, r)
+        call ranks%send_words([1_int32, 2_int32, int(r, int32)], r)
+        call ranks%receive_words(words, r)
         call check_true(error, all(words == [2, 4, 2*r]), 'words')
         if (allocated(error)) return
       else if (ranks%rank == r) then
         call ranks%wait_for_words(n)
         call check_true(error, n == 3, 'number of words')
-        call ranks%hear(words)
-        call ranks%give(2*words)
+        call ranks%receive_words(words, 0)
+        call ranks%send_words(2*words, 0)
         if (allocated(error)) return
       end if
     end do

@@ -154,6 +154,7 @@ SHEARED = DECK.replace("nodes_in_radius = 4", "nodes_in_radius = 20\nwindow = [2
     '[[load]]\ntangential_load_x = "2 N"\nsteps = 2\n[solver]\ntolerance = 1e-12\n'
 )
 ALIKE = SHEARED.replace('"72 GPa"', '"432 GPa"')
+ENTERED = SHEARED + 'entry = "interpolated"\n'
 LARGE = SHEARED.replace("in_radius = 20", "in_radius = 95")  # no smaller window is solved first
 TWISTED = LARGE.replace("steps = 2\n[solver]", 'torque = "5e-6 N m"\n[solver]')
 ADAPTIVE = SHEARED.replace("steps = 2\n[[load]]", "[[load]]").replace("steps = 2", 'steps = "auto"') + (
@@ -338,6 +339,29 @@ PlaneField.over = failing
 
 
 @with_mpi
+def test_a_step_that_does_not_converge_ends_as_in_one_process(tmp_path: Path) -> None:
+    (tmp_path / "sphere.toml").write_text(PRESSED)
+    (tmp_path / "sitecustomize.py").write_text(FEW)
+    said = []
+    for ranks in (1, 2):
+        process = launched(tmp_path, ranks, "run", "sphere.toml", "--overwrite", path=tmp_path)
+        out, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 3, out + err
+        said.append([line for line in err.splitlines() if line.startswith("hexcontact: ")])
+    assert said[0] == said[1]
+    assert "worst is R_n" in said[0][1]
+    assert "1 of 2 load steps are finished" in said[0][-1]
+
+
+# The second load step ends after one iteration on each lattice.
+FEW = """
+from hexcontact.core import flat
+press = flat.press
+flat.press = lambda *given: press(*given[:-1], given[-1] if given[2] < 15.0 else 1)
+"""
+
+
+@with_mpi
 def test_a_full_disk_between_two_ranks_ends_all(tmp_path: Path) -> None:
     (tmp_path / "sphere.toml").write_text(PRESSED)
     (tmp_path / "sitecustomize.py").write_text(FULL)
@@ -361,7 +385,7 @@ ranks.ask = asked
 
 
 @with_mpi
-@pytest.mark.parametrize("deck", [PRESSED, SHEARED], ids=["pressed", "sheared"])
+@pytest.mark.parametrize("deck", [PRESSED, SHEARED, ENTERED], ids=["pressed", "sheared", "entered"])
 def test_fields_of_bodies_are_those_of_one_process(deck: str, tmp_path: Path) -> None:
     fields = '[output]\nfields = ["pressure", "displacement_1_z", "displacement_2_y"]\n'
     (tmp_path / "sphere.toml").write_text(deck + fields)

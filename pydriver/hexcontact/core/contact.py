@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -199,12 +199,20 @@ class FlexibilityOperator(Handle):
     """Operator from tractions on the lattice to relative surface displacements.
 
     The method is ``"fft"`` for convolutions, or ``"direct"`` for an explicit matrix; with 0 threads it takes
-    the default of OpenMP.
+    the default of OpenMP; ``own`` as of `NormalContact`.
     """
 
-    def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
-        self.lattice = lattice
-        self._create(flat.create_operator, method_code(method), lattice, pair, *checked(threads=threads))
+    def __init__(
+        self,
+        lattice: Lattice,
+        pair: ElasticPair,
+        method: Method = "fft",
+        threads: int = 0,
+        own: Lattice | None = None,
+    ) -> None:
+        self.lattice, self.own = lattice, lattice if own is None else own
+        given = method_code(method), lattice, pair, self.own.n_row
+        self._create(flat.create_operator, *given, *checked(threads=threads))
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
@@ -214,14 +222,38 @@ class FlexibilityOperator(Handle):
         Tractions on body 1 (Pa) have the shape ``(n_row, n_col)``, and so have the results; an absent one is
         zero.
         """
-        zero = np.zeros(self.lattice.shape)
+        zero = np.zeros(self.own.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
         tractions = [
-            checked_field(zero if value is None else value, self.lattice, name)
-            for name, value in named.items()
+            checked_field(zero if value is None else value, self.own, name) for name, value in named.items()
         ]
         w, s_x, s_y = flat.apply_operator(self, tractions)
         return w, s_x, s_y
+
+    def displacement(self, state: NormalSolution, body: int, goodman: bool) -> Displacement:
+        """Return the displacement of a body by the tractions of a state, if this is its operator.
+
+        Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z. In
+        Goodman's approximation shear does not move the surfaces along z.
+        """
+        shear = [getattr(state, f"traction_{axis}", None) for axis in "xy"]
+        z, x, y = self.apply(state.pressure, *shear)
+        if goodman and shear[0] is not None:
+            z = self.apply(state.pressure)[0]
+        sign = 1.0 if body == 1 else -1.0
+        return Displacement(sign * x, sign * y, z)
+
+
+class Displacement(NamedTuple):
+    """Displacement of the surface of a body (m), z into the body."""
+
+    x: Array
+    y: Array
+    z: Array
+
+    def parts(self) -> tuple[dict[str, Array], dict[str, Any]]:
+        """Return fields and numbers."""
+        return self._asdict(), {}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -241,8 +273,13 @@ class NormalSolution(Solved):
     operator_applications: float = 0.0
     stopped: str = ""
 
+    def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return fields and numbers."""
+        fields = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return fields, {name: value for name, value in vars(self).items() if name not in fields}
+
     def as_start(self) -> NormalSolution | None:
-        """Return what the next load step starts from."""
+        """Return the start of the next load step: none, since that depends on its load alone."""
         return None
 
 
@@ -272,6 +309,10 @@ class Contact(Handle):
         gap = _finite(gap if self._mask.all() else np.where(self._mask, gap, 0.0), "initial_gap")
         # for the core, which keeps the only copy of the gap
         self._surfaces: tuple[Any, ...] = lattice, pair, gap, self._mask
+
+    initial_gap: Any = property(
+        flat.gap_of_problem, doc="Gap before loading and without wear (m), 0 where the bodies cannot touch."
+    )
 
     def called(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
         """Return the results of a procedure of the core that uses spectra of kernels."""
@@ -322,6 +363,9 @@ class NormalContact(Contact):
     rim_warning
         Warn (`hexcontact.RimWarning`) of a solution with contact at the rim of the window, unless all
         nodes touch that can and others cannot: the body ends there, like a punch.
+    own
+        Nodes of the arrays, of a problem that all ranks share and whose methods they call together: the rows
+        of this rank, or the lattice itself.
     """
 
     def __init__(
@@ -335,10 +379,11 @@ class NormalContact(Contact):
         *,
         rim_warning: bool = True,
         interface: Interface = UNILATERAL,
+        own: Lattice | None = None,
     ) -> None:
-        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
-        given = *self._surfaces, *checked(interface=interface, threads=threads)
-        del self._surfaces
+        super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
+        springs, count = checked(interface=interface, threads=threads)
+        given = *vars(self).pop("_surfaces"), springs, own is not None, count
         self._create(flat.create_pressed, method_code(method), *given)
 
     def solve(
@@ -363,10 +408,6 @@ class NormalContact(Contact):
         solution.gap[~self._mask] += self._beyond
         self._warn_of_rim(solution)
         return solution
-
-    initial_gap: Any = property(
-        flat.gap_of_pressed, doc="Gap before loading (m), 0 where the bodies cannot touch."
-    )
 
 
 def rough_pressure(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
-from . import flat, ranks
+from . import flat
 from .calls import checked, numbers
 from .contact import (
     UNILATERAL,
@@ -173,13 +172,8 @@ class ContactState(NormalSolution):
     # a field of the table of variables needs no line above
     __annotations__ = dict.fromkeys(_FIELDS, "Array") | __annotations__
 
-    def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
-        """Return fields and numbers."""
-        fields = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return fields, {name: value for name, value in vars(self).items() if name not in fields}
-
     def as_start(self) -> ContactState:
-        """Return what the next load step starts from: the state without the slip of the last one."""
+        """Return the start of the next load step: the state without the slip of the last one."""
         none = np.broadcast_to(0.0, self.pressure.shape)
         return dataclasses.replace(self, slip_increment_x=none, slip_increment_y=none).behind(self.known)
 
@@ -189,7 +183,7 @@ class FrictionalContact(Contact):
 
     Parameters
     ----------
-    lattice, pair, initial_gap, candidate, method, threads, interface, rim_warning
+    lattice, pair, initial_gap, candidate, method, threads, interface, rim_warning, own
         As of `NormalContact`.
     friction_coefficient
         Coefficient of friction mu, at least 0; ``inf``: no slip; or one for each node, ``(n_row, n_col)``;
@@ -200,9 +194,6 @@ class FrictionalContact(Contact):
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     iteration
         Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
-    own
-        Nodes of the arrays, of a problem that all ranks share and whose methods they call together: the rows
-        of this rank, or the lattice itself.
     """
 
     def __init__(
@@ -222,24 +213,11 @@ class FrictionalContact(Contact):
         rim_warning: bool = True,
         own: Lattice | None = None,
     ) -> None:
-        with contextlib.nullcontext() if own is None else ranks.agreed():
-            super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
-            law = _checked_law(friction_coefficient, shear_limit, self.own)
-            _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
-        given = (
-            *self._surfaces,
-            law.at_nodes(self.own),
-            springs,
-            coupling == "goodman",
-            own is not None,
-            count,
-        )
-        del self._surfaces
+        super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
+        law = _checked_law(friction_coefficient, shear_limit, self.own).at_nodes(self.own)
+        _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
+        given = *vars(self).pop("_surfaces"), law, springs, own is not None, count, coupling == "goodman"
         self._create(flat.create_sheared, method_code(method, iteration), *given)
-
-    initial_gap: Any = property(
-        flat.gap_of_sheared, doc="Gap before loading and without wear (m), 0 where the bodies cannot touch."
-    )
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""

@@ -114,7 +114,7 @@ def others(procedure: Callable[..., Any], *arguments: Any) -> None:
         freed = [_forgotten.pop() for _ in range(len(_forgotten))]
         words = _words(procedure, arguments, freed, False)
         for other in range(1, count):
-            flat.tell_words(words, other)
+            flat.send_words(words, other)
 
 
 def order(procedure: Callable[..., Any], *arguments: Any) -> Any:
@@ -134,15 +134,15 @@ def give(other: int, procedure: Callable[..., Any], *arguments: Any) -> None:
     if other == rank:
         procedure(*arguments)
     else:
-        flat.tell_words(_words(procedure, arguments, (), False), other)
+        flat.send_words(_words(procedure, arguments, (), False), other)
 
 
 def ask(other: int, procedure: Callable[..., Array], *arguments: Any, shape: tuple[int, int]) -> Array:
     """Return the array that a procedure returns on a rank."""
     if other == rank:
         return procedure(*arguments)
-    flat.tell_words(_words(procedure, arguments, (), True), other)
-    words = flat.take_words(other, 2 * shape[0] * shape[1])
+    flat.send_words(_words(procedure, arguments, (), True), other)
+    words = flat.receive_words(other, 2 * shape[0] * shape[1])
     return np.asarray(words).view(np.float64).reshape(shape)
 
 
@@ -164,15 +164,9 @@ def least(value: float) -> float:
     return float(flat.least_of_ranks(value))
 
 
-def span(lattice: Lattice, of: int) -> tuple[int, int]:
-    """Return the first row of a rank, from 0 on, and the row after its last one."""
-    first, after = flat.rows_of_rank(of, lattice.n_row)
-    return int(first), int(after)
-
-
 def rows(lattice: Lattice, of: int | None = None) -> Lattice:
     """Return the window of the rows of a rank, by default this one."""
-    first, after = span(lattice, rank if of is None else of)
+    first, after = map(int, flat.rows_of_rank(rank if of is None else of, lattice.n_row))
     return replace(lattice, row_first=lattice.row_first + first, n_row=after - first)
 
 
@@ -195,13 +189,15 @@ def _serve() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
         signal.signal(number, signal.SIG_IGN)  # the first rank keeps its last step, and ends all
     while True:
-        procedure, arguments, freed, answers = pickle.loads(flat.hear_words(flat.next_words()).tobytes())
+        procedure, arguments, freed, answers = pickle.loads(
+            flat.receive_words(0, flat.wait_for_words()).tobytes()
+        )
         if procedure is _end:
             break
         for number in freed:
             held.pop(number, None)
         if answers:
-            flat.give_words(np.ascontiguousarray(procedure(*arguments)).view(np.int32).ravel())
+            flat.send_words(np.ascontiguousarray(procedure(*arguments)).view(np.int32).ravel(), 0)
             continue
         with contextlib.suppress(HexcontactError):
             procedure(*arguments)

@@ -1,140 +1,64 @@
-"""Frictionless contact whose rows all ranks share: each has those of the gap and of the solution."""
+"""Contact that all ranks share: each has its rows of the gap and of the states.
+
+A window that is too small for that, and a problem whose nodes depend on all others, is on each rank as a
+whole; then the ranks share the transforms of the products alone. All ranks call the methods of its objects
+together, in the order of the first one.
+"""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Banded, Mask
-from . import flat, kernel_cache, ranks
-from .calls import checked
-from .contact import STOPPED, ElasticPair, Interface, NormalSolution
-from .handles import Handle, HeldState
+from ..arrays import Array, Banded
+from ..variables import WORN
+from . import ranks
+from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
+from .friction import FrictionalContact
 from .lattice import Lattice
+from .measures import is_unbounded, measures
+from .steps import AHEAD
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
+_STATES = NormalSolution, Displacement
 
 
-class Field(Protocol):
-    """A quantity over the plane."""
+class Layout(NamedTuple):
+    """How ranks share the arrays of a window: each has its rows, or all have all of them."""
 
-    def over(self, lattice: Lattice) -> Array:
-        """Return the values at the nodes of a window."""
-        ...
+    lattice: Lattice
+    by_rows: bool
 
-    def share(self, touching: Mask, lattice: Lattice) -> Array:
-        """Return the part of a cell that each node bears at ends of surfaces."""
-        ...
+    def nodes(self, rank: int | None = None) -> Lattice:
+        """Return the nodes of the arrays of a rank, by default this one."""
+        return ranks.rows(self.lattice, rank) if self.by_rows else self.lattice
 
+    def parts(self) -> Iterator[tuple[int, tuple[int, int]]]:
+        """Yield the ranks that together have all rows, each with the shape of its fields."""
+        for rank in range(ranks.count if self.by_rows else 1):
+            yield rank, self.nodes(rank).shape
 
-class Part(Handle):
-    """The rows of this rank of a contact."""
-
-    def __init__(
-        self, gap: Field, lattice: Lattice, pair: ElasticPair, interface: Interface, threads: int
-    ) -> None:
-        self.lattice, self.own = lattice, ranks.rows(lattice)
-        with ranks.agreed():
-            values = gap.over(self.own)
-            self.touching: Mask = np.isfinite(values)
-            self.gap, self.share = np.where(self.touching, values, 0.0), gap.share
-        self._create(flat.create_pressed_part, lattice, pair, self.gap, self.touching, interface, threads)
-
-    def rows(self, values: NDArray[Any]) -> Array:
-        """Return values of own rows, NaN where the bodies cannot touch."""
-        return np.where(self.touching, values, np.nan)
-
-
-class OperatorPart(Handle):
-    """The rows of this rank of a flexibility operator."""
-
-    def __init__(self, lattice: Lattice, pair: ElasticPair, threads: int) -> None:
-        self.lattice = lattice
-        self._create(flat.create_operator_part, lattice, pair, threads)
-
-
-def _create(number: int, *arguments: Any) -> None:
-    """Set up the part of this rank of a contact."""
-    ranks.held[number] = Part(*arguments)
-
-
-def _press(number: int, solution: int, *arguments: Any) -> Any:
-    """Solve a load step; hold own rows, and return the numbers of the solution."""
-    part = ranks.held[number]
-    try:
-        found = HeldState(flat.press_part(part, *arguments), part.own.shape)
-    finally:
-        kernel_cache.warn_of_faults()
-    ranks.held[solution] = found
-    return flat.numbers_of_state(found)
-
-
-def _measure(number: int, solution: int) -> tuple[Any, bool]:
-    """Return the measures of a solution, and whether its pressure rises to an end of the surface."""
-    part = ranks.held[number]
-    share = part.share(part.touching, part.own)
-    found: tuple[Any, bool] = flat.measure_part(
-        part.lattice, part.gap, part.touching, share, ranks.held[solution]
-    )
-    return found
-
-
-def _grown(number: int, solution: int) -> Lattice:
-    """Return a window that grows with the contact of a solution."""
-    larger: Lattice = ranks.held[number].lattice.grown(ranks.held[solution].view("zone") > 0)
-    return larger
-
-
-def _prepare(number: int, *arguments: Any) -> None:
-    """Set up the part of this rank of an operator."""
-    ranks.held[number] = OperatorPart(*arguments)
-
-
-def _displace(number: int, solution: int, displaced: int, goodman: bool) -> None:
-    """Hold own rows of the displacements by the tractions of a solution."""
-    operator, found = ranks.held[number], ranks.held[solution]
-    state, shear = found.held, [np.zeros(found.held.shape)] * 2
-    alone = [state.view("pressure"), *shear]
-    sheared = hasattr(found, "traction_x")
-    if sheared:
-        shear = [found.traction_x, found.traction_y]
-    z, x, y = flat.apply_operator_part(operator, [alone[0], *shear])
-    if goodman and sheared:
-        z = flat.apply_operator_part(operator, alone)[0]
-    ranks.held[displaced] = z, x, y
-
-
-def _rows(number: int, solution: int, name: str) -> Array:
-    """Return own rows of a field as real numbers."""
-    part, found = ranks.held[number], ranks.held[solution]
-    if name == "initial_gap":
-        return part.rows(part.gap)
-    values = found.view(name)
-    return part.rows(values) if name == "gap" else values.astype(float, copy=False)
-
-
-def _displaced_rows(displaced: int, place: int) -> Array:
-    """Return own rows of a displacement: along z, x or y."""
-    return np.asarray(ranks.held[displaced][place])
-
-
-class Shared(Protocol):
-    """A window that all ranks share."""
-
-    def parts(self) -> list[tuple[int, tuple[int, int]]]:
-        """Return the ranks that together have all rows, each with the shape of its fields."""
-        ...
+    def given(self, fields: Mapping[str, NDArray[Any]]) -> _Held:
+        """Give each rank its rows of fields; return them as the argument of an order."""
+        number = ranks.new_number()
+        for name, values in fields.items():
+            for rank in range(ranks.count):
+                nodes = self.nodes(rank)
+                first = nodes.row_first - self.lattice.row_first
+                rows = np.asarray(values)[..., first : first + nodes.n_row, :]
+                ranks.give(rank, _take, number, name, rows.copy())
+        return _Held(number, given=True)
 
 
 class SharedFields(Banded):
     """Fields over a window, whose bands are the rows of each rank."""
 
-    def __init__(self, layout: Shared, fields: Mapping[str, Rows]) -> None:
+    def __init__(self, layout: Layout, fields: Mapping[str, Rows]) -> None:
         super().__init__(fields)
         self.layout, self.taken = layout, fields
 
@@ -157,85 +81,245 @@ def rigid(rank: int, shape: tuple[int, int]) -> Array:
     return np.zeros(shape)
 
 
-class Displacement:
-    """Displacements by the tractions of a solution, whose fields lie on all ranks.
-
-    In Goodman's approximation shear tractions do not move the surfaces along z.
-    """
-
-    def __init__(self, solution: Any, operator: SharedOperator, goodman: bool = False) -> None:
-        self.number, self.sign = ranks.numbered(self), operator.sign
-        ranks.order(_displace, operator.number, solution.number, self.number, goodman)
-
-    def rows(self, axis: str) -> Rows:
-        """Return the rows of a component."""
-
-        def taken(rank: int, shape: tuple[int, int]) -> Array:
-            place = "zxy".index(axis)
-            found = ranks.ask(rank, _displaced_rows, self.number, place, shape=shape)
-            return self.sign * found if place else found
-
-        return taken
+def gap_in_rows(field: Any, layout: Layout) -> Rows:
+    """Return the rows of a gap over a window, which each rank evaluates."""
+    return lambda rank, shape: ranks.ask(rank, _over, field, layout.nodes(rank), shape=shape)
 
 
-class SharedOperator:
-    """Flexibility operator of one body, whose rows all ranks share; `sign` is that of its displacements."""
-
-    def __init__(self, lattice: Lattice, pair: ElasticPair, sign: float) -> None:
-        self.number, self.sign = ranks.numbered(self), sign
-        ranks.order(_prepare, self.number, replace(lattice), pair, 0)
+def _over(field: Any, lattice: Lattice) -> Array:
+    """Return a gap in some rows, NaN where nothing can touch."""
+    values = field.over(lattice)
+    return np.where(np.isfinite(values), values, np.nan)
 
 
-class SharedSolution:
-    """A solution whose fields lie on all ranks; numbers as of `NormalSolution`."""
+# --- the part of this rank ----------------------------------------------------------------------------------
 
-    touches_rim: bool
+
+class _Part(Contact):
+    """The part of this rank of a contact, its rows or all, from gap and friction as fields over the plane."""
+
+    def __init__(self, layout: Layout, gap: Any, **given: Any) -> None:
+        own = layout.nodes()
+        with ranks.agreed():
+            values = _over(gap, own)
+            if "friction_coefficient" in given:
+                self.law = given["friction_coefficient"] = given["friction_coefficient"].over(own)
+            given |= {"candidate": np.isfinite(values), "rim_warning": False, "own": own}
+            super().__init__(layout.lattice, initial_gap=values, **given)
+        self.share = gap.share
+        # all ranks have come this far
+        super()._create(*vars(self).pop("_arguments"))
+
+    def _create(self, *arguments: Any) -> None:
+        self._arguments = arguments
+
+    def measured(self, state: NormalSolution) -> tuple[dict[str, float], bool]:
+        """Return the measures of a state, and whether its pressure rises to an end of the surface."""
+        share = self.share(self._mask, self.own)
+        return measures(self, state), bool(is_unbounded(share, state.pressure, self.lattice.n_row))
+
+    def grown(self, state: NormalSolution) -> Lattice:
+        """Return a window that grows with the contact of a state."""
+        return self.lattice.grown(state.zone > 0)
+
+    def gap_rows(self) -> Array:
+        """Return own rows of the gap before loading, NaN where the bodies cannot touch."""
+        return np.where(self._mask, self.initial_gap, np.nan)
+
+    def friction_rows(self) -> Array:
+        """Return own rows of the coefficient of friction."""
+        assert self.law.limits is not None
+        return np.broadcast_to(self.law.limits[0], self.own.shape)
+
+
+class NormalPart(_Part, NormalContact):
+    """The part of this rank of a contact without friction."""
+
+
+class FrictionPart(_Part, FrictionalContact):
+    """The part of this rank of a contact with friction."""
+
+
+def operator_part(layout: Layout, pair: ElasticPair) -> FlexibilityOperator:
+    """Return the part of this rank of an operator."""
+    return FlexibilityOperator(layout.lattice, pair, own=layout.nodes())
+
+
+class _Held(NamedTuple):
+    """An object of this rank among the arguments of an order; or fields, or one, that it was given."""
+
+    number: int
+    given: bool = False
+
+    def here(self) -> Any:
+        """Return the object."""
+        if not self.given:
+            return ranks.held[self.number]
+        found = ranks.held.pop(self.number)
+        return found.get("", found)
+
+
+def _take(number: int, name: str, values: NDArray[Any]) -> None:
+    """Take own rows of a field."""
+    ranks.held.setdefault(number, {})[name] = values
+
+
+def _create(number: int, kind: Callable[..., Any], arguments: Sequence[Any], named: dict[str, Any]) -> None:
+    """Set up the part of this rank of an object."""
+    with ranks.agreed():
+        ranks.held[number] = kind(*_here(arguments), **named)
+
+
+def _call(
+    number: int, name: str, ends: Sequence[int], arguments: Sequence[Any], named: dict[str, Any]
+) -> Any:
+    """Call a method of an object; hold the states and displacements that it returns."""
+    with ranks.agreed():
+        found = getattr(ranks.held[number], name)(*_here(arguments), **named)
+    ranks.held.update(zip(ends, (each for each in _each(found) if isinstance(each, _STATES)), strict=False))
+    return found
+
+
+def _here(arguments: Sequence[Any]) -> list[Any]:
+    """Return arguments with the objects of this rank."""
+    return [each.here() if isinstance(each, _Held) else each for each in arguments]
+
+
+def _each(found: Any) -> tuple[Any, ...]:
+    """Return the results of a procedure."""
+    return found if type(found) is tuple else (found,)
+
+
+def _rows(number: int, name: str) -> Array:
+    """Return own rows of a field of a state, or the result of a method."""
+    found = getattr(ranks.held[number], name)
+    return np.asarray(found() if callable(found) else found).astype(float, copy=False)
+
+
+# --- on the first rank --------------------------------------------------------------------------------------
+
+
+class _Shared:
+    """An object of which each rank has a part; `layout` is that of its arrays."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout, self.number = layout, ranks.numbered(self)
+
+    def call(self, name: str, *arguments: Any, **named: Any) -> Any:
+        """Call a method on all ranks; return its result, with states on a window as shared ones."""
+        window = next((each.layout for each in arguments if isinstance(each, SharedObject)), self.layout)
+        ends = [SharedState(window), SharedState(window)]
+        given = [end.number for end in ends], [*map(self._sent, arguments)]
+        found = ranks.order(_call, self.number, name, *given, named)
+        several = tuple(
+            ends.pop(0).known(each) if isinstance(each, _STATES) else each for each in _each(found)
+        )
+        return several if type(found) is tuple else several[0]
+
+    def _sent(self, value: Any) -> Any:
+        """Return an argument as it is sent to other ranks: fields over the window by rows."""
+        if isinstance(value, _Shared):
+            return _Held(value.number)
+        if isinstance(value, np.ndarray) and value.shape[-2:] == self.layout.lattice.shape:
+            return self.layout.given({"": value})
+        if isinstance(value, Mapping) and any(np.ndim(field) for field in value.values()):
+            return self.layout.given(value)
+        return value
+
+    def rows(self, name: str) -> Rows:
+        """Return the rows of a field, or of the result of a method."""
+        return self.asked(_rows, name)
+
+    def asked(self, procedure: Callable[..., Array], *arguments: Any) -> Rows:
+        """Return the rows that a procedure returns on each rank; they keep the object."""
+        return lambda rank, shape: ranks.ask(rank, procedure, self.number, *arguments, shape=shape)
+
+
+class SharedObject(_Shared):
+    """An object that all ranks share; its methods are those of its parts."""
+
+    def __init__(self, layout: Layout, kind: Callable[..., Any], *arguments: Any, **named: Any) -> None:
+        super().__init__(layout)
+        ranks.order(_create, self.number, kind, [*map(self._sent, arguments)], named)
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Return a method that all ranks call."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return functools.partial(self.call, name)
+
+
+class SharedState(_Shared):
+    """A state whose fields lie on all ranks; numbers as of `NormalSolution` or `ContactState`."""
+
     converged: bool
+    touches_rim: bool
     sweeps: int
     normal_load: float
 
-    def __init__(self, contact: SharedContact) -> None:
-        self.contact, self.number = contact, ranks.numbered(self)
+    def known(self, state: Any) -> SharedState:
+        """Return the state with its numbers, from its rows on this rank."""
+        fields, self._numbers = state.parts()
+        self._kind, self._fields = type(state), [*fields]
+        vars(self).update(self._numbers)
+        return self
 
-    def rows(self, name: str) -> Rows:
-        """Return the rows of a field."""
-        return lambda rank, shape: ranks.ask(rank, _rows, self.contact.number, self.number, name, shape=shape)
+    def parts(self) -> tuple[Mapping[str, NDArray[Any]], dict[str, Any]]:
+        """Return fields, each of which is taken from the ranks at its use, and numbers."""
+        return SharedFields(self.layout, {name: self.rows(name) for name in self._fields}), self._numbers
 
-    def measures(self) -> tuple[Any, bool]:
-        """Return its measures, and whether the pressure rises to an end of the surface."""
-        found: tuple[Any, bool] = ranks.order(_measure, self.contact.number, self.number)
-        return found
+    def as_start(self) -> SharedState | None:
+        """Return the start of the next load step, as of the state of one rank."""
+        start: SharedState | None = self.call("as_start")
+        return start
 
-    def grown(self) -> Lattice:
-        """Return a larger window for a contact that reaches the rim."""
-        larger: Lattice = ranks.order(_grown, self.contact.number, self.number)
-        return larger
-
-    def as_start(self) -> None:
-        """Return what the next load step starts from."""
+    def gathered(self) -> Any:
+        """Return the state with its fields on this rank."""
+        fields, numbers = self.parts()
+        return self._kind(**{**fields, **numbers})
 
 
-class SharedContact:
-    """A frictionless contact whose rows all ranks share; they evaluate the gap at their own nodes."""
+class Later:
+    """An array that is taken from the ranks when it is used."""
 
-    def __init__(
-        self, lattice: Lattice, pair: ElasticPair, gap: Field, interface: Interface, threads: int = 0
-    ) -> None:
-        # without arrays that the lattice keeps
-        self.lattice, self.number = replace(lattice), ranks.numbered(self)
-        given = checked(interface=interface, threads=threads)
-        ranks.order(_create, self.number, gap, self.lattice, pair, *given)
+    def __init__(self, shape: tuple[int, ...], dtype: str, made: Callable[[], NDArray[Any]]) -> None:
+        self.shape, self.dtype, self.made = shape, np.dtype(dtype), made
 
-    def parts(self) -> list[tuple[int, tuple[int, int]]]:
-        """Return the ranks, each with the shape of its fields."""
-        return [(rank, ranks.rows(self.lattice, rank).shape) for rank in range(ranks.count)]
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.asarray(self.made(), dtype)
 
-    def solve(self, control: int, value: float, *, tolerance: float, max_sweeps: int = 200) -> SharedSolution:
-        """Solve for a normal load (control 1, N) or an approach (2, m), as `NormalContact.solve`."""
-        solution = SharedSolution(self)
-        given = control, value, *checked(tolerance=tolerance, max_sweeps=max_sweeps)
-        numbers = ranks.order(_press, self.number, solution.number, *given)
-        found = numbers._asdict() | {"stopped": STOPPED[numbers.stopped]}
-        known = {field.name for field in fields(NormalSolution)}
-        vars(solution).update({name: value for name, value in found.items() if name in known})
-        return solution
+
+class SharedCycles(SharedObject):
+    """Cycles of wear of a contact that all ranks share; other methods as of `CyclesOfWear`."""
+
+    def fields(self, contact: SharedObject) -> SharedFields:
+        """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
+        taken = {name: self.asked(_worn_rows, contact.number, name) for name in (*WORN, AHEAD)}
+        return SharedFields(contact.layout, taken)
+
+    def end(self, place: int, contact: SharedObject) -> tuple[float, Array, Any]:
+        """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
+        cycles, motions, _ = ranks.held[self.number].end(place, ranks.held[contact.number])
+
+        shape = 2, 3, *contact.layout.lattice.shape
+
+        def tractions() -> Array:
+            found = np.empty((6, *shape[2:]), np.float32)
+            for component, values in enumerate(found):
+                taken = self.asked(_end_rows, contact.number, place, component)
+                values[:] = SharedFields(contact.layout, {"end": taken})["end"]
+            return np.asarray(found.reshape(shape))
+
+        return cycles, motions, Later(shape, "f4", tractions)
+
+
+def _worn_rows(number: int, contact: int, name: str) -> Array:
+    """Return own rows of a field of the last cycle that wore."""
+    found: Array = ranks.held[number].fields(ranks.held[contact])[name]
+    return found
+
+
+def _end_rows(number: int, contact: int, place: int, component: int) -> Array:
+    """Return own rows of a traction, or of its rate, at the end of a load step."""
+    _, _, tractions = ranks.held[number].end(place, ranks.held[contact])
+    return np.asarray(tractions).reshape(6, *tractions.shape[2:])[component].astype(float)

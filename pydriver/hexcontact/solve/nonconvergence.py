@@ -13,7 +13,6 @@ import numpy as np
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import nodal_residuals
-from ..core.shared import SharedSolution
 from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
@@ -91,17 +90,17 @@ def error(
 def _residuals(case: Problem, solution: Any, target: LoadStep) -> dict[str, float]:
     """Return the residuals with a bound, by the symbol of the theory."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
-    wanted = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
+    bounded = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
     if not case.frictional:
-        wanted = {"R_n": True, "R_P": z}
-    return {sign: float(getattr(solution, RESIDUALS[sign])) for sign, shown in wanted.items() if shown}
+        bounded = {"R_n": True, "R_P": z}
+    return {sign: float(getattr(solution, RESIDUALS[sign])) for sign, shown in bounded.items() if shown}
 
 
 def _holds_a_shift(case: Problem, lattice: Lattice, solution: Any, target: LoadStep) -> bool:
     """Return whether a window that repeats is to be shifted, touches everywhere, and cannot slip."""
     shifted = any(motion.control != "force" for motion in (target.x, target.y))
     stuck = case.frictional and math.isinf(case.friction_coefficient) and lattice.periodic and shifted
-    return stuck and not isinstance(solution, SharedSolution) and bool((solution.pressure > 0.0).all())
+    return stuck and bool((solution.pressure > 0.0).all())
 
 
 def _number(value: float) -> str:
@@ -133,13 +132,13 @@ def _sliding(
             f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
             "that touch at x = y = 0",
         )
-    wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
-    wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
+    loads = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
+    loads += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
     motions = ", ".join(motion for _, motion in [*target.drives.values()][1:])
     expected = f"expected a smaller load, or a prescribed motion in its place ({motions})"
-    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
+    return True, f"friction cannot carry the {listed(loads, 'and the')}{known}", expected
 
 
 def _center(lattice: Lattice, solution: Any) -> tuple[float, float]:
@@ -199,10 +198,6 @@ def _worst(
     """Return the largest residual and its node."""
     sign = max(residuals, key=lambda name: residuals[name])
     value = residuals[sign]
-    if isinstance(solution, SharedSolution):  # whose nodes are not here
-        if not solution.normal_load > 0.0:
-            return Worst(sign, value, what=_LOST)
-        return Worst(sign, value, what=_missed(sign, solution, values) if sign == "R_P" else "")
     if not (solution.pressure > 0).any():
         return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):
@@ -233,10 +228,10 @@ def _missed(sign: str, solution: Any, values: tuple[float, ...]) -> str:
     return _instead(f"tangential load along {'xy'[axis]}", carried[axis], values[1 + axis], "N")
 
 
-def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
+def _instead(name: str, carried: float, expected: float, unit: str) -> str:
     return (
         f"the {name} that the tractions carry is {quantity(carried, unit)} instead of "
-        f"{quantity(wanted, unit)}, off by {quantity(abs(carried - wanted), unit, 2)}"
+        f"{quantity(expected, unit)}, off by {quantity(abs(carried - expected), unit, 2)}"
     )
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,17 +16,18 @@ from ..core import ranks
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import is_unbounded, measures, recorded
+from ..core.measures import is_unbounded, measures
 from ..core.shared import (
-    Displacement,
-    Rows,
-    SharedContact,
+    FrictionPart,
+    Layout,
+    NormalPart,
+    SharedCycles,
     SharedFields,
-    SharedOperator,
-    SharedSolution,
+    SharedObject,
+    gap_in_rows,
+    operator_part,
     rigid,
 )
-from ..core.shared_friction import Layout, SharedCycles, SharedFriction, gap_in_rows
 from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
@@ -46,6 +46,7 @@ from ..variables import (
 from .events import Listener
 from .memory_needed import fields_of, is_shared, require_memory
 
+_DISPLACED = frozenset(DISPLACEMENTS)
 _STEPPED = names_where(lambda v: v.dims == ("step",))
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
@@ -60,7 +61,10 @@ class Window:
     """
 
     state = STATE[False]  # fields of every step
+    contact: Any
     worn: Array | None = None  # depth by which the surfaces are worn, m
+    _own_gap: Array | None = None
+    _lent: weakref.ref[Array] | None = None
 
     def __init__(
         self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
@@ -69,14 +73,18 @@ class Window:
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
         self._bodies: dict[int, Any] = {}
-        gap, self.candidate = case.initial_gap(lattice)
-        self.friction = case.friction_law(lattice)
-        self.contact: Any = self._solver(gap)
-        self._lent: weakref.ref[Array] | None = None
+        self._place(None)
+
+    def _place(self, target: LoadStep | None) -> None:
+        """Set the surfaces up at their place in a load step, None: before the first."""
+        gap, self.candidate = self.case.initial_gap(self.lattice, target)
+        if target is None:
+            self.friction = self.case.friction_law(self.lattice)
+        self.gap: Any = gap if self.case.moves else None
+        self.contact = self._solver(gap, self.case.frictional)
         # of surfaces that move, and of nodes that cannot touch, the core has another one
-        keeps = case.moves or not self.candidate.all()
-        self.gap: Any = gap if case.moves else None
-        self._own_gap: Array | None = self._where_touching(gap) if keeps else None
+        if target is None and (self.case.moves or not self.candidate.all()):
+            self._own_gap = self._where_touching(gap)
 
     @property
     def initial_gap(self) -> Array:
@@ -89,11 +97,15 @@ class Window:
             self._lent = weakref.ref(gap)
         return gap
 
-    def _solver(self, gap: Array) -> Any:
-        """Return the solver for an initial gap (inf where nothing can touch)."""
-        method = self.case.method_for(self.lattice)
-        given = self.lattice, self.case.solved_pair, gap, self.candidate
-        return NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
+    def _solver(self, gap: Any, frictional: bool) -> Any:
+        """Return a solver for an initial gap (inf where nothing can touch)."""
+        case, solver = self.case, self.case.solver
+        given = self.lattice, case.solved_pair, gap, self.candidate
+        how: dict[str, Any] = {"method": case.method_for(self.lattice), "interface": case.interface}
+        if not frictional:
+            return NormalContact(*given, rim_warning=False, **how)
+        how |= {"coupling": solver.coupling, "iteration": solver.iteration}
+        return FrictionalContact(*given, friction_coefficient=self.friction, rim_warning=False, **how)
 
     def advance(self, state: Any, target: LoadStep, values: tuple[float, ...]) -> Any:
         """Solve a load step from the state at its beginning, None before the first load.
@@ -177,19 +189,37 @@ class Window:
             fields["worn_depth"] = self.worn
         if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
             fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
-        if any(name in DISPLACEMENTS for name in fields_of(self.case)):
-            fields |= self._displaced(fields)
+        if not _DISPLACED.isdisjoint(fields_of(self.case)):
+            fields |= self._displaced(solution)
         return fields
 
-    def _displaced(self, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+    def _displaced(self, solution: Any) -> dict[str, Any]:
         """Return the displacements of the surfaces that the deck names."""
-        found: dict[str, Array] = {}
+        found: dict[str, Any] = {}
         for body in (1, 2):
-            wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            if wanted:
-                moved = self._displacement(body, fields)
-                found |= {name: moved[name[-1]] for name in wanted}
+            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            if names and (pair := _pair_of_body(self.case, body)):
+                if body not in self._bodies:
+                    self._bodies[body] = self._operator(pair)
+                goodman = self.case.solver.coupling == "goodman"
+                moved = self._bodies[body].displacement(solution, body, goodman)
+                found |= {name: self._field(moved, name[-1]) for name in names}
+            elif names:
+                found |= dict.fromkeys(names, self._rigid)
         return found
+
+    @property
+    def _rigid(self) -> Any:
+        """Displacement of a rigid body."""
+        return np.zeros(self.lattice.shape)
+
+    def _operator(self, pair: ElasticPair) -> Any:
+        """Return the operator of a body."""
+        return FlexibilityOperator(self.lattice, pair)
+
+    def _field(self, solution: Any, name: str) -> Any:
+        """Return a field of a solution."""
+        return getattr(solution, name)
 
     def _where_touching(self, values: Array) -> Array:
         """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
@@ -229,70 +259,63 @@ class Window:
         share = self.case.plane_gap.share(self.candidate, self.lattice)
         return found, bool(is_unbounded(share, solution.pressure))
 
-    def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
-        """Return the surface displacement of one body, z into the body itself.
-
-        Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
-        """
-        if (pair := _pair_of_body(self.case, number)) is None:
-            return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
-        if number not in self._bodies:
-            self._bodies[number] = FlexibilityOperator(self.lattice, pair)
-        operator, pressure = self._bodies[number], fields["pressure"]
-        z, x, y = operator.apply(pressure, fields.get("traction_x"), fields.get("traction_y"))
-        if self.case.solver.coupling == "goodman" and "traction_x" in fields:
-            z = operator.apply(pressure)[0]  # in this approximation shear does not move the surfaces along z
-        sign = 1.0 if number == 1 else -1.0
-        return {"x": sign * x, "y": sign * y, "z": z}
-
 
 class SharedWindow(Window):
-    """A case without friction on a window whose rows all ranks share; each evaluates the gap at its nodes."""
+    """A window whose rows all ranks share; each evaluates the gap at its nodes.
 
-    def __init__(
-        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
-    ) -> None:
-        require_memory(case, lattice, steps_held)
-        self.case, self.lattice, self.steps_held = case, lattice, steps_held
-        self.listener, self._bodies = listener or Listener(), {}
-        self.friction = case.friction_law(lattice)  # none
-        self.contact: Any = SharedContact(lattice, case.solved_pair, case.plane_gap, case.interface)
+    Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those of all
+    rows, which each rank has then, as those of a small window.
+    """
 
-    def advance(self, state: None, target: LoadStep, values: tuple[float, ...]) -> SharedSolution:
-        """Solve a load step from its load or approach alone."""
-        control = 1 if target.z.control == "force" else 2
-        solution: SharedSolution = self.contact.solve(
-            control, values[0], tolerance=self.case.solver.tolerance
-        )
-        return solution
+    _rigid = staticmethod(rigid)
 
-    def _larger(self, solution: SharedSolution) -> Lattice:
-        return solution.grown()
+    @property
+    def initial_gap(self) -> Any:
+        """Gap of the surfaces that have not moved, at any point."""
+        return self.case.plane_gap
 
-    def _measures(self, solution: SharedSolution) -> tuple[dict[str, float], bool]:
-        found, unbounded = solution.measures()
-        return recorded(self.lattice, found, friction=False), unbounded
+    def _place(self, target: LoadStep | None) -> None:
+        if target is None:
+            self.layout = Layout(self.lattice, is_shared(self.case, self.lattice))
+            self.friction = self.case.friction_law(self.layout.nodes())
+        self.contact = self._solver(self.case.gap_in(target), self.case.frictional)
+
+    def _solver(self, gap: Any, frictional: bool) -> SharedObject:
+        how = {"pair": self.case.solved_pair, "interface": self.case.interface}
+        if not frictional:
+            layout = Layout(self.lattice, ranks.share(self.lattice))
+            return SharedObject(layout, NormalPart, layout, gap, **how)
+        how |= {"friction_coefficient": self.case.plane_friction, "coupling": self.case.solver.coupling}
+        return SharedObject(self.layout, FrictionPart, self.layout, gap, **how)
+
+    def _larger(self, solution: Any) -> Lattice:
+        larger: Lattice = self.contact.grown(solution)
+        return larger
+
+    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
+        found: tuple[dict[str, float], bool] = self.contact.measured(solution)
+        return found
+
+    def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:
+        """Return the error of a step that did not converge, from its fields, which are gathered here."""
+        return super().failure(solution.gathered(), target, values)
+
+    def _operator(self, pair: ElasticPair) -> SharedObject:
+        return SharedObject(self.layout, operator_part, self.layout, pair)
+
+    def _field(self, solution: Any, name: str) -> Any:
+        return solution.rows(name)
 
     def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
-        rows = {name: solution.rows(name) for name in ("initial_gap", *self.state)}
-        fields = SharedFields(self.contact, rows | displaced_rows(self, solution))
+        rows = {"initial_gap": self.contact.rows("gap_rows")}
+        rows |= {name: solution.rows(name) for name in self.state}
+        if self.case.moves:
+            rows[MOVED_GAP] = rows["initial_gap"]
+            rows["initial_gap"] = gap_in_rows(self.initial_gap, self.layout)
+        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
+            rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
+        fields = SharedFields(self.layout, rows | self._displaced(solution))
         return dict(fields) if self.steps_held else fields
-
-
-def displaced_rows(window: Window, solution: Any) -> dict[str, Rows]:
-    """Return the displacements of the surfaces that the deck names, of a solution that all ranks share."""
-    found: dict[str, Rows] = {}
-    for body in (1, 2):
-        names = [name for name in fields_of(window.case) if name.startswith(f"displacement_{body}")]
-        pair = _pair_of_body(window.case, body) if names else None
-        if pair is None:
-            found |= dict.fromkeys(names, rigid)
-            continue
-        if body not in window._bodies:
-            window._bodies[body] = SharedOperator(window.lattice, pair, 1.0 if body == 1 else -1.0)
-        moved = Displacement(solution, window._bodies[body], window.case.solver.coupling == "goodman")
-        found |= {name: moved.rows(name[-1]) for name in names}
-    return found
 
 
 def window_over(
@@ -321,20 +344,6 @@ class FrictionWindow(Window):
 
     state = STATE[True]
 
-    def _solver(self, gap: Array) -> FrictionalContact:
-        return FrictionalContact(
-            self.lattice,
-            self.case.solved_pair,
-            gap,
-            self.candidate,
-            friction_coefficient=self.friction,
-            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
-            method=self.case.method_for(self.lattice),
-            iteration="dissertation" if self.case.solver.iteration == "dissertation" else "newton",
-            interface=self.case.interface,
-            rim_warning=False,
-        )
-
     def advance(
         self,
         state: ContactState | None,
@@ -343,7 +352,7 @@ class FrictionWindow(Window):
     ) -> ContactState:
         """Advance a state to new loads and motions, with surfaces that move at their new place."""
         if self.case.moves:
-            self._move(target)
+            self._place(target)
         found: ContactState = self.contact.advance(
             self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],
@@ -355,17 +364,11 @@ class FrictionWindow(Window):
         )
         return found
 
-    def _move(self, target: LoadStep) -> None:
-        """Set the surfaces up at their place in a load step."""
-        self.gap, self.candidate = self.case.initial_gap(self.lattice, target)
-        self.contact = self._solver(self.gap)
-
     @property
     def how(self) -> dict[str, Any]:
         """Entry of nodes and tolerance of the solver."""
         solver = self.case.solver
-        entry = "interpolated" if solver.entry == "interpolated" else "implicit"
-        return {"entry": entry, "tolerance": solver.tolerance}
+        return {"entry": solver.entry, "tolerance": solver.tolerance}
 
     def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
         """Return cycles that wear the surfaces."""
@@ -395,7 +398,8 @@ class FrictionWindow(Window):
         """Return the whole state, and set the worn depth of the step."""
         if (worn := step.fields.get("worn_depth")) is not None:
             self.wear(np.array(worn))
-        return state_of(step)
+        state: ContactState = self.contact.assembled(*state_of(step).parts())
+        return state
 
     # --- history ------------------------------------------------------------------------------------------
 
@@ -412,17 +416,9 @@ class FrictionWindow(Window):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        area = self._frictionless()
-        return max([self.lattice.cell_area, *(area(**drive) for drive in self.case.largest_drives)])
-
-    def _frictionless(self) -> Callable[..., float]:
-        """Return the function of the contact area without friction (m2) under a load or at an approach."""
-        solver = Window._solver(self, self.initial_gap)
-
-        def area(**drive: float) -> float:
-            return self.lattice.cell_area * int((solver.solve(**drive, tolerance=_ROUGHLY).zone > 0).sum())
-
-        return area
+        solver, cell = self._solver(self.initial_gap, frictional=False), self.lattice.cell_area
+        solved = (solver.solve(**drive, tolerance=_ROUGHLY) for drive in self.case.largest_drives)
+        return max([cell, *(cell * int((each.parts()[0]["zone"] > 0).sum()) for each in solved)])
 
 
 def state_of(step: Step) -> ContactState:
@@ -439,48 +435,8 @@ def state_of(step: Step) -> ContactState:
     return ContactState(**state)  # a finished step has converged, and away from the rim
 
 
-class SharedFrictionWindow(FrictionWindow):
-    """Contact with friction whose rows all ranks share; each evaluates the gap at its nodes.
-
-    Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those of all
-    rows, which each rank has then, as those of a small window.
-    """
-
-    def __init__(
-        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
-    ) -> None:
-        require_memory(case, lattice, steps_held)
-        self.case, self.lattice, self.steps_held = case, lattice, steps_held
-        self.listener, self._bodies = listener or Listener(), {}
-        self.layout = Layout(dataclasses.replace(lattice), is_shared(case, lattice))
-        self.friction = case.friction_law(self.layout.own())
-        self.contact = self._shared(case.plane_gap)
-
-    def _shared(self, gap: Any) -> SharedFriction:
-        """Return the solver for a gap."""
-        case = self.case
-        return SharedFriction(
-            *(gap, case.plane_friction, self.layout),
-            pair=case.solved_pair,
-            coupling="goodman" if case.solver.coupling == "goodman" else "full",
-            interface=case.interface,
-        )
-
-    def _move(self, target: LoadStep) -> None:
-        self.contact = self._shared(self.case.gap_in(target))
-
-    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
-        found: tuple[dict[str, float], bool] = self.contact.method("measured", solution)
-        return found
-
-    def _larger(self, solution: Any) -> Lattice:
-        larger: Lattice = self.contact.method("grown", solution)
-        return larger
-
-    def restored(self, step: Step) -> Any:
-        """Return the whole state, and set the worn depth of the step."""
-        state = super().restored(step)
-        return None if state is None else self.contact.assembled(*state.parts())
+class SharedFrictionWindow(SharedWindow, FrictionWindow):
+    """Contact with friction whose rows all ranks share."""
 
     def wear(self, depth: Array) -> None:
         """Set the worn depth (m), which adds to the gap before loading."""
@@ -488,47 +444,7 @@ class SharedFrictionWindow(FrictionWindow):
 
     def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
         """Return cycles that wear the surfaces."""
-        return SharedCycles(settings, self.case.pair, steps, state)
+        return SharedCycles(state.layout, CyclesOfWear, settings, self.case.pair, steps, state)
 
     def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
         """Remember nothing: the core has the worn depth."""
-
-    def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:
-        """Return the error of a step that did not converge, from its fields, which are gathered here."""
-        return super().failure(solution.gathered(), target, values)
-
-    def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
-        rows = {"initial_gap": self.contact.rows("gap_rows")}
-        rows |= {name: solution.rows(name) for name in self.state}
-        if self.case.moves:
-            rows |= {
-                MOVED_GAP: rows["initial_gap"],
-                "initial_gap": gap_in_rows(self.case.plane_gap, self.lattice),
-            }
-        if math.isnan(self.case.friction_coefficient) and self.friction.limits:
-            rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
-        if self.layout.by_rows:
-            rows |= displaced_rows(self, solution)
-        fields: Any = SharedFields(self.layout, rows)
-        if not self.layout.by_rows and any(name in DISPLACEMENTS for name in fields_of(self.case)):
-            fields = dict(fields) | self._displaced(fields)
-        return dict(fields) if self.steps_held else fields
-
-    @property
-    def initial_gap(self) -> Array:
-        """Gap of the surfaces that have not moved, inf where nothing can touch."""
-        gap, self.candidate = self.case.initial_gap(self.lattice)
-        return gap
-
-    def _frictionless(self) -> Callable[..., float]:
-        if not ranks.share(self.lattice):
-            return super()._frictionless()
-        case = self.case
-        contact = SharedContact(self.lattice, case.solved_pair, case.plane_gap, case.interface)
-
-        def area(**drive: float) -> float:
-            [(name, value)] = drive.items()
-            solution = contact.solve(1 if name == "normal_load" else 2, value, tolerance=_ROUGHLY)
-            return float(solution.measures()[0].contact_area)
-
-        return area

@@ -271,6 +271,8 @@ contains
                                 options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
+      ! the next sweep begins with a product
+      iteration%single = .true.
       call pack_unknowns(step, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return

@@ -77,6 +77,8 @@ module hc_linear_system
     integer :: most = 0, made = 0
     !> GMRES: stored directions, after which it restarts with the present residual
     integer :: most_directions = 0
+    !> GMRES: residuals are stored in single precision; the product has an error of as much of the residual at the start
+    logical :: single = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)
     !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
@@ -85,7 +87,7 @@ module hc_linear_system
     logical :: independent = .true.
     !> Bound of the rounding errors in the product A x, which is carried along
     real(wp) :: drift = 0.0_wp
-    !> GMRES: bound of the error of the product off the active nodes, where directions are of single precision
+    !> GMRES: bound of the error of the product by what is stored in single precision
     real(wp) :: rounding = 0.0_wp
   end type iteration_t
 

@@ -253,6 +253,8 @@ contains
         if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
         call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, step%x, error)
         if (allocated(error)) return
+        call find_rhs(now, step, rhs, error)
+        if (allocated(error)) return
       end if
       ! those of the iterate come from the solution, or anew
       call now%forget_displacements()
@@ -273,13 +275,11 @@ contains
       iteration%most_directions = options%max_directions
       ! the next sweep begins with a product
       iteration%single = .true.
-      call pack_unknowns(step, unknown, fixed, kept)
+      ! the traction across of nodes on a bound that does not grow with the pressure is no unknown
+      call step%nodes%pack_all(step%x, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
-      allocate (step%x(3*n))
-      call system%space%fill(step%x, 0.0_wp)
-      call step%nodes%unpack(unknown, step%x)
-      call fixed%unpack(kept, step%x)
+      call step%nodes%unpack_all(3*n, unknown, fixed, kept, step%x)
       now%outcome = iteration%outcome
       now%rounding = iteration%rounding
       if (iteration%drift > options%displacement_rounding) then
@@ -314,27 +314,6 @@ contains
     call now%shear%add_rest(given(n + 1:))
     call step%nodes%pack(given, rhs)
   end subroutine find_rhs
-
-  !> Pack the unknowns, and the traction across of nodes on a bound that does not grow with the pressure, and free the field.
-  subroutine pack_unknowns(step, unknown, fixed, kept)
-    !> The step, whose unknowns are freed
-    type(coupled_step_t), intent(inout) :: step
-    !> Unknowns (nodes%n_active)
-    real(wp), allocatable, intent(out) :: unknown(:)
-    !> Nodes of other values that are not zero (of 3 n), and the values
-    type(active_set_t), intent(out) :: fixed
-    real(wp), allocatable, intent(out) :: kept(:)
-    real(wp), allocatable :: zero(:)
-
-    allocate (unknown(step%nodes%n_active), zero(step%nodes%n_active))
-    call step%nodes%pack(step%x, unknown)
-    call step%system%space%fill(zero, 0.0_wp)
-    call step%nodes%unpack(zero, step%x)
-    call new_active_set(fixed, logical(abs(step%x) > 0.0_wp, lk), step%system%space)
-    allocate (kept(fixed%n_active))
-    call fixed%pack(step%x, kept)
-    deallocate (step%x)
-  end subroutine pack_unknowns
 
   !> Take tractions and motions of the solution, and their displacements from the product that GMRES carries along.
   subroutine take_solution(now, step, error)

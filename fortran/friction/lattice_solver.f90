@@ -9,6 +9,7 @@ module hc_lattice_solver
   use hc_precision, only: wp, pi
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
+  use hc_memory, only: give_back
   use hc_contact_state, only: contact_state_t, add_fields, add_history, load_step_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
@@ -57,6 +58,7 @@ contains
     call now%set_start(problem, operators, start, step, error, estimate)
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
+    call give_back(size(now%p))
     associate (options => problem%options%newton)
       if (problem%couples_strongly(step%target)) call now%cut_parameter(options%cautious_share)
       do sweep = 1, step%max_sweeps

@@ -182,7 +182,7 @@ contains
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:), given(:)
+    real(wp), allocatable :: rhs(:), given(:), unknown(:)
     real(wp) :: scale, level
     logical :: by_load, compliant, unknown_gap
     integer :: i
@@ -227,8 +227,11 @@ contains
     end if
     iteration%tolerance = iteration%tolerance*scale
     iteration%most = options%max_iterations
-    call solve_step_equation(now%pressure, nodes, constraints, rhs, now%p, now%w, iteration, error)
+    allocate (unknown(nodes%n_active))
+    call nodes%pack(now%p, unknown)
+    call solve_step_equation(now%pressure, nodes, constraints, rhs, unknown, now%w, iteration, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, now%p)
     if (iteration%drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
     if (allocated(error)) return
     call now%pressure%stretch(-1.0_wp, now%p, now%w)
@@ -389,22 +392,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:)
-    real(wp), allocatable, target :: own(:)
-    real(wp), pointer, contiguous :: given(:)
+    type(active_set_t) :: fixed
+    real(wp), allocatable :: rhs(:), unknown(:), kept(:)
     real(wp) :: goal, scale
-    integer :: stat
+    integer :: n
 
     options = now%problem%options%newton
-    ! motions that are prescribed are known; the others are multipliers
-    call now%shear%take_image(size(found%x), own, given, stat)
-    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
-    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
-    if (allocated(error)) return
-    call find_prescribed_displacement(now, given)
-    call now%shear%add_rest(given)
-    call nodes%pack(given, rhs)
-    if (allocated(own)) deallocate (own)
+    n = size(found%x)
     if (found%is_last) then
       call move_alloc(now%u, found%ax)
     else
@@ -415,10 +409,14 @@ contains
     ! the pressure moves what u does not contain yet
     if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
       call now%shear%add_springs(found%x, found%ax)
+      call find_rhs(now, nodes, n, rhs, error)
+      if (allocated(error)) return
       call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%x, error)
       if (allocated(error)) return
     end if
     call displace(now, found%x, found%ax, error)
+    if (allocated(error)) return
+    call find_rhs(now, nodes, n, rhs, error)
     if (allocated(error)) return
     ! Newton's method alone converges the faster the more accurate its steps are
     goal = min(now%residual_tangential, 1.0_wp)
@@ -426,8 +424,10 @@ contains
                                                             now%pressure_feels_shear)))
     scale = found%scale
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
-    call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
+    call nodes%pack_all(found%x, unknown, fixed, kept)
+    call solve_step_equation(now%shear, nodes, found%constraints, rhs, unknown, found%ax, iteration, error)
     if (allocated(error)) return
+    call nodes%unpack_all(n, unknown, fixed, kept, found%x)
     now%rounding = iteration%rounding
     if (iteration%drift > options%displacement_rounding*scale) then
       now%rounding = 0.0_wp
@@ -436,6 +436,30 @@ contains
     end if
     now%outcome = max(now%outcome, iteration%outcome)
   end subroutine solve_in_frames
+
+  !> Find the right-hand side of (F10), in memory of the operator: motions that are prescribed are known; the others are multipliers.
+  subroutine find_rhs(now, nodes, n, rhs, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(in) :: now
+    !> Unknowns (of 2 n), and number of all components
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    !> Right-hand side (n_active)
+    real(wp), allocatable, intent(out) :: rhs(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: given(:)
+    integer :: stat
+
+    call now%shear%take_image(n, own, given, stat)
+    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
+    call find_prescribed_displacement(now, given)
+    call now%shear%add_rest(given)
+    call nodes%pack(given, rhs)
+  end subroutine find_rhs
 
   !> Take traction, displacement and motions of a solution.
   subroutine take_solution(now, found, judged, error)

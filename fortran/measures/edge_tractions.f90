@@ -228,7 +228,7 @@ contains
     real(wp), intent(inout) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: x(:), ax(:), rhs(:)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), unknown(:)
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     logical(lk), allocatable :: active(:)
@@ -255,8 +255,10 @@ contains
       iteration = iteration_t(tolerance=system%options%accuracy*maxval(abs(rhs - ax), mask=active), &
                               most=system%options%max_iterations)
       rhs = pack(rhs, active)
-      call projected_cg(system, set, constraints, rhs, x, ax, iteration, error)
+      unknown = pack(x, active)
+      call projected_cg(system, set, constraints, rhs, unknown, ax, iteration, error)
       if (allocated(error)) return
+      call set%unpack(unknown, x)
       if (iteration%outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)
       change = reshape(x, shape(change))
     end associate

@@ -74,18 +74,20 @@ contains
     scratch => null()
     if (present(shared)) scratch => shared
     if (.not. associated(scratch)) allocate (scratch)
-    call prepare(self%problem, self%operators(1))
+    call prepare(self%problem, self%operators(1), rounded=.false.)
     do l = 2, n_level
       if (allocated(error)) return
-      call prepare(self%coarse(l), self%operators(l))
+      call prepare(self%coarse(l), self%operators(l), rounded=.true.)
     end do
 
   contains
 
     !> Set up threads and operators of one lattice, whose rows are shared as the problem says.
-    subroutine prepare(level, operators)
+    subroutine prepare(level, operators, rounded)
       type(friction_problem_t), intent(inout) :: level
       type(operators_t), intent(out) :: operators
+      !> Its solutions are only starts
+      logical, intent(in) :: rounded
       type(field_space_t) :: space
 
       space = space_over(level%lattice%extent, n_threads)
@@ -93,7 +95,7 @@ contains
       space%ranks = level%space%ranks
       level%space = space
       if (present(ranks) .and. space%ranks%size == 1) space%helpers = ranks%over(level%lattice%extent)
-      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner)
+      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner, rounded)
     end subroutine prepare
 
   end subroutine new_frictional_contact

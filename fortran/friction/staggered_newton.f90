@@ -425,6 +425,7 @@ contains
     scale = found%scale
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
     call nodes%pack_all(found%x, unknown, fixed, kept)
+    call give_back(n)
     call solve_step_equation(now%shear, nodes, found%constraints, rhs, unknown, found%ax, iteration, error)
     if (allocated(error)) return
     call nodes%unpack_all(n, unknown, fixed, kept, found%x)

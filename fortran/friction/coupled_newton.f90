@@ -251,8 +251,11 @@ contains
         step%ax(n + 1:) = now%u
         call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
         if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
-        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, step%x, error)
+        allocate (unknown(step%nodes%n_active))
+        call step%nodes%pack(step%x, unknown)
+        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, unknown, error)
         if (allocated(error)) return
+        call step%nodes%unpack(unknown, step%x)
         call find_rhs(now, step, rhs, error)
         if (allocated(error)) return
       end if

@@ -55,10 +55,9 @@ contains
     judged = .true.
     if (present(as_start)) judged = .not. as_start
     call operators%reset()
+    call give_back(problem%own_size())
     call now%set_start(problem, operators, start, step, error, estimate)
     if (allocated(error)) return
-    deallocate (start%pressure, start%traction)
-    call give_back(size(now%p))
     associate (options => problem%options%newton)
       if (problem%couples_strongly(step%target)) call now%cut_parameter(options%cautious_share)
       do sweep = 1, step%max_sweeps
@@ -133,6 +132,7 @@ contains
       ! without friction no sweep finds u, which follows the pressure
       if (judged .and. .not. problem%friction%resists()) known = .false.
       if (.not. known) call now%forget()
+      call give_back(size(now%p))
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, now%operators%space)
       call record(now, state)
       state%motion = now%motion

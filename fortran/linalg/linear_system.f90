@@ -232,7 +232,7 @@ contains
     real(wp), intent(in), contiguous :: ax(:)
     !> Share of the preconditioned residual
     real(wp), intent(in) :: length
-    !> Unknowns (n), whose C^T x stays
+    !> Unknowns (n_active), whose C^T x stays
     real(wp), intent(inout), contiguous :: x(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
@@ -247,11 +247,11 @@ contains
     call nodes%pack(ax, z)
     rhs = rhs - z
     call constraints%add_columns(system%space, constraints%multiplier, rhs)
-    call system%precondition_packed(nodes, size(x), rhs, z, error)
+    call system%precondition_packed(nodes, size(ax), rhs, z, error)
     if (allocated(error)) return
     share = -matmul(inverse, constraints%resultants(nodes%space, z))
     call constraints%add_mb(system%space, share, z)
-    call nodes%add(length, z, x)
+    x = x + length*z
   end subroutine step_ahead
 
   !> Compute (C^T M B)^-1.

@@ -644,7 +644,7 @@ contains
     type(dense_system_t) :: system
     type(active_set_t) :: nodes
     real(wp) :: x(5), before(5), ax(5), r(5), z(5), columns(5, 1), rows(5, 1)
-    real(wp), allocatable :: mb(:, :), right(:)
+    real(wp), allocatable :: mb(:, :), right(:), unknown(:)
     type(constraints_t) :: constraints
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], length = 0.6_wp
     logical(lk), parameter :: active(5) = [.true., .true., .false., .true., .true.]
@@ -668,8 +668,10 @@ contains
     call pack_single(nodes, mb, constraints%mb)
     call pack_columns(nodes, rows, constraints%rows)
     right = pack(rhs, active)
-    call step_ahead(system, nodes, constraints, right, ax, length, x, error)
+    unknown = pack(x, active)
+    call step_ahead(system, nodes, constraints, right, ax, length, unknown, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, x)
     r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)
     z = r/[(1.0_wp + i, i=1, 5)]
     z = z - mb(:, 1)*(dot_product(rows(:, 1), z)/dot_product(rows(:, 1), mb(:, 1)))
@@ -680,8 +682,9 @@ contains
     before = x
     constraints%rows = 0.0_wp*constraints%rows
     right = pack(rhs, active)
-    call step_ahead(system, nodes, constraints, right, ax, length, x, error)
+    call step_ahead(system, nodes, constraints, right, ax, length, unknown, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, x)
     call check(error, x, before, 0.0_wp, 'no step where constraints depend on each other')
   end subroutine test_step_ahead
 

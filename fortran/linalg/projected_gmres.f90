@@ -26,9 +26,6 @@ module hc_projected_gmres
 
   public :: projected_gmres
 
-  !> Directions whose memory is about the largest that a load step takes
-  integer, parameter :: many = 4
-
 contains
 
   !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly; the norm of a residual is that of
@@ -152,7 +149,7 @@ contains
       h = 0.0_wp
       do k = 1, most
         if (stat == 0 .and. .not. allocated(basis(k)%mr)) then
-          if (k >= many) call give_back(size(ax))
+          call give_back(size(ax))
           allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), stat=stat)
         end if
         if (stat == 0) call system%take_image(size(ax), own, image, stat)

@@ -102,7 +102,8 @@ contains
     !> Row transforms share the memory of those of a finer lattice; the window repeats
     logical, intent(in) :: shared, periodic
 
-    operators_memory = fft_memory(extent, .false., threads, n_spectrum, shared, periodic) &
+    ! spectra that only serve for starts are rounded
+    operators_memory = fft_memory(extent, .false., threads, n_spectrum, shared, periodic)/merge(2, 1, shared) &
                        + preconditioner_memory(extent, threads, .false., shared=.true.) &
                        + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory

@@ -440,7 +440,7 @@ contains
     now%outcome = max(now%outcome, iteration%outcome)
   end subroutine solve_in_frames
 
-  !> Find the right-hand side of (F10), in memory of the operator: motions that are prescribed are known; the others are multipliers.
+  !> Find the right-hand side of (F10), in memory of the operator: prescribed motions are known; the others are multipliers.
   subroutine find_rhs(now, nodes, n, rhs, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(in) :: now

@@ -56,8 +56,6 @@ contains
       real(sp), allocatable :: mr(:)
       !> The product A z on the other nodes
       real(sp), allocatable :: beyond(:)
-      !> Largest rounding error of v
-      real(wp) :: rounding = 0.0_wp
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
@@ -72,6 +70,8 @@ contains
     !> H, and after rotations
     real(wp), dimension(iteration%most_directions + 1, iteration%most_directions) :: arnoldi, h
     real(wp), dimension(iteration%most_directions + 1) :: g, left
+    !> Largest rounding errors of the stored residuals
+    real(wp) :: rounded_off(iteration%most_directions + 1)
     real(wp), dimension(iteration%most_directions) :: c, s, y
     real(wp) :: share(size(constraints%multiplier), iteration%most_directions), length, began
     real(wp) :: inverse(size(constraints%multiplier), size(constraints%multiplier))
@@ -85,6 +85,7 @@ contains
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
     iteration%rounding = 0.0_wp
+    rounded_off = 0.0_wp
     iteration%outcome = solution_broke_off
     call constraints%invert(space, inverse, iteration%independent)
     if (.not. iteration%independent) return
@@ -209,7 +210,7 @@ contains
         if (.not. allocated(basis(i)%rounded)) allocate (basis(i)%rounded(size(w)), stat=stat)
         if (stat /= 0) return
         basis(i)%rounded = real(w, sp)
-        basis(i)%rounding = 0.5_wp*epsilon(1.0_sp)*space%max_abs(w)
+        rounded_off(i) = 0.5_wp*epsilon(1.0_sp)*space%max_abs(w)
       else
         if (.not. allocated(basis(i)%v)) allocate (basis(i)%v(size(w)), stat=stat)
         if (stat == 0) basis(i)%v = w
@@ -281,7 +282,7 @@ contains
         call others%add(y(i), basis(i)%beyond, ax)
         largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
         iteration%rounding = iteration%rounding + abs(y(i))*(0.5_wp*epsilon(1.0_sp)*largest &
-                                                             + arnoldi(i + 1, i)*basis(i + 1)%rounding/minval(iteration%weight))
+                                                             + arnoldi(i + 1, i)*rounded_off(i + 1)/minval(iteration%weight))
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return

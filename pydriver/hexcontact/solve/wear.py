@@ -131,7 +131,7 @@ class WearPath(GivenPath):
         spent: float,
         started: float,
     ) -> Step:
-        """Return a cycle, before which energy was dissipated, as a load step, with the restart data of the next one."""
+        """Return a cycle as a load step, with the restart data of the next; `spent`: energy before it."""
         fields = cycles.fields(self.window.contact)
         self.window.remember_wear(fields)
         last = self._targets[0]

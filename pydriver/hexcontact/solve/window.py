@@ -138,7 +138,7 @@ class Window:
         return nonconvergence.error(self.case, self.lattice, solution, target, values)
 
     def step(self, target: LoadStep, solution: NormalSolution, spent: float, started: float) -> Step:
-        """Return a finished step from its end and the energy dissipated before; its time counts from `started`."""
+        """Return a finished step from its end and the energy spent before; its time counts from `started`."""
         bulk: dict[str, float] = {}
         if self.case.deck.bulk:
             bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))

@@ -15,7 +15,7 @@
 !> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int, c_f_pointer
-  use, intrinsic :: iso_fortran_env, only: int8, int64, real64
+  use, intrinsic :: iso_fortran_env, only: int8, int64, real32, real64
   use hc_precision, only: wp
   use hc_build_options, only: perturb_convolution
   use hc_error, only: error_t, status, raise
@@ -59,6 +59,10 @@ module hc_convolution
   type :: convolution_t
     !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
+    !> The spectra rounded to single precision, which stand for them if they are there
+    real(real32), pointer, contiguous :: narrow(:, :, :) => null()
+    !> Spectra are rounded: the convolution only serves for starts
+    logical :: rounded = .false.
     !> Spectrum of a single even kernel in double precision, which stands for it if it is there; its owner outlives the convolution
     real(real64), pointer, contiguous :: wide(:, :) => null()
     !> Factor of the results
@@ -202,8 +206,12 @@ contains
     call release(self%held%spectrum)
     if (is_kept(self, cache)) call cache%find(key, self%held%spectrum)
     if (associated(self%held%spectrum)) then
-      call self%held%spectrum%point(shape_wanted, self%spectrum)
-      found = associated(self%spectrum)
+      if (self%rounded) then
+        call self%held%spectrum%point(shape_wanted, self%narrow)
+      else
+        call self%held%spectrum%point(shape_wanted, self%spectrum)
+      end if
+      found = associated(self%spectrum) .or. associated(self%narrow)
       if (found) return
       call release(self%held%spectrum)
     end if
@@ -224,14 +232,30 @@ contains
     if (present(cache)) is_kept = associated(cache) .and. self%ranks%size == 1
   end function is_kept
 
-  !> Store complete spectra in the cache.
+  !> Store complete spectra in the cache, rounded before if the convolution has rounded ones.
   subroutine store_spectra(self, cache, key)
-    class(convolution_t), intent(in) :: self
+    class(convolution_t), intent(inout) :: self
     !> The cache, if there is one
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> With a cache: parameters of the kernels
     type(kernel_key_t), intent(in), optional :: key
+    type(kernel_spectrum_t), pointer :: wide
+    integer :: stat
 
+    if (self%rounded) then
+      wide => self%held%spectrum
+      allocate (self%held%spectrum)
+      call self%held%spectrum%reserve(shape(self%spectrum), self%narrow, stat)
+      if (stat == 0) then
+        self%narrow = real(self%spectrum, real32)
+        self%spectrum => null()
+        call release(wide)
+      else
+        call release(self%held%spectrum)
+        self%held%spectrum => wide
+        return
+      end if
+    end if
     if (is_kept(self, cache)) call cache%store(key, self%held%spectrum)
   end subroutine store_spectra
 
@@ -643,6 +667,8 @@ contains
       end do
       if (associated(self%wide)) then
         call multiply_one(size(given, 1), real(self%wide(:, b), wp), transformed(:, 1), given(:, 1))
+      else if (associated(self%narrow)) then
+        call multiply(real(self%narrow(:, b, :), wp), self%first_odd, self%whole, kernel, transformed, given)
       else if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
       else

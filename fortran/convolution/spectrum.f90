@@ -9,16 +9,17 @@ module hc_spectrum
   private
 
   public :: kernel_spectrum_t, kernel_key_t, new_kernel_key, new_depth_key, release
-  public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, of_stress
-  public :: of_displacement, kind_name, key_length
+  public :: of_pressure, of_all_tractions, of_tractions_rounded, of_pressure_rounded, inverse_of_pressure, inverse_of_shear
+  public :: of_stress, of_displacement, kind_name, key_length
 
   !> Transformed kernels: the kernel of the pressure, those of all blocks, that of the pressure in single
-  !> precision, the inverses that precondition, and those of stress and displacement at a
-  !> depth.
+  !> precision, the inverses that precondition, those of stress and displacement at a
+  !> depth, and those of all blocks in single precision.
   integer, parameter :: of_pressure = 1, of_all_tractions = 2, of_pressure_rounded = 3, &
-    inverse_of_pressure = 4, inverse_of_shear = 5, of_stress = 6, of_displacement = 7
-  character(len=*), parameter :: kind_name(7) = &
-    [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse', 'stress', 'displacement']
+    inverse_of_pressure = 4, inverse_of_shear = 5, of_stress = 6, of_displacement = 7, of_tractions_rounded = 8
+  character(len=*), parameter :: kind_name(8) = &
+    [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse', 'stress', 'displacement', &
+     'tractions-single']
 
   !> Words of a key.
   integer, parameter :: key_length = 8 + n_word
@@ -70,7 +71,7 @@ contains
     key%word(2:3) = merge(-lattice%extent, lattice%extent, lattice%periodic)
     key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
     key%word(8:7 + n_word) = reduced%key_words(normal=kind /= inverse_of_shear, &
-                                               tangential=kind == of_all_tractions .or. kind == inverse_of_shear)
+                                               tangential=any(kind == [of_all_tractions, of_tractions_rounded, inverse_of_shear]))
     if (kind == inverse_of_shear) key%word(key_length) = &
       transfer(medium%spring_compliance()/medium%unit(lattice%spacing()), key%word(1))
   end function new_kernel_key

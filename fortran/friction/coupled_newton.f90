@@ -21,6 +21,7 @@
 module hc_coupled_newton
   use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
+  use hc_memory, only: give_back
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
@@ -196,9 +197,10 @@ contains
     real(wp), allocatable, intent(out) :: missing(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: ones(:, :), along(:), plane(:)
+    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy
+    real(wp), allocatable :: ones(:, :), along(:)
     real(sp), allocatable :: punch(:, :)
-    integer :: n, k
+    integer :: n, k, from, to
 
     n = size(now%p)
     associate (c => step%constraints)
@@ -210,8 +212,11 @@ contains
       ! the traction mu p e belongs to the pressure
       allocate (c%rows(step%pressed%n_active, size(missing)), along(n))
       do k = 1, size(missing)
-        plane = reshape(step%driven%direction(k, now%problem), [2*n])
-        along = step%system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+        do from = 1, n, size(ux)
+          to = from + size(ux) - 1
+          call step%driven%direction_row(k, now%problem, from, ux, uy)
+          along(from:to) = step%system%slope(from:to)*(now%shear%direction(1, from:to)*ux + now%shear%direction(2, from:to)*uy)
+        end do
         call step%pressed%pack(along, c%rows(:, k))
       end do
       if (now%target%control(normal) /= force_control) return
@@ -237,27 +242,20 @@ contains
     type(active_set_t) :: fixed
     real(wp) :: residual, p_max
     integer :: n
+    logical :: ahead
 
     n = size(now%p)
     options = now%problem%options%newton
     residual = max(now%residual_normal, now%residual_tangential)
+    ahead = residual < options%residual_ahead
     associate (system => step%system, iteration => step%iteration)
       allocate (step%ax(3*n))
-      call find_rhs(now, step, rhs, error)
-      if (allocated(error)) return
-      if (residual < options%residual_ahead) then
+      if (ahead) then
         step%ax(:n) = now%w + now%closing
-        if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
         step%ax(n + 1:) = now%u
-        call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
-        if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
-        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, step%x, error)
-        if (allocated(error)) return
       end if
       ! those of the iterate come from the solution, or anew
       call now%forget_displacements()
-      call system%product(step%x, step%ax, error)
-      if (allocated(error)) return
       p_max = system%space%max(now%p)
       allocate (iteration%weight(3))
       iteration%weight(1) = 1.0_wp/(now%problem%normal_compliance*p_max)
@@ -266,18 +264,36 @@ contains
       end if
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       if (step%determined()) deallocate (now%p, now%q)
+      if (ahead) then
+        if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
+        call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
+        if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
+        allocate (unknown(step%nodes%n_active))
+        call step%nodes%pack(step%x, unknown)
+        call find_rhs(now, step, rhs, error)
+        if (allocated(error)) return
+        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, unknown, error)
+        if (allocated(error)) return
+        call step%nodes%unpack(unknown, step%x)
+        deallocate (unknown)
+      end if
+      call system%product(step%x, step%ax, error)
+      if (allocated(error)) return
+      call find_rhs(now, step, rhs, error)
+      if (allocated(error)) return
       residual = min(residual, 1.0_wp)
       iteration%tolerance = max(residual*min(options%inner_accuracy, max(residual, options%coupled_accuracy)), &
                                 options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
-      call pack_unknowns(step, unknown, fixed, kept)
+      ! the next sweep begins with a product
+      iteration%single = .true.
+      ! the traction across of nodes on a bound that does not grow with the pressure is no unknown
+      call give_back(3*n)
+      call step%nodes%pack_all(step%x, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
-      allocate (step%x(3*n))
-      call system%space%fill(step%x, 0.0_wp)
-      call step%nodes%unpack(unknown, step%x)
-      call fixed%unpack(kept, step%x)
+      call step%nodes%unpack_all(3*n, unknown, fixed, kept, step%x)
       now%outcome = iteration%outcome
       now%rounding = iteration%rounding
       if (iteration%drift > options%displacement_rounding) then
@@ -312,27 +328,6 @@ contains
     call now%shear%add_rest(given(n + 1:))
     call step%nodes%pack(given, rhs)
   end subroutine find_rhs
-
-  !> Pack the unknowns, and the traction across of nodes on a bound that does not grow with the pressure, and free the field.
-  subroutine pack_unknowns(step, unknown, fixed, kept)
-    !> The step, whose unknowns are freed
-    type(coupled_step_t), intent(inout) :: step
-    !> Unknowns (nodes%n_active)
-    real(wp), allocatable, intent(out) :: unknown(:)
-    !> Nodes of other values that are not zero (of 3 n), and the values
-    type(active_set_t), intent(out) :: fixed
-    real(wp), allocatable, intent(out) :: kept(:)
-    real(wp), allocatable :: zero(:)
-
-    allocate (unknown(step%nodes%n_active), zero(step%nodes%n_active))
-    call step%nodes%pack(step%x, unknown)
-    call step%system%space%fill(zero, 0.0_wp)
-    call step%nodes%unpack(zero, step%x)
-    call new_active_set(fixed, logical(abs(step%x) > 0.0_wp, lk), step%system%space)
-    allocate (kept(fixed%n_active))
-    call fixed%pack(step%x, kept)
-    deallocate (step%x)
-  end subroutine pack_unknowns
 
   !> Take tractions and motions of the solution, and their displacements from the product that GMRES carries along.
   subroutine take_solution(now, step, error)

@@ -136,8 +136,8 @@ contains
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners over its window
     type(operators_t), intent(inout), target :: operators
-    !> State to start from
-    type(contact_state_t), intent(in) :: start
+    !> State to start from, whose tractions are freed
+    type(contact_state_t), intent(inout) :: start
     !> The load step, whose reference is not copied
     type(load_step_t), intent(in) :: step
     !> Allocated on failure
@@ -159,6 +159,7 @@ contains
       self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
     end do
     !$omp end parallel do
+    deallocate (start%pressure, start%traction)
     self%motion = merge(start%motion, step%target%value, step%target%control == force_control)
     if (operators%space%count(self%contact) > 0) then
       ! a twist turns about the middle of the contact, as far as the shifts are free

@@ -74,18 +74,20 @@ contains
     scratch => null()
     if (present(shared)) scratch => shared
     if (.not. associated(scratch)) allocate (scratch)
-    call prepare(self%problem, self%operators(1))
+    call prepare(self%problem, self%operators(1), rounded=.false.)
     do l = 2, n_level
       if (allocated(error)) return
-      call prepare(self%coarse(l), self%operators(l))
+      call prepare(self%coarse(l), self%operators(l), rounded=.true.)
     end do
 
   contains
 
     !> Set up threads and operators of one lattice, whose rows are shared as the problem says.
-    subroutine prepare(level, operators)
+    subroutine prepare(level, operators, rounded)
       type(friction_problem_t), intent(inout) :: level
       type(operators_t), intent(out) :: operators
+      !> Its solutions are only starts
+      logical, intent(in) :: rounded
       type(field_space_t) :: space
 
       space = space_over(level%lattice%extent, n_threads)
@@ -93,7 +95,7 @@ contains
       space%ranks = level%space%ranks
       level%space = space
       if (present(ranks) .and. space%ranks%size == 1) space%helpers = ranks%over(level%lattice%extent)
-      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner)
+      call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner, rounded)
     end subroutine prepare
 
   end subroutine new_frictional_contact
@@ -150,20 +152,20 @@ contains
     n_shear = max(n_force - 1, 1)
     ! all that GMRES may store but one, since mostly a few are enough
     directions = options%max_directions - 1
-    ! iterate; shear system
-    everywhere = 6*field + mark + 3*field
-    ! packed: traction estimates; weights of the preconditioner of the shear traction, its vectors in the frames; its fields
+    ! iterate without shear traction; shear system
+    everywhere = 4*field + mark + 3*field
+    ! packed: traction estimates; weights of the preconditioner of the shear traction, its vector in the frames; its fields
     ! are in the memory of the transforms
-    inside = (1 + 2*n_shear)*half + 2*half + 2*field
+    inside = (1 + 2*n_shear)*half + 2*half + field
     if (coupled) then
-      ! slope; product of the unknowns; those of all directions off the contact; without tractions and displacements of the iterate
-      everywhere = everywhere + (1 + 3 - 6)*field + 3*directions*half
-      ! packed, where half of the nodes stick: unknowns, both of all directions, a residual; constraints with their estimates, and
-      ! their rows for the pressure; without the products there
-      inside = inside + 5*(directions + 1)*field + n_shear*(3*field + 2*half) + half - 5*directions*half/2
+      ! slope; product of the unknowns; those of all directions off the contact; without pressure and displacements of the iterate
+      everywhere = everywhere + (1 + 3 - 4)*field + 3*directions*half
+      ! packed, where half of the nodes stick: unknowns and two residuals; both of all directions, without the products there;
+      ! constraints with their estimates, and their rows for the pressure
+      inside = inside + 5*3*field/2 + 5*(directions + 1)*half/2 + n_shear*(3*field + 2*half) + half
     else
-      ! packed: vectors of conjugate gradients, constraints with their estimates
-      inside = inside + 2*3*field + 2*n_shear*(field + half)
+      ! packed: shear traction, vectors of conjugate gradients, constraints with their estimates
+      inside = inside + 2*(1 + 3)*field + 2*n_shear*(field + half)
     end if
     friction_step_memory = n*everywhere + n_contact*inside
   end function friction_step_memory

@@ -9,6 +9,7 @@ module hc_lattice_solver
   use hc_precision, only: wp, pi
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
+  use hc_memory, only: give_back
   use hc_contact_state, only: contact_state_t, add_fields, add_history, load_step_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
@@ -54,9 +55,9 @@ contains
     judged = .true.
     if (present(as_start)) judged = .not. as_start
     call operators%reset()
+    call give_back(problem%own_size())
     call now%set_start(problem, operators, start, step, error, estimate)
     if (allocated(error)) return
-    deallocate (start%pressure, start%traction)
     associate (options => problem%options%newton)
       if (problem%couples_strongly(step%target)) call now%cut_parameter(options%cautious_share)
       do sweep = 1, step%max_sweeps
@@ -131,6 +132,7 @@ contains
       ! without friction no sweep finds u, which follows the pressure
       if (judged .and. .not. problem%friction%resists()) known = .false.
       if (.not. known) call now%forget()
+      call give_back(size(now%p))
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, now%operators%space)
       call record(now, state)
       state%motion = now%motion

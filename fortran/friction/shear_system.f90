@@ -11,7 +11,7 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
@@ -124,7 +124,7 @@ contains
     !> Its traction if all nodes stuck, along x and y (2 n)
     real(wp), intent(in), contiguous :: plane(:)
     !> The traction along t and e at these nodes
-    real(wp), intent(inout), contiguous :: traction_t(:), traction_e(:)
+    real(sp), intent(inout), contiguous :: traction_t(:), traction_e(:)
     real(wp), dimension(most) :: q_t, q_e, u_e
     integer :: i, k, n, from, to, m, at
 
@@ -145,8 +145,9 @@ contains
         u_e(:m) = 0.0_wp
         if (runs%second(k) > 0) u_e(:m) = along_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k))
         call slip_compliance_row(m, self%compliance(from:to), along_t(at:at + m - 1), u_e, q_t, q_e)
-        traction_t(at:at + m - 1) = q_t(:m)
-        if (runs%second(k) > 0) traction_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k)) = q_e(:m)
+        traction_t(at:at + m - 1) = real(q_t(:m), sp)
+        if (runs%second(k) == 0) cycle
+        traction_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k)) = real(q_e(:m), sp)
       end do
     end do
     !$omp end parallel do

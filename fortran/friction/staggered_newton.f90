@@ -41,8 +41,11 @@ module hc_staggered_newton
 
   !> A shear traction that is solved for, with its displacement.
   type :: shear_solution_t
-    !> Traction [Pa], and displacement with the springs [m], in the frames (2 n)
-    real(wp), allocatable :: x(:), ax(:)
+    !> Traction in the frames [Pa], at the unknowns, and at other nodes where it is not zero
+    real(wp), allocatable :: unknown(:), given(:)
+    type(active_set_t) :: fixed
+    !> Displacement with the springs, in the frames (2 n) [m]
+    real(wp), allocatable :: ax(:)
     !> Motions that are driven by their loads, the loads as constraints, and the defect of the start
     type(driven_motions_t) :: driven
     type(constraints_t) :: constraints
@@ -182,7 +185,7 @@ contains
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
-    real(wp), allocatable :: rhs(:), given(:)
+    real(wp), allocatable :: rhs(:), given(:), unknown(:)
     real(wp) :: scale, level
     logical :: by_load, compliant, unknown_gap
     integer :: i
@@ -227,8 +230,11 @@ contains
     end if
     iteration%tolerance = iteration%tolerance*scale
     iteration%most = options%max_iterations
-    call solve_step_equation(now%pressure, nodes, constraints, rhs, now%p, now%w, iteration, error)
+    allocate (unknown(nodes%n_active))
+    call nodes%pack(now%p, unknown)
+    call solve_step_equation(now%pressure, nodes, constraints, rhs, unknown, now%w, iteration, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, now%p)
     if (iteration%drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
     if (allocated(error)) return
     call now%pressure%stretch(-1.0_wp, now%p, now%w)
@@ -289,7 +295,7 @@ contains
       if (found%is_last .or. size(found%missing) == 0 .or. fixing) exit
       ! where all nodes slip, only their directions resist a load: limit the step along them
       if (found%independent) then
-        if (now%shear%space%max_abs(found%x(:n)) <= options%most_across*highest) exit
+        if (now%shear%space%max_abs(now%q(:n)) <= options%most_across*highest) exit
         deallocate (found%ax)
       end if
       fixing = .true.
@@ -358,16 +364,17 @@ contains
     call nodes%pair(2*n)
     found%sticks = now%shear%space%count(active(n + 1:)) > 0
     deallocate (active)
+    call give_back(2*n)
     associate (constraints => found%constraints)
       call find_constraints(now, nodes, found%driven, constraints%columns, found%missing)
       constraints%multiplier = found%driven%multipliers(now%motion)
       ! traction and displacement stay where they are, in the frames: a window is too large for copies
-      call move_alloc(now%q, found%x)
-      call now%shear%turn(found%x)
+      call now%shear%turn(now%q)
+      call nodes%pack_all(now%q, found%unknown, found%fixed, found%given)
       do try = 1, 2
         call find_rigid_traction(now, nodes, constraints%columns, try == 2, constraints%mb, error)
         if (allocated(error)) return
-        call constraints%satisfy(nodes%space, found%missing, found%x, found%independent, nodes)
+        call constraints%satisfy(nodes%space, found%missing, found%unknown, found%independent)
         if (found%independent) exit
       end do
     end associate
@@ -390,35 +397,29 @@ contains
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
     real(wp), allocatable :: rhs(:)
-    real(wp), allocatable, target :: own(:)
-    real(wp), pointer, contiguous :: given(:)
     real(wp) :: goal, scale
-    integer :: stat
+    integer :: n
 
     options = now%problem%options%newton
-    ! motions that are prescribed are known; the others are multipliers
-    call now%shear%take_image(size(found%x), own, given, stat)
-    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
-    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
-    if (allocated(error)) return
-    call find_prescribed_displacement(now, given)
-    call now%shear%add_rest(given)
-    call nodes%pack(given, rhs)
-    if (allocated(own)) deallocate (own)
+    n = size(now%u)
     if (found%is_last) then
       call move_alloc(now%u, found%ax)
     else
       ! the old displacements may be needed again
-      allocate (found%ax(size(found%x)))
+      allocate (found%ax(n))
       call now%shear%space%copy(now%u, found%ax)
     end if
     ! the pressure moves what u does not contain yet
     if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
-      call now%shear%add_springs(found%x, found%ax)
-      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%x, error)
+      call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
+      call find_rhs(now, nodes, n, rhs, error)
+      if (allocated(error)) return
+      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%unknown, error)
       if (allocated(error)) return
     end if
-    call displace(now, found%x, found%ax, error)
+    call displace(now, nodes, found, error)
+    if (allocated(error)) return
+    call find_rhs(now, nodes, n, rhs, error)
     if (allocated(error)) return
     ! Newton's method alone converges the faster the more accurate its steps are
     goal = min(now%residual_tangential, 1.0_wp)
@@ -426,16 +427,42 @@ contains
                                                             now%pressure_feels_shear)))
     scale = found%scale
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
-    call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%x, found%ax, iteration, error)
+    call give_back(n)
+    call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%unknown, found%ax, iteration, error)
     if (allocated(error)) return
     now%rounding = iteration%rounding
     if (iteration%drift > options%displacement_rounding*scale) then
       now%rounding = 0.0_wp
-      call displace(now, found%x, found%ax, error)
+      call displace(now, nodes, found, error)
       if (allocated(error)) return
     end if
+    call nodes%unpack_all(n, found%unknown, found%fixed, found%given, now%q)
     now%outcome = max(now%outcome, iteration%outcome)
   end subroutine solve_in_frames
+
+  !> Find the right-hand side of (F10), in memory of the operator: prescribed motions are known; the others are multipliers.
+  subroutine find_rhs(now, nodes, n, rhs, error)
+    !> Tractions and motions
+    type(friction_iterate_t), intent(in) :: now
+    !> Unknowns (of 2 n), and number of all components
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    !> Right-hand side (n_active)
+    real(wp), allocatable, intent(out) :: rhs(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: given(:)
+    integer :: stat
+
+    call now%shear%take_image(n, own, given, stat)
+    if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    if (allocated(error)) return
+    call find_prescribed_displacement(now, given)
+    call now%shear%add_rest(given)
+    call nodes%pack(given, rhs)
+  end subroutine find_rhs
 
   !> Take traction, displacement and motions of a solution.
   subroutine take_solution(now, found, judged, error)
@@ -470,36 +497,39 @@ contains
     !> Rounding error of the displacements [m]
     real(wp), intent(out) :: rounding
 
-    call now%shear%leave_frames(found%x, found%ax, rounding)
-    call move_alloc(found%x, now%q)
+    call now%shear%leave_frames(now%q, found%ax, rounding)
     call move_alloc(found%ax, now%u)
   end subroutine leave_frames
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.
-  subroutine displace(now, x, ax, error)
+  subroutine displace(now, nodes, found, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
-    !> Shear traction, in the frames (2 n)
-    real(wp), intent(in), contiguous, target :: x(:)
-    !> Tangential displacement, in the frames (2 n)
-    real(wp), intent(out), contiguous, target :: ax(:)
+    !> Unknowns (of 2 n)
+    type(active_set_t), intent(in) :: nodes
+    !> Shear traction; its displacement, in the frames, is computed
+    type(shear_solution_t), intent(inout) :: found
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: traction(:)
-    integer :: n
+    real(wp), allocatable, target :: traction(:)
+    integer :: n, m
 
-    if (.not. now%shear_feels_pressure) then
-      call now%shear%product(x, ax, error)
+    n = size(now%p)
+    m = merge(n, 0, now%shear_feels_pressure)
+    call give_back(2*n)
+    allocate (traction(m + 2*n))
+    call now%shear%space%fill(traction, 0.0_wp)
+    call nodes%unpack(found%unknown, traction(m + 1:))
+    call found%fixed%unpack(found%given, traction(m + 1:))
+    if (m == 0) then
+      call now%shear%product(traction, found%ax, error)
       return
     end if
-    n = size(now%p)
-    allocate (traction(3*n))
     call now%shear%space%copy(now%p, traction(:n))
-    call now%shear%space%copy(x, traction(n + 1:))
     call now%shear%turn(traction(n + 1:))
-    call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], ax, error)
+    call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], found%ax, error)
     if (allocated(error)) return
-    call now%shear%add_springs(x, ax)
+    call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
   end subroutine displace
 
   !> Estimate the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
@@ -576,7 +606,7 @@ contains
     end if
     if (size(mb, 2) == 0) return
     call now%shear%take_image(2*n, own, plane, stat)
-    if (stat == 0) allocate (column(size(mb, 1)), stat=stat)
+    if (stat == 0 .and. .not. known) allocate (column(size(mb, 1)), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
       return
@@ -584,9 +614,8 @@ contains
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)
-        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane, column(:n_t), &
-                                             column(n_t + 1:))
-        mb(:, k) = real(column, sp)
+        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane, mb(:n_t, k), &
+                                             mb(n_t + 1:, k))
       else
         call now%shear%space%fill(plane, 0.0_wp)
         column(:) = mb(:, k)

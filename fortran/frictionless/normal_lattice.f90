@@ -12,7 +12,7 @@ module hc_normal_lattice
   use hc_field_space, only: field_space_t
   use hc_flexibility, only: normal
   use hc_flexibility, only: transform_length
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
   use hc_spectrum_cache, only: kernel_cache_t
@@ -81,7 +81,7 @@ contains
     self%space = space
     ! on a window that repeats, single precision is rounded from the spectrum of the other
     if ((exact .or. self%lattice%is_periodic()) .and. .not. self%exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, self%medium, error, normal_only=.true., space=space, &
+      call new_fft_flexibility(self%flexibility, self%lattice, self%medium, error, kind=of_pressure, space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.

@@ -37,7 +37,8 @@ module hc_field_space
     !> Assign and combine vectors
     procedure :: fill, copy, add, add_columns
     !> Scalar product of two vectors, and of several with one
-    procedure :: dot, dots
+    generic :: dot => dot_double, dot_single
+    procedure :: dots
     !> Sum and largest element of a vector or of a field over the window; of nothing, zero and the least number there is
     generic :: sum => vector_sum, window_sum, window_sum_on, window_sum_single
     generic :: max => vector_max, vector_max_on, window_max, window_max_on
@@ -60,7 +61,7 @@ module hc_field_space
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
     procedure, private :: vector_sum, window_sum, window_sum_on, window_sum_single, vector_max, vector_max_on, window_max, &
-                          window_max_on, vector_min, window_min, count_nodes, count_window
+                          window_max_on, vector_min, window_min, count_nodes, count_window, dot_double, dot_single
   end type field_space_t
 
   interface
@@ -573,7 +574,7 @@ contains
   end function dots
 
   !> Compute a scalar product, summed by pairs of rows or in fixed blocks.
-  real(wp) function dot(self, a, b, before)
+  real(wp) function dot_double(self, a, b, before)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length
     real(wp), intent(in), contiguous :: a(:), b(:)
@@ -593,7 +594,33 @@ contains
       end do
     end do
     !$omp end parallel do
-    dot = self%ranks%total(part)
-  end function dot
+    dot_double = self%ranks%total(part)
+  end function dot_double
+
+  !> Compute the scalar product of a vector in single precision and one in double.
+  real(wp) function dot_single(self, a, b)
+    class(field_space_t), intent(in) :: self
+    !> Vectors of equal length
+    real(sp), intent(in), contiguous :: a(:)
+    real(wp), intent(in), contiguous :: b(:)
+    integer, parameter :: block = 1024
+    real(wp) :: part(self%n_term(size(a))), wide(block)
+    integer :: k, m, from, to, at, n
+
+    !$omp parallel do schedule(static) num_threads(self%threads) private(m, from, to, at, n, wide)
+    do k = 1, size(part)
+      part(k) = 0.0_wp
+      do m = 1, self%n_component()
+        call term(self, k, m, size(a), 0, from, to)
+        do at = from, to, block
+          n = min(block, to - at + 1)
+          wide(:n) = a(at:at + n - 1)
+          part(k) = part(k) + ddot(n, wide, 1, b(at:at + n - 1), 1)
+        end do
+      end do
+    end do
+    !$omp end parallel do
+    dot_single = self%ranks%total(part)
+  end function dot_single
 
 end module hc_field_space

@@ -37,6 +37,8 @@ module hc_active_set
   contains
     !> The active nodes of a field
     generic :: pack => pack_field, pack_single
+    !> All values of a field that are not zero, in place of the field
+    procedure :: pack_all, unpack_all
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
     !> Add a multiple of them to the field
@@ -315,6 +317,55 @@ contains
     end do
     !$omp end parallel do
   end subroutine add_single
+
+  !> Pack the values at the active nodes of a field, and those elsewhere that are not zero, and free it.
+  subroutine pack_all(self, field, packed, others, kept)
+    class(active_set_t), intent(in) :: self
+    !> Field over all nodes
+    real(wp), allocatable, intent(inout) :: field(:)
+    !> Values at the active nodes (n_active)
+    real(wp), allocatable, intent(out) :: packed(:)
+    !> Other nodes, and the values there
+    type(active_set_t), intent(out) :: others
+    real(wp), allocatable, intent(out) :: kept(:)
+    logical(lk), allocatable :: left(:)
+    integer :: k, i
+
+    allocate (packed(self%n_active), left(size(field)))
+    call self%pack(field, packed)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do i = 1, size(field)
+      left(i) = abs(field(i)) > 0.0_wp
+    end do
+    !$omp end parallel do
+    do k = 1, size(self%first)
+      left(self%first(k):self%last(k)) = .false.
+    end do
+    call new_active_set(others, left, self%space)
+    allocate (kept(others%n_active))
+    call others%pack(field, kept)
+    deallocate (field)
+  end subroutine pack_all
+
+  !> Make the field again.
+  subroutine unpack_all(self, n, packed, others, kept, field)
+    class(active_set_t), intent(in) :: self
+    !> Number of all nodes
+    integer, intent(in) :: n
+    !> Values at the active nodes; freed
+    real(wp), allocatable, intent(inout) :: packed(:)
+    !> Other nodes, and the values there
+    type(active_set_t), intent(in) :: others
+    real(wp), intent(in), contiguous :: kept(:)
+    !> Field over all nodes
+    real(wp), allocatable, intent(out) :: field(:)
+
+    allocate (field(n))
+    call self%space%fill(field, 0.0_wp)
+    call self%unpack(packed, field)
+    call others%unpack(kept, field)
+    deallocate (packed)
+  end subroutine unpack_all
 
   !> Return the nodes that are not active.
   pure type(active_set_t) function complement(self, n) result(others)

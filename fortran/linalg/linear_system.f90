@@ -77,6 +77,8 @@ module hc_linear_system
     integer :: most = 0, made = 0
     !> GMRES: stored directions, after which it restarts with the present residual
     integer :: most_directions = 0
+    !> GMRES: residuals are stored in single precision; the product has an error of as much of the residual at the start
+    logical :: single = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)
     !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
@@ -85,7 +87,7 @@ module hc_linear_system
     logical :: independent = .true.
     !> Bound of the rounding errors in the product A x, which is carried along
     real(wp) :: drift = 0.0_wp
-    !> GMRES: bound of the error of the product off the active nodes, where directions are of single precision
+    !> GMRES: bound of the error of the product by what is stored in single precision
     real(wp) :: rounding = 0.0_wp
   end type iteration_t
 
@@ -225,32 +227,31 @@ contains
     type(active_set_t), intent(in) :: nodes
     !> Constraints, with multipliers that are nearly right
     type(constraints_t), intent(in) :: constraints
-    !> Right-hand side (n_active), and nearly A x (n)
-    real(wp), intent(in), contiguous :: rhs(:), ax(:)
+    !> Right-hand side (n_active), used up: its memory is that of the residual; nearly A x (n)
+    real(wp), intent(inout), contiguous :: rhs(:)
+    real(wp), intent(in), contiguous :: ax(:)
     !> Share of the preconditioned residual
     real(wp), intent(in) :: length
-    !> Unknowns (n), whose C^T x stays
+    !> Unknowns (n_active), whose C^T x stays
     real(wp), intent(inout), contiguous :: x(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: r(:), z(:)
+    real(wp), allocatable :: z(:)
     real(wp), dimension(size(constraints%multiplier)) :: share
     real(wp) :: inverse(size(share), size(share))
     logical :: independent
 
     call constraints%invert(nodes%space, inverse, independent)
     if (.not. independent) return
-    allocate (r(nodes%n_active), z(nodes%n_active))
+    allocate (z(nodes%n_active))
     call nodes%pack(ax, z)
-    r = rhs - z
-    call constraints%add_columns(system%space, constraints%multiplier, r)
-    call system%precondition_packed(nodes, size(x), r, z, error)
+    rhs = rhs - z
+    call constraints%add_columns(system%space, constraints%multiplier, rhs)
+    call system%precondition_packed(nodes, size(ax), rhs, z, error)
     if (allocated(error)) return
     share = -matmul(inverse, constraints%resultants(nodes%space, z))
     call constraints%add_mb(system%space, share, z)
-    call nodes%pack(x, r)
-    r = r + length*z
-    call nodes%unpack(r, x)
+    x = x + length*z
   end subroutine step_ahead
 
   !> Compute (C^T M B)^-1.

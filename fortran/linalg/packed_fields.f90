@@ -47,11 +47,8 @@ contains
     integer, intent(in) :: k
     !> The field
     real(wp), intent(in), contiguous :: field(:)
-    real(wp), allocatable :: packed(:)
 
-    allocate (packed(self%nodes%n_active))
-    call self%nodes%pack(field, packed)
-    self%values(:, k) = real(packed, sp)
+    call self%nodes%pack(field, self%values(:, k))
   end subroutine keep
 
   !> Return a field that was kept.

@@ -49,7 +49,7 @@ contains
     type(constraints_t), intent(inout) :: constraints
     !> Right-hand side at the active nodes, whose memory becomes that of the residual
     real(wp), allocatable, intent(inout) :: rhs(:)
-    !> Unknowns (n), on entry a start that satisfies the constraints
+    !> Unknowns (n_active), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere, on entry and on return
     real(wp), intent(inout), contiguous :: ax(:)
@@ -77,7 +77,7 @@ contains
     call constraints%invert(space, inverse, independent)
     call find_residual(nodes, rhs, ax, space, r, z)
     allocate (d(size(r)))
-    call system%take_image(size(x), own, onto, stat)
+    call system%take_image(size(ax), own, onto, stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for a product: choose a smaller window')
     if (allocated(error)) return
     iteration%made = 0
@@ -98,7 +98,7 @@ contains
         call add_constraints(change, b, r, iteration%residual, space)
         largest = max(largest, iteration%residual)
         if (iteration%residual <= iteration%tolerance .or. iteration%made >= iteration%most) exit
-        call system%precondition_packed(nodes, size(x), r, z, error)
+        call system%precondition_packed(nodes, size(ax), r, z, error)
         if (allocated(error)) return
         call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
         call recurrence%last_share(rz, share, anew)
@@ -109,7 +109,7 @@ contains
         step = recurrence%step_length(space%dot(d, z))
         if (.not. step > 0.0_wp) iteration%outcome = solution_broke_off
         if (.not. step > 0.0_wp) exit
-        call nodes%add(step, d, x)
+        call combine(step, d, 1.0_wp, x, space)
         call combine(step, onto, 1.0_wp, ax, space)
         change = 0.0_wp
         iteration%made = iteration%made + 1

@@ -6,9 +6,11 @@
 !>     z <- M r - M B (C^T M B)^-1 C^T M r.
 !>
 !> Of the products A z only the part off the active nodes is stored: with the weights W, the matrix H of Arnoldi's method and
-!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s.
+!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s. M r is rounded to single precision before its product;
+!> V may be stored in single precision, too, while the arithmetic is in double.
 !>
-!> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869).
+!> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869; J. I. Aliaga, H. Anzt et al., Int. J. High Perform.
+!> Comput. Appl. 37, 2023, 5-25).
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
@@ -23,9 +25,6 @@ module hc_projected_gmres
   private
 
   public :: projected_gmres
-
-  !> Directions whose memory is about the largest that a load step takes
-  integer, parameter :: many = 4
 
 contains
 
@@ -50,14 +49,18 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      !> Weighted residual v on the active nodes, and M r there, r that residual without its weights: the direction is
-      !> z = M r + M B share with C^T z = 0
-      real(wp), allocatable :: v(:), mr(:)
+      !> Weighted residual v on the active nodes, in one of the precisions
+      real(wp), allocatable :: v(:)
+      real(sp), allocatable :: rounded(:)
+      !> M r there, r that residual without its weights: the direction is z = M r + M B share with C^T z = 0
+      real(sp), allocatable :: mr(:)
       !> The product A z on the other nodes
       real(sp), allocatable :: beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
+    !> Residual without its weights, and the one that becomes the next; in its memory also a direction and its product
+    real(wp), allocatable :: r(:), w(:)
     type(active_set_t) :: others
     !> A product over all nodes, and memory for it where the system has none
     real(wp), pointer, contiguous :: image(:)
@@ -67,6 +70,8 @@ contains
     !> H, and after rotations
     real(wp), dimension(iteration%most_directions + 1, iteration%most_directions) :: arnoldi, h
     real(wp), dimension(iteration%most_directions + 1) :: g, left
+    !> Largest rounding errors of the stored residuals
+    real(wp) :: rounded_off(iteration%most_directions + 1)
     real(wp), dimension(iteration%most_directions) :: c, s, y
     real(wp) :: share(size(constraints%multiplier), iteration%most_directions), length, began
     real(wp) :: inverse(size(constraints%multiplier), size(constraints%multiplier))
@@ -80,6 +85,7 @@ contains
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
     iteration%rounding = 0.0_wp
+    rounded_off = 0.0_wp
     iteration%outcome = solution_broke_off
     call constraints%invert(space, inverse, iteration%independent)
     if (.not. iteration%independent) return
@@ -99,12 +105,11 @@ contains
     !> Compute the weighted residual of the start, the first direction.
     subroutine begin()
       type(active_set_t) :: of_part
-      real(wp), allocatable :: packed(:)
       real(wp) :: unit(size(along))
       integer :: i, part
 
       others = nodes%complement(size(ax))
-      allocate (packed(nodes%n_active))
+      allocate (r(nodes%n_active))
       part = size(ax)/size(iteration%weight)
       last(0) = 0
       do i = 1, size(iteration%weight)
@@ -114,17 +119,17 @@ contains
       do i = 1, size(along)
         unit = 0.0_wp
         unit(i) = 1.0_wp
-        packed = 0.0_wp
-        call constraints%add_columns(space, unit, packed)
-        call weigh(iteration%weight, packed)
-        along(i) = sqrt(space%dot(packed, packed))
+        r = 0.0_wp
+        call constraints%add_columns(space, unit, r)
+        call weigh(iteration%weight, r)
+        along(i) = sqrt(space%dot(r, r))
       end do
-      call move_alloc(rhs, basis(1)%v)
-      call nodes%pack(ax, packed)
-      basis(1)%v = basis(1)%v - packed
-      call constraints%add_columns(space, constraints%multiplier, basis(1)%v)
-      call weigh(iteration%weight, basis(1)%v)
-      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
+      call move_alloc(rhs, w)
+      call nodes%pack(ax, r)
+      w = w - r
+      call constraints%add_columns(space, constraints%multiplier, w)
+      call weigh(iteration%weight, w)
+      length = sqrt(space%dot(w, w))
       iteration%residual = length
       iteration%drift = epsilon(1.0_wp)*length
     end subroutine begin
@@ -138,15 +143,15 @@ contains
 
       directions = 0
       began = length
-      basis(1)%v = basis(1)%v/length
+      w = w/length
+      call keep(1, stat)
       g = 0.0_wp
       g(1) = began
       h = 0.0_wp
       do k = 1, most
-        stat = 0
-        if (.not. allocated(basis(k)%mr)) then
-          if (k >= many) call give_back(size(ax))
-          allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+        if (stat == 0 .and. .not. allocated(basis(k)%mr)) then
+          call give_back(size(ax))
+          allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), stat=stat)
         end if
         if (stat == 0) call system%take_image(size(ax), own, image, stat)
         if (stat /= 0) then
@@ -155,19 +160,24 @@ contains
         end if
         call find_direction(k)
         if (allocated(error)) return
-        call system%product_packed(nodes, basis(k + 1)%v, image, error)
+        call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
-        call nodes%pack(image, basis(k + 1)%v)
+        call nodes%pack(image, w)
         call others%pack(image, basis(k)%beyond)
-        call constraints%add_columns(space, -share(:, k), basis(k + 1)%v)
-        call weigh(iteration%weight, basis(k + 1)%v)
+        call constraints%add_columns(space, -share(:, k), w)
+        call weigh(iteration%weight, w)
         do i = 1, k
-          h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
-          basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
+          if (iteration%single) then
+            h(i, k) = space%dot(basis(i)%rounded, w)
+          else
+            h(i, k) = space%dot(basis(i)%v, w)
+          end if
+          call add_residual(-h(i, k), i)
         end do
-        h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
+        h(k + 1, k) = sqrt(space%dot(w, w))
         arnoldi(:, k) = h(:, k)
-        if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
+        if (h(k + 1, k) > 0.0_wp) w = w/h(k + 1, k)
+        call keep(k + 1, stat)
         do i = 1, k - 1
           rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
           h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
@@ -188,28 +198,63 @@ contains
       if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
-    !> Compute a direction, in the memory of the next residual.
+    !> Store a residual.
+    subroutine keep(i, stat)
+      !> Its number
+      integer, intent(in) :: i
+      !> Not zero: there is not enough memory
+      integer, intent(out) :: stat
+
+      stat = 0
+      if (iteration%single) then
+        if (.not. allocated(basis(i)%rounded)) allocate (basis(i)%rounded(size(w)), stat=stat)
+        if (stat /= 0) return
+        basis(i)%rounded = real(w, sp)
+        rounded_off(i) = 0.5_wp*epsilon(1.0_sp)*space%max_abs(w)
+      else
+        if (.not. allocated(basis(i)%v)) allocate (basis(i)%v(size(w)), stat=stat)
+        if (stat == 0) basis(i)%v = w
+      end if
+    end subroutine keep
+
+    !> Add a multiple of a stored residual to w.
+    subroutine add_residual(factor, i)
+      real(wp), intent(in) :: factor
+      !> Its number
+      integer, intent(in) :: i
+
+      if (iteration%single) then
+        w = w + factor*basis(i)%rounded
+      else
+        w = w + factor*basis(i)%v
+      end if
+    end subroutine add_residual
+
+    !> Compute a direction.
     subroutine find_direction(k)
       !> Its number
       integer, intent(in) :: k
 
-      call weigh(1.0_wp/iteration%weight, basis(k)%v)
-      call system%precondition_packed(nodes, size(ax), basis(k)%v, basis(k + 1)%v, error)
+      if (iteration%single) then
+        r = basis(k)%rounded
+      else
+        r = basis(k)%v
+      end if
+      call weigh(1.0_wp/iteration%weight, r)
+      call system%precondition_packed(nodes, size(ax), r, w, error)
       if (allocated(error)) return
-      call weigh(iteration%weight, basis(k)%v)
-      call space%copy(basis(k + 1)%v, basis(k)%mr)
-      share(:, k) = -matmul(inverse, constraints%resultants(space, basis(k + 1)%v))
-      call constraints%add_mb(space, share(:, k), basis(k + 1)%v)
+      basis(k)%mr = real(w, sp)
+      w = basis(k)%mr
+      share(:, k) = -matmul(inverse, constraints%resultants(space, w))
+      call constraints%add_mb(space, share(:, k), w)
     end subroutine find_direction
 
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
-      real(wp), allocatable :: packed(:)
       real(wp) :: largest
       integer :: i
 
       if (allocated(own)) deallocate (own)
-      allocate (packed(nodes%n_active))
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do
@@ -221,37 +266,38 @@ contains
       ! solution and product from the same directions: the preconditioner is of single precision, and where a node
       ! slips far the matrix would make displacements of its rounding errors
       left = 0.0_wp
-      packed = 0.0_wp
+      w = 0.0_wp
       do i = 1, directions + 1
         left(i) = -dot_product(arnoldi(i, :directions), y(:directions))
-        packed = packed - left(i)*basis(i)%v
+        call add_residual(-left(i), i)
       end do
-      call weigh(1.0_wp/iteration%weight, packed)
-      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), packed)
-      call nodes%add(1.0_wp, packed, ax)
-      packed = 0.0_wp
-      call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), packed)
-      call space%add(packed, x)
+      call weigh(1.0_wp/iteration%weight, w)
+      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w)
+      call nodes%add(1.0_wp, w, ax)
+      w = 0.0_wp
+      call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), w)
+      call space%add(w, x)
       do i = 1, directions
         call add_direction(y(i), basis(i)%mr)
         call others%add(y(i), basis(i)%beyond, ax)
         largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
-        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*abs(y(i))*largest
+        iteration%rounding = iteration%rounding + abs(y(i))*(0.5_wp*epsilon(1.0_sp)*largest &
+                                                             + arnoldi(i + 1, i)*rounded_off(i + 1)/minval(iteration%weight))
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return
       left(1) = left(1) + began
-      basis(1)%v = left(1)*basis(1)%v
-      do i = 2, directions + 1
-        basis(1)%v = basis(1)%v + left(i)*basis(i)%v
+      w = 0.0_wp
+      do i = 1, directions + 1
+        call add_residual(left(i), i)
       end do
-      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
+      length = sqrt(space%dot(w, w))
     end subroutine take_step
 
     !> Add a multiple of a direction to the unknowns.
     subroutine add_direction(factor, direction)
       real(wp), intent(in) :: factor
-      real(wp), intent(in), contiguous :: direction(:)
+      real(sp), intent(in), contiguous :: direction(:)
       integer :: i
 
       !$omp parallel do simd schedule(static) num_threads(space%threads)

@@ -31,7 +31,7 @@ contains
     type(constraints_t), intent(inout) :: constraints
     !> Right-hand side at the active nodes; used up
     real(wp), allocatable, intent(inout) :: rhs(:)
-    !> Unknowns (n), on entry a start that satisfies the constraints
+    !> Unknowns (n_active), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere, on entry and on return
     real(wp), intent(inout), contiguous :: ax(:)
@@ -39,8 +39,6 @@ contains
     type(iteration_t), intent(inout) :: iteration
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-
-    real(wp), allocatable :: unknown(:)
 
     if (system%symmetric) then
       call projected_cg(system, nodes, constraints, rhs, x, ax, iteration, error)
@@ -50,10 +48,7 @@ contains
     allocate (constraints%multiplier(size(constraints%columns, 2)), source=0.0_wp)
     iteration%most_directions = max_directions
     iteration%weight = [1.0_wp]
-    allocate (unknown(nodes%n_active))
-    call nodes%pack(x, unknown)
-    call projected_gmres(system, nodes, constraints, rhs, unknown, ax, iteration, error)
-    call nodes%unpack(unknown, x)
+    call projected_gmres(system, nodes, constraints, rhs, x, ax, iteration, error)
   end subroutine solve_step_equation
 
 end module hc_step_equation

@@ -17,7 +17,7 @@ module hc_edge_tractions
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, of_pressure, of_all_tractions
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
@@ -114,7 +114,8 @@ contains
     else
       call new_traction_field(edge_shape, lattice, edges, traction(:, :, 1:1), contact, stick, options=tuning)
     end if
-    call new_fft_flexibility(flexibility, lattice, medium, error, normal_only=n == 1, space=space, cache=cache)
+    call new_fft_flexibility(flexibility, lattice, medium, error, merge(of_pressure, of_all_tractions, n == 1), space, &
+                              cache=cache)
     if (allocated(error)) return
     system%flexibility => flexibility
     system%space = space
@@ -228,7 +229,7 @@ contains
     real(wp), intent(inout) :: change(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: x(:), ax(:), rhs(:)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), unknown(:)
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     logical(lk), allocatable :: active(:)
@@ -255,8 +256,10 @@ contains
       iteration = iteration_t(tolerance=system%options%accuracy*maxval(abs(rhs - ax), mask=active), &
                               most=system%options%max_iterations)
       rhs = pack(rhs, active)
-      call projected_cg(system, set, constraints, rhs, x, ax, iteration, error)
+      unknown = pack(x, active)
+      call projected_cg(system, set, constraints, rhs, unknown, ax, iteration, error)
       if (allocated(error)) return
+      call set%unpack(unknown, x)
       if (iteration%outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)
       change = reshape(x, shape(change))
     end associate

@@ -11,13 +11,14 @@ module hc_flexibility_fft
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
   use hc_fft_passes, only: complement
   use hc_fft_layout, only: convolution_memory, transform_memory
-  use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
+  use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions, of_tractions_rounded
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_pressure_kernel, only: normal_kernel_t
   implicit none
   private
 
   public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory, spectra_of
+  public :: of_pressure, of_all_tractions, of_tractions_rounded
 
   !> Blocks that have spectra, the odd ones last, where that of yy is a multiple of the normal one less that of xx.
   integer, parameter :: with_trace(5) = [1, 2, 3, 5, 6]
@@ -53,7 +54,7 @@ module hc_flexibility_fft
 contains
 
   !> Make plans and spectra of the operator over a window.
-  subroutine new_fft_flexibility(operator, lattice, medium, error, normal_only, space, kernel, cache)
+  subroutine new_fft_flexibility(operator, lattice, medium, error, kind, space, kernel, cache)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
     !> Lattice and window
@@ -62,11 +63,12 @@ contains
     class(elastic_medium_t), intent(in) :: medium
     !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> The operator is applied to the pressure alone, for the gap alone
-    logical, intent(in), optional :: normal_only
+    !> of_pressure: the operator is applied to the pressure alone, for the gap alone; of_tractions_rounded: it only serves for
+    !> starts; absent: of_all_tractions
+    integer, intent(in), optional :: kind
     !> Space of the fields; absent: as many threads as OpenMP would take
     type(field_space_t), intent(in), optional :: space
-    !> With `normal_only`: the kernel, as far as it has been computed
+    !> With `of_pressure`: the kernel, as far as it has been computed
     type(normal_kernel_t), intent(inout), optional :: kernel
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
@@ -76,7 +78,7 @@ contains
     class(elastic_medium_t), allocatable :: reduced
     type(kernel_key_t) :: key
     type(field_space_t) :: shared
-    integer :: n_kernel(2), i
+    integer :: n_kernel(2), spectra, i
     logical :: only_normal, found
 
     call check_operator(lattice, medium, error)
@@ -84,8 +86,9 @@ contains
     shared = space_over(lattice%extent)
     if (present(space)) shared = space
     operator%space = shared
-    only_normal = .false.
-    if (present(normal_only)) only_normal = normal_only
+    spectra = of_all_tractions
+    if (present(kind)) spectra = kind
+    only_normal = spectra == of_pressure
     operator%lattice = lattice
     allocate (operator%medium, source=medium)
     operator%n_component = merge(1, 3, only_normal)
@@ -104,7 +107,8 @@ contains
     if (allocated(error)) return
     operator%convolution%factor = medium%unit(lattice%spacing())
     operator%convolution%whole = medium%trace()
-    key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, medium)
+    operator%convolution%rounded = spectra == of_tractions_rounded
+    key = new_kernel_key(spectra, lattice, medium)
     call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
     if (lattice%is_periodic()) then

@@ -12,7 +12,7 @@ module hc_operator_set
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: flexibility_t, normal
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, of_all_tractions, of_tractions_rounded
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_preconditioner, only: preconditioner_t
   use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
@@ -52,7 +52,7 @@ module hc_operator_set
 contains
 
   !> Set up the operator by FFT and preconditioners by the inverse symbol, over a window.
-  subroutine new_operators(self, lattice, medium, space, error, cache, options)
+  subroutine new_operators(self, lattice, medium, space, error, cache, options, rounded)
     !> Operators to be set up
     type(operators_t), intent(out) :: self
     !> Lattice and window
@@ -67,7 +67,10 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Tuning numbers of the preconditioners; absent: the usual ones
     type(preconditioner_options_t), intent(in), optional :: options
+    !> The operator only serves for starts, with spectra in single precision; absent: it does not
+    logical, intent(in), optional :: rounded
     type(preconditioner_options_t) :: tuning
+    integer :: kind
     type(fft_flexibility_t), allocatable :: flexibility
     type(pressure_preconditioner_t), allocatable :: normal
     type(shear_preconditioner_t), allocatable :: tangential
@@ -75,7 +78,9 @@ contains
     if (present(options)) tuning = options
     self%space = space
     allocate (flexibility, normal, tangential)
-    call new_fft_flexibility(flexibility, lattice, medium, error, space=space, cache=cache)
+    kind = of_all_tractions
+    if (present(rounded)) kind = merge(of_tractions_rounded, of_all_tractions, rounded)
+    call new_fft_flexibility(flexibility, lattice, medium, error, kind, space, cache=cache)
     if (allocated(error)) return
     call new_symbol_preconditioner(normal, lattice, medium, space, tuning, error, cache)
     if (allocated(error)) return
@@ -97,7 +102,8 @@ contains
     !> Row transforms share the memory of those of a finer lattice; the window repeats
     logical, intent(in) :: shared, periodic
 
-    operators_memory = fft_memory(extent, .false., threads, n_spectrum, shared, periodic) &
+    ! spectra that only serve for starts are rounded
+    operators_memory = fft_memory(extent, .false., threads, n_spectrum, shared, periodic)/merge(2, 1, shared) &
                        + preconditioner_memory(extent, threads, .false., shared=.true.) &
                        + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory

@@ -228,16 +228,18 @@ contains
     real(wp), intent(in), contiguous :: displacement(:)
     real(wp), intent(inout), contiguous :: traction(:)
     real(wp), intent(inout) :: work
-    !> Along t: share of the bodies in the displacement, and the traction of the springs under the rest
-    real(wp), allocatable :: across(:), rest(:)
+    !> Traction of the springs along t
+    real(wp), allocatable :: rest(:)
 
     if (self%slips) then
       call take_fields(self, n/2)
     else
       call self%take_memory(n)
     end if
-    associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active, threads => self%space%threads)
-      allocate (across(n_t), rest(n_t))
+    ! the share of the bodies in the displacement along t stands where the traction will be
+    associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active, threads => self%space%threads, &
+               across => traction(:nodes%pairs%n_first))
+      if (self%slips) allocate (rest(n_t))
       across = displacement(:n_t)/self%unit
       if (self%slips) call share_out(self, runs, displacement(n_t + 1:n_all), across, rest)
       call to_plane(runs, threads, self%direction, self%values(:n/2), self%values(n/2 + 1:), across, displacement(n_t + 1:n_all), &
@@ -249,7 +251,7 @@ contains
       call self%space%fill(traction(:n_all), 0.0_wp)
       call add_in_frames(runs, threads, self%direction, self%values(:n/2), self%values(n/2 + 1:), traction(:n_t), &
                          traction(n_t + 1:n_all))
-      if (self%slips) call collect(self, runs, rest, across, traction(:n_t), traction(n_t + 1:n_all))
+      if (self%slips) call collect(self, runs, rest, traction(:n_t), traction(n_t + 1:n_all))
     end associate
   end subroutine apply_to_shear_packed
 
@@ -290,34 +292,34 @@ contains
   end subroutine share_out
 
   !> Compute U^T y + (I - U)^T v, the transpose of `share_out`.
-  subroutine collect(self, runs, rest, work, along_t, along_e)
+  subroutine collect(self, runs, rest, along_t, along_e)
     class(shear_preconditioner_t), intent(inout) :: self
     !> Active nodes
     type(paired_runs_t), intent(in) :: runs
-    !> Traction v of the springs along t; place for as many numbers
-    real(wp), intent(in), contiguous :: rest(:)
-    real(wp), intent(inout), contiguous :: work(:)
+    !> Traction v of the springs along t; used up
+    real(wp), intent(inout), contiguous :: rest(:)
     !> Traction y of the bodies, then the sum, along t and e at the active nodes
     real(wp), intent(inout), contiguous :: along_t(:), along_e(:)
-    real(wp) :: waves
+    real(wp) :: waves, both
     integer :: i, pass
 
     waves = 1.0_wp - self%options%short_waves/self%options%long_waves
-    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
-    do i = 1, size(work)
-      work(i) = (1.0_wp - self%own(i))*waves*(along_t(i) - rest(i))
-      along_t(i) = self%own(i)*along_t(i) + (1.0_wp - self%own(i))*rest(i)
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(both)
+    do i = 1, size(rest)
+      both = self%own(i)*along_t(i) + (1.0_wp - self%own(i))*rest(i)
+      rest(i) = (1.0_wp - self%own(i))*waves*(along_t(i) - rest(i))
+      along_t(i) = both
     end do
     !$omp end parallel do simd
-    call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), work)
+    call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest)
     do pass = size(self%options%smoothing_steps), 1, -1
       call average(self, self%options%smoothing_steps(pass))
     end do
-    call self%space%fill(work, 0.0_wp)
-    call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), work, along_e)
+    call self%space%fill(rest, 0.0_wp)
+    call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e)
     !$omp parallel do simd schedule(static) num_threads(self%space%threads)
-    do i = 1, size(work)
-      along_t(i) = along_t(i) + self%far(i)*work(i)
+    do i = 1, size(rest)
+      along_t(i) = along_t(i) + self%far(i)*rest(i)
     end do
     !$omp end parallel do simd
   end subroutine collect

@@ -17,7 +17,7 @@ program bench_operator
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_field_space, only: field_space_t
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure, of_all_tractions
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate, good_size
   implicit none
 
@@ -162,7 +162,7 @@ contains
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [side, side], error)
     call new_fft_flexibility(operator, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, &
-                             normal_only=n_component == 1, space=field_space_t(1))
+                             kind=merge(of_pressure, of_all_tractions, n_component == 1), space=field_space_t(1))
     if (allocated(error)) error stop 'the operator could not be set up'
     allocate (traction(side, side, n_component), displacement(side, side, n_component))
     call random_number(traction)

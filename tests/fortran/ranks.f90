@@ -8,7 +8,7 @@ module ranks_tests
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure, of_all_tractions
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
@@ -241,12 +241,12 @@ contains
     allocate (traction(lattice%extent(1), lattice%extent(2), n), expected(lattice%extent(1), lattice%extent(2), n))
     traction = reshape([(sin(1.3_wp*i), i=1, size(traction))], shape(traction))
     space = space_over(lattice%extent, 1)
-    call new_fft_flexibility(alone, lattice, pair, error, normal_only=.not. all_of_them, space=space)
+    call new_fft_flexibility(alone, lattice, pair, error, kind=merge(of_all_tractions, of_pressure, all_of_them), space=space)
     if (allocated(error)) return
     space%ranks = ranks
     rows = space%own_rows(lattice%extent(2))
     allocate (answer(lattice%extent(1), rows(2) - rows(1) + 1, n))
-    call new_fft_flexibility(shared, lattice, pair, error, normal_only=.not. all_of_them, space=space)
+    call new_fft_flexibility(shared, lattice, pair, error, kind=merge(of_all_tractions, of_pressure, all_of_them), space=space)
     if (allocated(error)) return
     call alone%apply(components(:n), traction, components(:n), expected, error)
     if (allocated(error)) return

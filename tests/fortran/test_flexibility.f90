@@ -9,7 +9,7 @@ module test_flexibility
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
@@ -397,7 +397,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(shared(4), oblique, pair, error, cache=cache)
     if (allocated(error)) return
-    call new_fft_flexibility(shared(5), lattice, pair, error, normal_only=.true., cache=cache)
+    call new_fft_flexibility(shared(5), lattice, pair, error, kind=of_pressure, cache=cache)
     if (allocated(error)) return
     call check_true(error, cache%found == 2 .and. cache%missed == 3, 'another lattice, other components')
     if (allocated(error)) return
@@ -429,7 +429,7 @@ contains
     field = 0.0_wp
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 5], error)
     if (allocated(error)) return
-    call new_fft_flexibility(fft, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, normal_only=.true.)
+    call new_fft_flexibility(fft, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, kind=of_pressure)
     if (allocated(error)) return
     call fft%apply([normal], field, [normal], answer, raised)
     call check_raised(error, raised, status%invalid_input, 'an answer of another shape')
@@ -520,7 +520,7 @@ contains
     pair = elastic_pair_t(0.7_wp, 0.0_wp, 0.0_wp)
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-32, -32], [65, 65], error)
     if (allocated(error)) return
-    call new_fft_flexibility(fft, lattice, pair, error, normal_only=.true.)
+    call new_fft_flexibility(fft, lattice, pair, error, kind=of_pressure)
     if (allocated(error)) return
     call new_inverse_symbol(preconditioner, lattice, pair, field_space_t(), error)
     if (allocated(error)) return

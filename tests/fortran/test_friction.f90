@@ -505,7 +505,7 @@ contains
       call new_operators(operators, lattice, pair, field_space_t(), error)
       if (allocated(error)) return
       if (allocated(x)) deallocate (x, y, unknown, image, none%columns, none%mb)
-      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n))
+      allocate (x(side, side), y(side, side), image(2*n))
       call lattice%coordinates(x, y)
       call new_shear_system(system, operators)
       ! compliances from nothing to that of the whole contact, as they grow across a slip zone
@@ -513,9 +513,9 @@ contains
       active = [reshape(x**2 + y**2 < 0.8_wp, [n]), spread(.false., 1, n)]
       system%space = field_space_t()
       call system%set_contact(active(:n))
-      unknown = 0.0_wp
       image = 0.0_wp
       call new_active_set(nodes, active, system%space)
+      allocate (unknown(nodes%n_active), source=0.0_wp)
       allocate (rhs(nodes%n_active), source=1.0_wp)
       call nodes%pair(2*n)
       allocate (none%columns(nodes%n_active, 0), none%mb(nodes%n_active, 0))

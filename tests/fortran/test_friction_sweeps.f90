@@ -244,7 +244,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t), target :: contact
     type(operators_t), target :: operators
-    type(contact_state_t) :: start
+    type(contact_state_t) :: start, used_up
     type(friction_iterate_t), target :: fresh, now
     real(wp), allocatable :: change(:, :)
     real(wp), allocatable, target :: reference(:, :, :)
@@ -265,7 +265,8 @@ contains
       reference = start%relative_displacement
       reference(at(1), at(2), 1) = contact%problem%tangential_compliance
       now = fresh
-      call now%set_start(contact%problem, operators, start, &
+      used_up = start
+      call now%set_start(contact%problem, operators, used_up, &
                        load_step_t(load_target_t([f, d, d, d], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), reference, 1.0e-9_wp), error)
       if (allocated(error)) return
       now%first = .false.

@@ -91,7 +91,7 @@ contains
     integer, intent(out) :: iterations, outcome
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out), optional :: drift
-    real(wp), allocatable :: right(:)
+    real(wp), allocatable :: right(:), unknown(:)
     type(constraints_t) :: constraints
     type(iteration_t) :: iteration
     type(active_set_t) :: nodes
@@ -99,10 +99,12 @@ contains
     call new_active_set(nodes, active, system%space)
     call pack_columns(nodes, constraint, constraints%columns)
     call pack_single(nodes, mb, constraints%mb)
-    allocate (right(nodes%n_active))
+    allocate (right(nodes%n_active), unknown(nodes%n_active))
     call nodes%pack(rhs, right)
+    call nodes%pack(x, unknown)
     iteration = iteration_t(tolerance=tolerance, most=max_iterations)
-    call freeing_cg(system, nodes, constraints, right, x, ax, iteration, error)
+    call freeing_cg(system, nodes, constraints, right, unknown, ax, iteration, error)
+    call nodes%unpack(unknown, x)
     multiplier = constraints%multiplier
     residual = iteration%residual
     iterations = iteration%made
@@ -642,7 +644,7 @@ contains
     type(dense_system_t) :: system
     type(active_set_t) :: nodes
     real(wp) :: x(5), before(5), ax(5), r(5), z(5), columns(5, 1), rows(5, 1)
-    real(wp), allocatable :: mb(:, :)
+    real(wp), allocatable :: mb(:, :), right(:), unknown(:)
     type(constraints_t) :: constraints
     real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], length = 0.6_wp
     logical(lk), parameter :: active(5) = [.true., .true., .false., .true., .true.]
@@ -665,8 +667,11 @@ contains
     call pack_columns(nodes, columns, constraints%columns)
     call pack_single(nodes, mb, constraints%mb)
     call pack_columns(nodes, rows, constraints%rows)
-    call step_ahead(system, nodes, constraints, pack(rhs, active), ax, length, x, error)
+    right = pack(rhs, active)
+    unknown = pack(x, active)
+    call step_ahead(system, nodes, constraints, right, ax, length, unknown, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, x)
     r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)
     z = r/[(1.0_wp + i, i=1, 5)]
     z = z - mb(:, 1)*(dot_product(rows(:, 1), z)/dot_product(rows(:, 1), mb(:, 1)))
@@ -676,8 +681,10 @@ contains
     if (allocated(error)) return
     before = x
     constraints%rows = 0.0_wp*constraints%rows
-    call step_ahead(system, nodes, constraints, pack(rhs, active), ax, length, x, error)
+    right = pack(rhs, active)
+    call step_ahead(system, nodes, constraints, right, ax, length, unknown, error)
     if (allocated(error)) return
+    call nodes%unpack(unknown, x)
     call check(error, x, before, 0.0_wp, 'no step where constraints depend on each other')
   end subroutine test_step_ahead
 

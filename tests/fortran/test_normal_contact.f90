@@ -9,7 +9,7 @@ module test_normal_contact
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_lattice_symbol, only: kernel_symbols, lattice_symbols
@@ -285,7 +285,7 @@ contains
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-60, -60], [n, n], error)
     if (.not. allocated(error)) then
-      call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, normal_only=.true.)
+      call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, kind=of_pressure)
     end if
     if (allocated(error)) return
     call new_inverse_symbol(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
@@ -399,7 +399,7 @@ contains
     if (allocated(error)) return
     call solver%solve(force_control, 4.0_wp/3.0_wp, tolerance, 60, state, error)
     if (allocated(error)) return
-    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=.true.)
+    call new_fft_flexibility(flexibility, lattice, pair, error, kind=of_pressure)
     if (allocated(error)) return
     pressure = reshape(state%pressure, [150, 150, 1])
     allocate (w, mold=pressure)

@@ -8,7 +8,7 @@ module test_preconditioner
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure
   use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_preconditioner, only: preconditioner_t
@@ -78,7 +78,7 @@ contains
     pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp)
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [n, n], error)
     if (allocated(error)) return
-    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=.true.)
+    call new_fft_flexibility(flexibility, lattice, pair, error, kind=of_pressure)
     if (allocated(error)) return
     call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), preconditioner_options_t(), error)
     if (allocated(error)) return

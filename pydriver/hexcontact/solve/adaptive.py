@@ -25,26 +25,31 @@ class GivenPath:
     def __init__(self, case: Problem, window: Any, before: Sequence[Step]) -> None:
         self.case, self.window = case, window
         self.position = len(before)
+        self.state: Any = None  # from which the next load step starts; the only reference to it
 
-    def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
+    def steps(self, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
         """Solve a load step; yield it with the state at its end.
 
         `begun` has the loads and motions at the beginning of its segment. If the contact reaches the rim, the
         step is solved again on a larger window.
         """
         started, values = time.perf_counter(), target.values(begun)
-        while (reached := self.window.advance(state, target, values)).touches_rim:
+        while (reached := self.window.advance(self.state, target, values)).touches_rim:
             if self.case.full_contact:
                 break
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
-            state = self.window.carried(state, smaller)
+            self.state = self.window.carried(self.state, smaller)
         if not reached.converged:
             raise self.window.failure(reached, target, values)
-        step = self.window.step(target, reached, state, started)
-        del state  # its memory goes before the step is written
-        yield step, reached
+        yield self.window.step(target, reached, self._spent(), started), reached
 
-    def after(self, state: Any) -> Iterator[Step]:
+    def _spent(self) -> float:
+        """Return the energy dissipated before a load step, and free the state at its beginning."""
+        spent = 0.0 if self.state is None else self.state.dissipated_energy
+        self.state = None
+        return spent
+
+    def after(self) -> Iterator[Step]:
         """Solve further steps after the load history; here none."""
         yield from ()
 
@@ -69,22 +74,20 @@ class AdaptivePath(GivenPath):
         """Return a load step with its number among the recorded ones."""
         return dataclasses.replace(target, index=self._number)
 
-    def steps(
-        self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
-    ) -> Iterator[tuple[Step, ContactState]]:
+    def steps(self, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, ContactState]]:
         """Solve the rest of an adaptive segment, or a given load step; yield each step and its end."""
         if target.ramp is None:
-            for step, reached in super().steps(state, self._numbered(target), begun):
+            for step, reached in super().steps(self._numbered(target), begun):
                 self._steps, self._whole = core.forget_changes(self._steps)._replace(fraction=1.0), None
                 yield self._placed(step), reached
             return
         place = self.position
         while self.position == place:
             started = time.perf_counter()
-            state, reached = self._taken(state, target, begun)
+            reached = self._taken(target, begun)
             now = self._steps
             part = dataclasses.replace(self._numbered(target.until(now.end)), ramp=target.ramp)
-            step = self.window.step(part, reached, state, started)
+            step = self.window.step(part, reached, self._spent(), started)
             history = {
                 **step.history,
                 "stick_area_step_error": now.stick_area_error,
@@ -96,7 +99,6 @@ class AdaptivePath(GivenPath):
                 "segment_fraction": now.end,
             }
             yield self._placed(dataclasses.replace(step, history=history)), reached
-            state = reached.as_start()
             del step, reached
 
     def _placed(self, step: Step) -> Step:
@@ -119,10 +121,8 @@ class AdaptivePath(GivenPath):
             companion, control["companion"] = self._whole.parts()
         return dataclasses.replace(step, companion=companion, control=control, load_fraction=control["done"])
 
-    def _taken(
-        self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
-    ) -> tuple[ContactState | None, ContactState]:
-        """Attempt load steps on a growing window until one is taken; return the states before and after."""
+    def _taken(self, target: LoadStep, begun: Mapping[str, float]) -> ContactState:
+        """Attempt load steps on a growing window until one is taken; return the state at its end."""
         assert target.ramp is not None
         self._steps = core.begin_step(self._steps, target.ramp.largest)
         while True:
@@ -133,7 +133,7 @@ class AdaptivePath(GivenPath):
                 self._steps,
                 [motion.control for motion in target.targets],
                 [[*values, *self.case.bulk(part.bulk)[1]] for part, values in driven],
-                self.window.contact.virgin() if state is None else state,
+                self.window.contact.virgin() if self.state is None else self.state,
                 self._whole,
                 **self.window.how,
             )
@@ -142,8 +142,8 @@ class AdaptivePath(GivenPath):
             if self._steps.verdict == core.OUTGROWN:
                 smaller = self.window.lattice
                 self.window = self.window.grown(reached, self._numbered(target))
-                state = self.window.carried(state, smaller)
+                self.state = self.window.carried(self.state, smaller)
                 self._whole = self.window.carried(self._whole, smaller)
             elif self._steps.verdict != core.REJECTED:
                 self._whole = whole
-                return state, reached
+                return reached

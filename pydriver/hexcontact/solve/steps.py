@@ -102,7 +102,7 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
 
 def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]) -> Iterator[Step]:
     """Solve step by step; see `steps`."""
-    state = path.window.restored(before[-1]) if before else None
+    path.state = path.window.restored(before[-1]) if before else None
     if before and isinstance(before, list) and ranks.count > 1:  # each rank has its rows of the last step
         before[-1] = before[-1].head
     segment, begun, reached_by_now = -1, _standing({}), _standing({})
@@ -113,19 +113,20 @@ def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]
     for target in targets:
         if target.segment != segment:
             segment, begun = target.segment, reached_by_now
-        for step, reached in path.steps(state, target, begun):
-            _warn_of_path(path.case, step, state, path.window.listener)
-            # before the step is written, so that the memory of the state before it goes
-            state, reached_by_now = reached.as_start(), _standing(step.history)
+        touching = path.state is not None and path.state.normal_load > 0.0
+        for step, reached in path.steps(target, begun):
+            _warn_of_path(path.case, step, touching, path.window.listener)
+            path.state, reached_by_now = reached.as_start(), _standing(step.history)
+            touching = path.state is not None and path.state.normal_load > 0.0
             yield step
             del step, reached  # the next step has no use of them
-    yield from path.after(state)
+    yield from path.after()
 
 
-def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) -> None:
+def _warn_of_path(case: Problem, step: Step, touching: bool, listener: Listener) -> None:
     """Warn of a load step that was halved where nothing prescribes the path of its parts."""
     static = case.solver.algorithm == "static"
-    if step.history.get("cuts") and (static or before is None or not before.normal_load > 0.0):
+    if step.history.get("cuts") and (static or not touching):
         in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
         words = unasked_path([step.number], in_parts)
         listener.said("halved", level=logging.WARNING, step=step.number, warning=words)

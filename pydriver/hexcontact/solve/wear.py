@@ -52,21 +52,21 @@ class WearPath(GivenPath):
         numbers |= {"interpolated": case.solver.entry == "interpolated", "size": 1.0, "first": 0.5}
         self._settings = core.WearSettings(**numbers)
 
-    def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
+    def steps(self, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
         """Solve a load step before the first cycle that wears."""
-        for step, reached in super().steps(state, target, begun):
+        for step, reached in super().steps(target, begun):
             self._number += 1
             control = self._control([-1.0] * len(self._targets), np.zeros((len(self._targets), 2, 7)))
             yield dataclasses.replace(step, control=control, load_fraction=0.0), reached
 
-    def after(self, state: ContactState) -> Iterator[Step]:
+    def after(self) -> Iterator[Step]:
         """Solve the cycles that wear the surfaces, from the end of the load history or of the last cycle."""
         started, done = time.perf_counter(), 0.0 if self._last is None else self._last.history["wear_cycles"]
-        cycles, self._last = self._begun(state), None
+        cycles, self._last = self._begun(self.state), None
         while done < self._wear.cycles:
             now = self._solved(cycles)
-            before, state = state, cycles.reached(self.window.contact)
-            yield self._recorded(cycles, now, state, before, started)
+            spent, self.state = self._spent(), cycles.reached(self.window.contact)
+            yield self._recorded(cycles, now, spent, started)
             started, done = time.perf_counter(), now.cycles
 
     def _begun(self, state: ContactState) -> core.CyclesOfWear:
@@ -128,16 +128,15 @@ class WearPath(GivenPath):
         self,
         cycles: core.CyclesOfWear,
         now: core.WearProgress,
-        state: ContactState,
-        before: ContactState,
+        spent: float,
         started: float,
     ) -> Step:
-        """Return a cycle as a load step, with the restart data of the next one."""
+        """Return a cycle as a load step, with the restart data of the next; `spent`: energy before it."""
         fields = cycles.fields(self.window.contact)
         self.window.remember_wear(fields)
         last = self._targets[0]
         target = dataclasses.replace(last, index=self._number, segment=last.segment + 1, label=LABEL)
-        step = self.window.step(target, state, before, started)
+        step = self.window.step(target, self.state, spent, started)
         history = {
             **step.history,
             "wear_cycles": now.cycles,

@@ -149,8 +149,8 @@ class Window:
 
         return nonconvergence.error(self.case, self.lattice, solution, target, values)
 
-    def step(self, target: LoadStep, solution: NormalSolution, before: Any, started: float) -> Step:
-        """Return a finished step from the states at its end and beginning; its time counts from `started`."""
+    def step(self, target: LoadStep, solution: NormalSolution, spent: float, started: float) -> Step:
+        """Return a finished step from its end and the energy spent before; its time counts from `started`."""
         bulk: dict[str, float] = {}
         if self.case.deck.bulk:
             bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
@@ -158,7 +158,7 @@ class Window:
         if target.roll:
             bulk["rolled_distance"] = target.roll.done
         history: dict[str, float | int | str] = {
-            **self._history(solution, before),
+            **self._history(solution, spent),
             **bulk,
             "segment": target.segment + 1,
             "label": target.label,
@@ -237,7 +237,7 @@ class Window:
         stresses = zip(BULK_STRESS, target.bulk, strict=True)
         return driven | {name: value for name, value in stresses if name in known}
 
-    def _history(self, solution: Any, before: Any) -> dict[str, float]:
+    def _history(self, solution: Any, spent: float) -> dict[str, float]:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
@@ -403,11 +403,10 @@ class FrictionWindow(Window):
 
     # --- history ------------------------------------------------------------------------------------------
 
-    def _history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
+    def _history(self, solution: ContactState, spent: float) -> dict[str, float]:
         static = self.case.solver.algorithm == "static"  # without history
-        spent_before = 0.0 if before is None or static else before.dissipated_energy
-        spent = solution.dissipated_energy - spent_before
-        history = {**super()._history(solution, before), "dissipated_energy_step": spent}
+        in_step = solution.dissipated_energy - (0.0 if static else spent)
+        history = {**super()._history(solution, spent), "dissipated_energy_step": in_step}
         left_out = () if self.case.deck.bulk else BULK_STRAIN
         left_out = left_out if self.case.rolls else (*left_out, *CORE["rolling"])
         left_out = (*left_out, "creep_power_error") if self.case.pair.beta else left_out

@@ -286,8 +286,8 @@ contains
                                 options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
-      ! the next sweep begins with a product
-      iteration%single = .true.
+      ! the next sweep begins with a product; stiff springs that rest under the pressure would feel the rounding
+      iteration%single = .not. allocated(system%tilt)
       ! the traction across of nodes on a bound that does not grow with the pressure is no unknown
       call give_back(3*n)
       call step%nodes%pack_all(step%x, unknown, fixed, kept)

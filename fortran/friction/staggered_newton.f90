@@ -427,7 +427,6 @@ contains
                                                             now%pressure_feels_shear)))
     scale = found%scale
     iteration = iteration_t(tolerance=max(goal, options%final_accuracy*now%tolerance)*scale, most=options%max_iterations)
-    call give_back(n)
     call solve_step_equation(now%shear, nodes, found%constraints, rhs, found%unknown, found%ax, iteration, error)
     if (allocated(error)) return
     now%rounding = iteration%rounding

@@ -77,7 +77,7 @@ module hc_linear_system
     integer :: most = 0, made = 0
     !> GMRES: stored directions, after which it restarts with the present residual
     integer :: most_directions = 0
-    !> GMRES: residuals are stored in single precision; the product has an error of as much of the residual at the start
+    !> GMRES: directions are stored in single precision; the product has an error of as much of the residual at the start
     logical :: single = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), allocatable :: weight(:)

@@ -6,8 +6,8 @@
 !>     z <- M r - M B (C^T M B)^-1 C^T M r.
 !>
 !> Of the products A z only the part off the active nodes is stored: with the weights W, the matrix H of Arnoldi's method and
-!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s. M r is rounded to single precision before its product;
-!> V may be stored in single precision, too, while the arithmetic is in double.
+!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s. V and M r may be stored in single precision, while
+!> the arithmetic is in double; M r is rounded before its product then.
 !>
 !> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869; J. I. Aliaga, H. Anzt et al., Int. J. High Perform.
 !> Comput. Appl. 37, 2023, 5-25).
@@ -49,11 +49,11 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      !> Weighted residual v on the active nodes, in one of the precisions
-      real(wp), allocatable :: v(:)
-      real(sp), allocatable :: rounded(:)
-      !> M r there, r that residual without its weights: the direction is z = M r + M B share with C^T z = 0
-      real(sp), allocatable :: mr(:)
+      !> Weighted residual v on the active nodes, and M r there, r that residual without its weights: the direction is
+      !> z = M r + M B share with C^T z = 0
+      real(wp), allocatable :: v(:), mr(:)
+      !> The same in single precision
+      real(sp), allocatable :: rounded(:), rounded_mr(:)
       !> The product A z on the other nodes
       real(sp), allocatable :: beyond(:)
     end type direction_t
@@ -149,9 +149,10 @@ contains
       g(1) = began
       h = 0.0_wp
       do k = 1, most
-        if (stat == 0 .and. .not. allocated(basis(k)%mr)) then
+        if (stat == 0 .and. .not. allocated(basis(k)%beyond)) then
           call give_back(size(ax))
-          allocate (basis(k)%mr(nodes%n_active), basis(k)%beyond(others%n_active), stat=stat)
+          allocate (basis(k)%beyond(others%n_active), basis(k)%rounded_mr(merge(nodes%n_active, 0, iteration%single)), &
+                    basis(k)%mr(merge(0, nodes%n_active, iteration%single)), stat=stat)
         end if
         if (stat == 0) call system%take_image(size(ax), own, image, stat)
         if (stat /= 0) then
@@ -243,8 +244,12 @@ contains
       call weigh(1.0_wp/iteration%weight, r)
       call system%precondition_packed(nodes, size(ax), r, w, error)
       if (allocated(error)) return
-      basis(k)%mr = real(w, sp)
-      w = basis(k)%mr
+      if (iteration%single) then
+        basis(k)%rounded_mr = real(w, sp)
+        w = basis(k)%rounded_mr
+      else
+        basis(k)%mr = w
+      end if
       share(:, k) = -matmul(inverse, constraints%resultants(space, w))
       call constraints%add_mb(space, share(:, k), w)
     end subroutine find_direction
@@ -278,7 +283,11 @@ contains
       call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), w)
       call space%add(w, x)
       do i = 1, directions
-        call add_direction(y(i), basis(i)%mr)
+        if (iteration%single) then
+          x = x + y(i)*basis(i)%rounded_mr
+        else
+          x = x + y(i)*basis(i)%mr
+        end if
         call others%add(y(i), basis(i)%beyond, ax)
         largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
         iteration%rounding = iteration%rounding + abs(y(i))*(0.5_wp*epsilon(1.0_sp)*largest &
@@ -293,19 +302,6 @@ contains
       end do
       length = sqrt(space%dot(w, w))
     end subroutine take_step
-
-    !> Add a multiple of a direction to the unknowns.
-    subroutine add_direction(factor, direction)
-      real(wp), intent(in) :: factor
-      real(sp), intent(in), contiguous :: direction(:)
-      integer :: i
-
-      !$omp parallel do simd schedule(static) num_threads(space%threads)
-      do i = 1, size(x)
-        x(i) = x(i) + factor*direction(i)
-      end do
-      !$omp end parallel do simd
-    end subroutine add_direction
 
     !> Multiply by one factor for each part.
     subroutine weigh(factor, values)

@@ -320,7 +320,7 @@ contains
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
     real(wp) :: part(size(now%p, 2)), steepness
-    integer :: row, k
+    integer :: row
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)

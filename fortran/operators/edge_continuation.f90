@@ -42,7 +42,7 @@ module hc_edge_continuation
                                           others = iand(but_two, but_two - 1)
   !> The three lowest as numbers of steps, and 1 where there are as many, else 0: sums without branches for most nodes.
   integer, parameter :: lowest(0:127, 3) = reshape([trailz(bits_of) + 1, trailz(but_one) + 1, trailz(but_two) + 1], [128, 3])
-  real(sp), parameter :: taken(0:127, 3) = reshape([min(n_bits, 1), min(n_bits/2, 1), min(n_bits/3, 1)], [128, 3])
+  real(sp), parameter :: taken(0:127, 3) = reshape(merge(1.0_sp, 0.0_sp, [n_bits >= 1, n_bits >= 2, n_bits >= 3]), [128, 3])
 
   !> Nodes of the rings and their neighbors; the active nodes at the edge are ring 0.
   type :: edge_extension_t
@@ -240,23 +240,22 @@ contains
     integer(int16), intent(inout), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
-    integer, allocatable :: first(:)
-    integer :: r, n
+    integer :: first(0:most_rings + 1), r, n
     real(wp) :: found(1), by_number(0:7)
     real(wp), parameter :: number(0:7) = [(real(max(r, 1), wp), r=0, 7)]
 
     n = n_edge
-    first = [1, n + 1]
+    first(0:1) = [1, n + 1]
     found = 0.0_wp
     do r = 1, most_rings
-      call add_ring(list, first(r), first(r + 1) - 1, step, int(r, int16), mark, n)
+      call add_ring(list, first(r - 1), first(r) - 1, step, int(r, int16), mark, n)
+      first(r + 1) = n + 1
       if (space%ranks%size == 1) then
-        if (n < first(r + 1)) exit
+        if (n < first(r)) exit
         found = r
-      else if (any(is_own(self, n_col, list(first(r + 1):n)))) then
+      else if (any(is_own(self, n_col, list(first(r):n)))) then
         found = r
       end if
-      first = [first, n + 1]
     end do
     call space%most(found)
     self%n_ring = nint(found(1))
@@ -289,7 +288,7 @@ contains
     width = n_col + 2
     n_row = size(mark)/width - 2
     n = first(self%n_ring + 1) - 1
-    height = int(max(min(worth_a_block*(self%n_ring + 1)*real(n_row)/max(n, 1), real(n_row)), 1.0))
+    height = int(max(min(real(worth_a_block*(self%n_ring + 1), wp)*n_row/max(n, 1), real(n_row, wp)), 1.0_wp))
     if (n >= worth_sharing) self%space = space
     allocate (before(0:self%n_ring, (n_row + height - 1)/height), source=0)
     allocate (self%start(0:self%n_ring + 1, size(before, 2)))

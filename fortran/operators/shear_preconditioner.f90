@@ -239,7 +239,7 @@ contains
     ! the share of the bodies in the displacement along t stands where the traction will be
     associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active, threads => self%space%threads, &
                across => traction(:nodes%pairs%n_first))
-      if (self%slips) allocate (rest(n_t))
+      allocate (rest(merge(n_t, 0, self%slips)))
       across = displacement(:n_t)/self%unit
       if (self%slips) call share_out(self, runs, displacement(n_t + 1:n_all), across, rest)
       call to_plane(runs, threads, self%direction, self%values(:n/2), self%values(n/2 + 1:), across, displacement(n_t + 1:n_all), &

@@ -392,7 +392,7 @@ class NormalContact(Contact):
         normal_load: float | None = None,
         approach: float | None = None,
         tolerance: float = 1e-8,
-        max_sweeps: int = 400,
+        max_sweeps: int = 200,
     ) -> NormalSolution:
         """Solve for a normal load (N), not negative, or for an approach of the remote parts (m).
 

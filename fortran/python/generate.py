@@ -150,7 +150,7 @@ class Procedure:
             kind = self.kinds[argument.kind]
             for line in kind["set"].format(argument.name).strip().splitlines():
                 can_fail = line.startswith("call ") and "error" in line
-                lines.append(f"if (.not. allocated(error)) {line}" if can_fail else line)
+                lines.append(listed(f"if (.not. allocated(error)) {line}" if can_fail else line))
             after += [kind["after"].format(argument.name)] if "after" in kind else []
         calls = self.row["calls"].strip()
         for flag in (argument.name for argument in self.takes if argument.kind == "flag"):

@@ -16,7 +16,6 @@ from . import flat, memory
 from .contact import ElasticPair
 from .friction import FrictionLaw
 from .lattice import Lattice, Nodes
-from .measures import Ellipse
 
 _UNLIMITED, _LIMITED = 5, 11  # arrays of a traction field
 _GIVEN = 12  # arrays that it is made from, with copies and zones
@@ -37,13 +36,14 @@ def tractions_memory(
 
 
 class Edge(NamedTuple):
-    """An area of the plane whose edge runs between the nodes."""
+    """An area of the plane whose edge runs between the nodes, with the half-axes of its second moments."""
 
     area: float
     radius: float
     length: float
+    semi_major: float
+    semi_minor: float
     segments: Array
-    ellipse: Ellipse
 
 
 class ZoneMesh(NamedTuple):
@@ -224,7 +224,7 @@ class ContactEdges:
 
     def _edge(self, zone: _Zone) -> Edge:
         edge, segments, count = flat.edge_of_zone(self, *zone, flat.count_cut_triangles(zone[0]))
-        return Edge(edge.area, edge.radius, edge.length, segments[:count], Ellipse.of(edge))
+        return Edge(**edge._asdict(), segments=segments[:count])
 
     def _mesh(self, zone: _Zone, field: Array, vanishes: bool) -> ZoneMesh:
         nodes, cut = int(zone[0].sum()), flat.count_cut_triangles(zone[0])

@@ -28,13 +28,6 @@ _FRICTIONLESS = FrictionLaw(0.0)
 _Zone = tuple[Mask, Array, bool]  # nodes, reserve of friction, whether it is the stick area
 
 
-def tractions_memory(
-    n_row: int, n_col: int, contact: int, sheared: bool, spectra: int, threads: int = 0
-) -> int:
-    """Return the memory (bytes) of `ContactEdges.tractions`, besides its arguments and its result."""
-    return int(flat.memory_of_edges(n_col, n_row, contact, sheared, spectra, threads))
-
-
 class Edge(NamedTuple):
     """An area of the plane whose edge runs between the nodes, with the half-axes of its second moments."""
 

@@ -89,24 +89,16 @@ def nodal_residuals(
 
 def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:
     """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
-    frictional = isinstance(solution, ContactState)
+    frictional, periodic = isinstance(solution, ContactState), contact.lattice.periodic
     found = (flat.measure_friction if frictional else flat.measure_pressure)(contact, solution)
-    if frictional and not contact.lattice.periodic:
-        all_known: dict[str, float] = found._asdict()
-        return all_known
-    return recorded(contact.lattice, found, friction=frictional)
-
-
-def recorded(lattice: Lattice, found: Any, *, friction: bool) -> dict[str, float]:
-    """Return the measures of the core that the load history of a window has."""
-    known = {
-        name: value for name, value in found._asdict().items() if friction or not VARIABLES[name].frictional
+    known = {name: (value, VARIABLES[name]) for name, value in found._asdict().items()}
+    return {
+        name: value
+        for name, (value, variable) in known.items()
+        if (frictional or not variable.frictional)
+        # a window that repeats has no edges, and no place of a zone
+        and not (periodic and math.isnan(value) and not variable.required)
     }
-    if lattice.periodic:  # no edges, and no place of a zone
-        known = {
-            name: value for name, value in known.items() if VARIABLES[name].required or not math.isnan(value)
-        }
-    return known
 
 
 def turning_points(values: Array) -> list[int]:

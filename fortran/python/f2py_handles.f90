@@ -71,7 +71,7 @@ module hc_f2py_handles
   type(communicator_t) :: ranks
 
   !> Spectra of kernels that all problems share: none until their bound is set.
-  type(kernel_cache_t), target, save :: own_cache
+  type(kernel_cache_t), target :: own_cache
   type(kernel_cache_t), pointer :: kernel_cache => own_cache
 
 contains

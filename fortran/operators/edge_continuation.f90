@@ -289,7 +289,7 @@ contains
     width = n_col + 2
     n_row = size(mark)/width - 2
     n = first(self%n_ring + 1) - 1
-    height = int(max(min(worth_a_block*(self%n_ring + 1)*real(n_row)/max(n, 1), real(n_row)), 1.0))
+    height = max(int(min(worth_a_block*(self%n_ring + 1)*real(n_row)/max(n, 1), real(n_row))), 1)
     if (n >= worth_sharing) self%space = space
     allocate (before(0:self%n_ring, (n_row + height - 1)/height), source=0)
     allocate (self%start(0:self%n_ring + 1, size(before, 2)))

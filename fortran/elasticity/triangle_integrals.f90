@@ -30,7 +30,7 @@ module hc_triangle_integrals
 
   public :: triangle_integral, triangle_integrals, is_supported
   public :: vertex_kernels, load_displacement, linear_load_displacement
-  public :: evaluate_integral, evaluate_displacement, evaluate_linear_displacement
+  public :: evaluate_integral, evaluate_displacement, evaluate_linear_displacement, check_points
 
   !> Exponents (j, k, m) of the six kernels of the point loads (3.10)-(3.18):
   !> 1/rho, x/rho^2, y/rho^2, x^2/rho^3, x y/rho^3, y^2/rho^3.
@@ -206,7 +206,7 @@ contains
     character(len=120) :: message
     integer :: i
 
-    call check_points(vertices, x, y, size(integral), error)
+    call check_points(x, y, size(integral), error, vertices)
     if (allocated(error)) return
     if (.not. is_supported(j, k, m)) then
       write (message, '(a,3(i0,a))') 'triangle integral (j, k, m) = (', j, ', ', k, ', ', m, &
@@ -242,7 +242,7 @@ contains
 
     integer :: i
 
-    call check_points(vertices, x, y, size(u, 2), error)
+    call check_points(x, y, size(u, 2), error, vertices)
     if (.not. allocated(error)) call check_material(shear_modulus, poisson_ratio, error)
     if (allocated(error)) return
     if (direction < 1 .or. direction > 3) then
@@ -278,7 +278,7 @@ contains
 
     integer :: i
 
-    call check_points(vertices, x, y, size(u, 2), error)
+    call check_points(x, y, size(u, 2), error, vertices)
     if (.not. allocated(error)) call check_material(shear_modulus, poisson_ratio, error)
     if (allocated(error)) return
     if (.not. all(ieee_is_finite(traction))) then
@@ -384,19 +384,22 @@ contains
   end function displacement
 
   !> Refuse coordinates that are not finite or differ in number.
-  pure subroutine check_points(vertices, x, y, n, error)
-    !> Vertices, as columns
-    real(wp), intent(in) :: vertices(2, 3)
+  pure subroutine check_points(x, y, n, error, vertices)
     !> Field points
     real(wp), intent(in) :: x(:), y(:)
     !> Number of results
     integer, intent(in) :: n
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> Vertices of a triangle, as columns
+    real(wp), intent(in), optional :: vertices(2, 3)
+    logical :: finite
 
+    finite = .true.
+    if (present(vertices)) finite = all(ieee_is_finite(vertices))
     if (size(x) /= size(y) .or. size(x) /= n) then
       call raise(error, status%invalid_input, 'field points: as many x as y as results expected')
-    else if (.not. all(ieee_is_finite(vertices))) then
+    else if (.not. finite) then
       call raise(error, status%invalid_input, 'vertices of a triangle: finite coordinates expected')
     else if (.not. (all(ieee_is_finite(x)) .and. all(ieee_is_finite(y)))) then
       call raise(error, status%invalid_input, 'field points: finite coordinates expected')

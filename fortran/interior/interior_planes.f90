@@ -9,6 +9,7 @@
 module hc_interior_planes
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
@@ -16,6 +17,7 @@ module hc_interior_planes
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_points, only: check_body
+  use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior, periodic_memory
   use hc_fftw, only: good_size
   use hc_fft_layout, only: convolution_memory, transform_memory
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
@@ -49,6 +51,7 @@ module hc_interior_planes
     type(tables_t) :: tables
     integer :: body = 1
     type(layered_body_t) :: inside
+    type(field_space_t) :: space
     !> Tractions in the frame of the body
     real(wp), allocatable :: loads(:, :, :)
   contains
@@ -58,6 +61,8 @@ module hc_interior_planes
     procedure :: set_depth
     !> Stress or displacement at the nodes of the plane
     procedure :: apply
+    !> The same at several depths for a history of load steps, also of a window that repeats
+    procedure :: of_history
   end type interior_planes_t
 
   !> The tables at one depth.
@@ -122,7 +127,6 @@ contains
     !> Compute the displacement, not the stress
     logical, intent(in), optional :: displaced
 
-    type(field_space_t) :: shared
     integer :: n_even, stat
     logical :: coated
 
@@ -130,14 +134,17 @@ contains
     if (.not. allocated(error)) call check_body(body, error)
     if (.not. allocated(error)) call check_interior([0.0_wp], [0.0_wp], [0.0_wp], inside%base%poisson_ratio, error)
     if (allocated(error)) return
-    shared = space_over(lattice%extent)
-    if (present(space)) shared = space
+    planes%space = space_over(lattice%extent)
+    if (present(space)) planes%space = space
     coated = size(inside%layer) > 0
     planes%tables = tables_of(.false., coated)
     if (present(displaced)) planes%tables = tables_of(displaced, coated)
     planes%lattice = lattice
     planes%body = body
     planes%inside = inside
+    if (lattice%is_periodic()) return
+    call require_memory(planes_memory(lattice%extent, coated, planes%space%threads), error, planes%space%threads)
+    if (allocated(error)) return
     call new_interior_pyramid(planes%pyramid, lattice%unit_basis())
     allocate (planes%loads(lattice%extent(1), lattice%extent(2), 3), stat=stat)
     if (stat /= 0) then
@@ -146,7 +153,7 @@ contains
     end if
     n_even = planes%tables%first_odd - 1
     call new_convolution(planes%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         [n_even, size(planes%tables%load) - n_even], max(planes%tables%n_component, 3), shared, error)
+                         [n_even, size(planes%tables%load) - n_even], max(planes%tables%n_component, 3), planes%space, error)
   end subroutine new_interior_planes
 
   !> Bytes that planes take, the setting up of their tables included.
@@ -234,6 +241,61 @@ contains
       if (tables%kind == of_displacement) field = self%lattice%spacing()*field
     end associate
   end subroutine apply
+
+  !> Stress, or displacement times the shear modulus, at the nodes of several planes for a history of load steps.
+  subroutine of_history(self, traction, depth, field, error, cache)
+    class(interior_planes_t), intent(inout) :: self
+    !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
+    real(wp), intent(in), contiguous :: traction(:, :, :, :)
+    !> Depths below the surface of the body [m]
+    real(wp), intent(in) :: depth(:)
+    !> Stress [Pa] or displacement [Pa m] (n_col, n_row, component, depth, step)
+    real(wp), intent(inout) :: field(:, :, :, :, :)
+    !> Allocated on failure: a depth above the surface, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in) :: cache
+    type(kernel_cache_t), pointer :: kept
+    integer :: i, step
+
+    if (self%lattice%is_periodic()) then
+      call repeat_history(self, traction, depth, field, error)
+      return
+    end if
+    ! of too many planes each would drop another one, and the surface, before it is used again
+    kept => null()
+    if (associated(cache)) then
+      if (cache%holds(size(depth)*self%spectra_memory())) kept => cache
+    end if
+    do i = 1, size(depth)
+      if (.not. allocated(error)) call self%set_depth(depth(i), error, kept)
+      do step = 1, size(traction, 4)
+        if (.not. allocated(error)) call self%apply(traction(:, :, :, step), field(:, :, :, i, step), error)
+      end do
+    end do
+  end subroutine of_history
+
+  !> Compute `of_history` below a window that repeats.
+  subroutine repeat_history(self, traction, depth, field, error)
+    class(interior_planes_t), intent(in) :: self
+    real(wp), intent(in) :: traction(:, :, :, :), depth(:)
+    real(wp), intent(inout) :: field(:, :, :, :, :)
+    type(error_t), allocatable, intent(out) :: error
+    type(periodic_interior_t) :: repeating
+    integer :: i
+
+    call check_interior(0.0_wp*depth, 0.0_wp*depth, depth, self%inside%base%poisson_ratio, error)
+    if (.not. allocated(error)) call check_inside(self%inside, depth, error)
+    if (.not. allocated(error)) call require_memory(periodic_memory(self%lattice%extent, size(traction, 4)), error, &
+                                                    self%space%threads)
+    if (.not. allocated(error)) call new_periodic_interior(repeating, self%lattice, self%body, self%inside, traction, self%space, &
+                                                           error)
+    do i = 1, size(depth)
+      if (.not. allocated(error)) call repeating%on_plane(depth(i), field(:, :, :, i, :), error)
+    end do
+    if (allocated(error) .or. self%body == 1) return
+    field(:, :, self%tables%turned, :, :) = -field(:, :, self%tables%turned, :, :)
+  end subroutine repeat_history
 
   pure subroutine table_row(self, j, k)
     class(plane_tables_t), intent(in) :: self

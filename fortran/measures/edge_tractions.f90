@@ -12,12 +12,13 @@ module hc_edge_tractions
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use hc_precision, only: wp, lk
   use hc_error, only: error_t, status, raise
+  use hc_memory, only: require_memory
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, of_pressure, of_all_tractions
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, of_pressure, of_all_tractions, spectra_of
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
@@ -109,6 +110,9 @@ contains
 
     if (present(options)) tuning = options
     n = merge(3, 1, friction%resists() .and. friction%is_bounded())
+    call require_memory(edge_tractions_memory(lattice%extent, count(contact), n == 3, space%threads, spectra_of(medium)), error, &
+                        space%threads)
+    if (allocated(error)) return
     if (n == 3) then
       call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, friction, tuning)
     else

@@ -29,9 +29,8 @@ module hc_f2py_handles
   implicit none
   private
 
-  public :: slot_t, take_slot, enter, leave, free_object, free_slip, hold, hold_wear, find_state, find_wear
-  public :: kernel_cache, own_cache, report, ranks
-  public :: bodies_of, find_coated, coated_t, add_springs, friction_of, normal_law_of
+  public :: slot_t, take_slot, enter, leave, free_object, free_slip, hold, find, kernel_cache, report, ranks
+  public :: bodies_of, make_layered, add_springs, friction_of, normal_law_of
 
   !> Object of a handle: one of these.
   type :: slot_t
@@ -53,15 +52,6 @@ module hc_f2py_handles
     type(wear_path_t), pointer :: wear => null()
   end type slot_t
 
-  !> Bodies with coatings.
-  type :: coated_t
-    !> Compliances of their surfaces [1/Pa]
-    real(c_double) :: lambda_1 = 0.0_c_double, lambda_2 = 0.0_c_double, lambda_5 = 0.0_c_double
-    !> Largest coupling of normal and tangential displacements, error and number of the images of the kernels
-    real(c_double) :: coupling = 0.0_c_double, fit_error = 0.0_c_double
-    integer :: images = 0
-  end type coated_t
-
   !> Entry of the table.
   type :: entry_t
     !> Odd while there is an object
@@ -80,8 +70,9 @@ module hc_f2py_handles
   !> Ranks that solve problems together: one, unless MPI is started.
   type(communicator_t) :: ranks
 
-  !> Spectra of kernels that all problems share.
-  type(kernel_cache_t), pointer :: kernel_cache => null()
+  !> Spectra of kernels that all problems share: none until their bound is set.
+  type(kernel_cache_t), target :: own_cache
+  type(kernel_cache_t), pointer :: kernel_cache => own_cache
 
 contains
 
@@ -274,60 +265,26 @@ contains
     call unlock(handle_table)
   end function slot_of
 
-  !> Return the state of a handle.
-  subroutine find_state(handle, extent, state, error)
+  !> Find the state, or the path through cycles of wear, of a handle.
+  subroutine find(handle, kind, slot, error, extent)
     !> Its handle
     integer(c_int64_t), intent(in) :: handle
-    !> Number of columns and rows of its window
-    integer, intent(in) :: extent(2)
-    !> The state
-    type(contact_state_t), pointer, intent(out) :: state
+    !> `state` or `path`
+    character(len=*), intent(in) :: kind
+    !> Its slot
+    type(slot_t), pointer, intent(out) :: slot
     !> Allocated if the handle is stale, or the state is that of another window
     type(error_t), allocatable, intent(out) :: error
-    type(slot_t), pointer :: slot
+    !> Number of columns and rows of the window of the state
+    integer, intent(in), optional :: extent(2)
+    logical :: fits
 
-    state => null()
     slot => slot_of(handle)
-    if (associated(slot)) state => slot%state
-    if (associated(state)) then
-      if (all(shape(state%pressure) == extent)) return
-    end if
-    call raise(error, status%bad_handle, 'the handle is stale: its state has been freed')
-  end subroutine find_state
-
-  !> Give a path through cycles of wear a handle; on failure it is freed.
-  subroutine hold_wear(path, handle, error)
-    !> The path
-    type(wear_path_t), pointer, intent(inout) :: path
-    !> Its handle, 0 on failure
-    integer(c_int64_t), intent(out) :: handle
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    type(slot_t), pointer :: slot
-
-    call take_slot(slot, handle, error)
-    if (allocated(error)) then
-      deallocate (path)
-    else
-      slot%wear => path
-    end if
-  end subroutine hold_wear
-
-  !> Return the path through cycles of wear of a handle.
-  subroutine find_wear(handle, path, error)
-    !> Its handle
-    integer(c_int64_t), intent(in) :: handle
-    !> The path
-    type(wear_path_t), pointer, intent(out) :: path
-    !> Allocated if the handle is stale
-    type(error_t), allocatable, intent(out) :: error
-    type(slot_t), pointer :: slot
-
-    path => null()
-    slot => slot_of(handle)
-    if (associated(slot)) path => slot%wear
-    if (.not. associated(path)) call raise(error, status%bad_handle, 'the handle is stale: its path has been freed')
-  end subroutine find_wear
+    fits = associated(slot)
+    if (fits) fits = merge(associated(slot%state), associated(slot%wear), kind == 'state')
+    if (fits .and. present(extent)) fits = all(shape(slot%state%pressure) == extent)
+    if (.not. fits) call raise(error, status%bad_handle, 'the handle is stale: its '//kind//' has been freed')
+  end subroutine find
 
   !> Make two bodies from their numbers: three compliances; or Young's modulus, Poisson's ratio and 1 if it is rigid of each, the
   !> numbers of their coatings, and thickness, Young's modulus and Poisson's ratio of each of these, outermost first.
@@ -364,19 +321,6 @@ contains
     call new_layered_pair(pair, [(material_t(constants(3*i - 2), constants(3*i - 1), constants(3*i) > 0.5_c_double), i=1, 2)], &
                           coating(:first), coating(first + 1:), error)
   end subroutine make_layered
-
-  !> Find the constants of bodies with coatings.
-  subroutine find_coated(constants, found, error)
-    real(c_double), intent(in) :: constants(:)
-    type(coated_t), intent(out) :: found
-    !> Allocated on failure: constants of no body, layers that images do not describe
-    type(error_t), allocatable, intent(out) :: error
-    type(layered_pair_t) :: pair
-
-    call make_layered(constants, pair, error)
-    if (allocated(error)) return
-    found = coated_t(pair%lambda_1, pair%lambda_2, pair%lambda_5, pair%coupling(), pair%fit_error, pair%n_image())
-  end subroutine find_coated
 
   !> Add the tangential springs of an interface to two bodies.
   subroutine add_springs(bodies, interface)
@@ -442,11 +386,6 @@ contains
       allocate (law, source=power_interface_t(interface(1), interface(2)))
     end if
   end function normal_law_of
-
-  !> Make the cache of spectra, which is empty and holds nothing until its bound is set.
-  subroutine own_cache()
-    if (.not. associated(kernel_cache)) allocate (kernel_cache)
-  end subroutine own_cache
 
   !> Return an error as a code and a message.
   pure subroutine report(error, code, message)

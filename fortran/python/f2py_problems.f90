@@ -25,7 +25,7 @@ module hc_f2py_problems
   implicit none
   private
 
-  public :: new_operator, new_pressed, new_sheared, solver_options_t, secure_fields, entry_fields, wear_fields
+  public :: new_operator, new_problem, solver_options_t, secure_fields, entry_fields, wear_fields
   public :: new_held_state, find_field
 
   !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; any other number: with Newton's.
@@ -120,8 +120,8 @@ contains
     if (allocated(error)) call free_object(handle)
   end subroutine new_operator
 
-  !> Create a frictionless contact problem.
-  subroutine new_pressed(method, lattice, bodies, gap, candidate, law, options, handle, error)
+  !> Create a contact problem, with friction or without.
+  subroutine new_problem(method, lattice, bodies, gap, candidate, law, options, handle, error, friction)
     integer, intent(in) :: method
     type(lattice_t), intent(in) :: lattice
     class(elastic_medium_t), intent(in) :: bodies
@@ -135,81 +135,59 @@ contains
     integer(c_int64_t), intent(out) :: handle
     !> Allocated on failure, on all ranks that share the problem
     type(error_t), allocatable, intent(out) :: error
-    type(slot_t), pointer :: slot
-    type(field_space_t) :: space
-    type(direct_contact_t), pointer :: dense
-    type(normal_contact_t), pointer :: fft
-    integer(c_int64_t) :: bytes
-
-    space = space_over(lattice%extent, options%threads)
-    bytes = dense_fields*lattice%size()
-    if (method == fft_based) bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
-    call take_window(lattice, size(gap, 2), options%shared, bytes, options%threads, slot, handle, error)
-    if (.not. allocated(error)) then
-      if (method == fft_based) then
-        allocate (fft)
-        slot%solver => fft
-        call new_normal_contact(fft, slot%lattice, bodies, gap, candidate, error, options%threads, kernel_cache, law=law, &
-                                ranks=slot%space%ranks)
-      else
-        allocate (dense)
-        slot%solver => dense
-        call new_direct_contact(dense, slot%lattice, bodies, gap, candidate, error, law=law)
-      end if
-    end if
-    if (allocated(error)) call free_object(handle)
-  end subroutine new_pressed
-
-  !> Create a contact problem with friction.
-  subroutine new_sheared(method, lattice, bodies, gap, candidate, friction, law, options, handle, error)
-    integer, intent(in) :: method
-    type(lattice_t), intent(in) :: lattice
-    class(elastic_medium_t), intent(in) :: bodies
-    !> Gap before loading (n_col, n_row or own rows) [m]
-    real(wp), intent(in) :: gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row or own rows)
-    logical, intent(in) :: candidate(:, :)
-    class(friction_law_t), intent(in) :: friction
-    class(normal_law_t), intent(in) :: law
-    type(solver_options_t), intent(in) :: options
-    !> Handle of the problem
-    integer(c_int64_t), intent(out) :: handle
-    !> Allocated on failure, on all ranks that share the problem
-    type(error_t), allocatable, intent(out) :: error
+    !> Absent: none
+    class(friction_law_t), intent(in), optional :: friction
     type(slot_t), pointer :: slot
     type(friction_problem_t) :: problem
-    type(windowed_friction_t), pointer :: fft
-    type(direct_friction_t), pointer :: dense
+    type(direct_contact_t), pointer :: dense_pressed
+    type(normal_contact_t), pointer :: pressed
+    type(direct_friction_t), pointer :: dense_sheared
+    type(windowed_friction_t), pointer :: sheared
     type(field_space_t) :: space
     integer(c_int64_t) :: bytes
 
     space = space_over(lattice%extent, options%threads)
     bytes = dense_fields*lattice%size()
-    ! of the largest contact there can be, with all loads prescribed
-    if (method == fft_based) bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. options%goodman, &
-                                                              space%threads, spectra_of(bodies), lattice%is_periodic())
+    if (method == fft_based .and. present(friction)) then
+      ! of the largest contact there can be, with all loads prescribed
+      bytes = windowed_friction_memory(lattice%extent, lattice%size(), n_load, .not. options%goodman, space%threads, &
+                                       spectra_of(bodies), lattice%is_periodic())
+    else if (method == fft_based) then
+      bytes = normal_contact_memory(lattice%extent, space%threads, lattice%is_periodic())
+    end if
     call take_window(lattice, size(gap, 2), options%shared, bytes, options%threads, slot, handle, error)
-    if (.not. allocated(error)) then
+    if (present(friction) .and. .not. allocated(error)) then
       space%ranks = slot%space%ranks
       call new_friction_problem(problem, lattice, bodies, gap, candidate, friction, options%goodman, error, law, space)
       call slot%ranks%agree(error)
     end if
-    if (.not. allocated(error)) then
-      if (method == fft_based) then
-        allocate (fft)
-        slot%sheared => fft
-        call new_windowed_friction(fft, problem, error, options%threads, kernel_cache, slot%ranks)
-        call slot%ranks%agree(error)
-      else
-        allocate (dense)
-        slot%sheared => dense
-        problem%options%direct%as_written = method == as_written
-        call new_direct_friction(dense, problem, error)
-      end if
-      slot%solver => slot%sheared
+    if (allocated(error)) then
+      call free_object(handle)
+      return
     end if
+    if (present(friction) .and. method == fft_based) then
+      allocate (sheared)
+      slot%sheared => sheared
+      call new_windowed_friction(sheared, problem, error, options%threads, kernel_cache, slot%ranks)
+      call slot%ranks%agree(error)
+    else if (present(friction)) then
+      allocate (dense_sheared)
+      slot%sheared => dense_sheared
+      problem%options%direct%as_written = method == as_written
+      call new_direct_friction(dense_sheared, problem, error)
+    else if (method == fft_based) then
+      allocate (pressed)
+      slot%solver => pressed
+      call new_normal_contact(pressed, slot%lattice, bodies, gap, candidate, error, options%threads, kernel_cache, law=law, &
+                              ranks=slot%space%ranks)
+    else
+      allocate (dense_pressed)
+      slot%solver => dense_pressed
+      call new_direct_contact(dense_pressed, slot%lattice, bodies, gap, candidate, error, law=law)
+    end if
+    if (present(friction)) slot%solver => slot%sheared
     if (allocated(error)) call free_object(handle)
-  end subroutine new_sheared
+  end subroutine new_problem
 
   !> Refuse a load step if there is no memory for further fields beside the solution.
   subroutine secure_fields(slot, n_field, error, ahead)

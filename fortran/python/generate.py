@@ -145,12 +145,13 @@ class Procedure:
         """Return the body: objects from their arguments, calls, records to numbers, status."""
         lines = [f"{part.name} = 0" for part in gives if self.fails]
         records = (argument for argument in self.gives if argument.kind in self.kinds)
-        after = [listed(self.kinds[given.kind]["found"].format(given.name)) for given in records]
+        solved = "if (.not. allocated(error)) " * self.fails
+        after = [listed(solved + self.kinds[given.kind]["found"].format(given.name)) for given in records]
         for argument in self.objects:
             kind = self.kinds[argument.kind]
             for line in kind["set"].format(argument.name).strip().splitlines():
                 can_fail = line.startswith("call ") and "error" in line
-                lines.append(f"if (.not. allocated(error)) {line}" if can_fail else line)
+                lines.append(listed(f"if (.not. allocated(error)) {line}" if can_fail else line))
             after += [kind["after"].format(argument.name)] if "after" in kind else []
         calls = self.row["calls"].strip()
         for flag in (argument.name for argument in self.takes if argument.kind == "flag"):

@@ -343,13 +343,12 @@ def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     threads = memory.threads()
     core = case.memory_needed(lattice)
     assert plain.memory_needed(lattice) < contact.memory_needed("fft", *lattice.shape, threads=threads) + 1
-    assert core < friction.memory_needed("fft", *lattice.shape, threads=threads)
+    given = {"threads": threads, "part": "problem with friction"}
+    assert core < contact.memory_needed("fft", *lattice.shape, **given)
     nodes = int(np.pi * radius**2 / lattice.cell_area)
     loads = sum(target.control == "force" for target in case.load_steps[-1].targets)
     near = [
-        friction.memory_needed(
-            "fft", *lattice.shape, contact=int(factor * nodes), loads=loads, threads=threads
-        )
+        contact.memory_needed("fft", *lattice.shape, contact=int(factor * nodes), loads=loads, **given)
         for factor in (0.8, 1.2)
     ]
     assert near[0] < core < near[1]

@@ -114,7 +114,7 @@ def test_each_folder_of_the_library_has_suites_and_modules_have_tests() -> None:
         [],
         ["tests/python/test_surfaces.py", "tests/python/test_units.py"],
     )
-    assert "tests/python/test_edges.py" in run.tests_of("fortran/python/f2py_edges.f90")[1]
+    assert "tests/python/test_edges.py" in run.tests_of("fortran/python/f2py_handles.f90")[1]
 
 
 def test_equivalent_mutants_are_there_and_have_a_reason() -> None:

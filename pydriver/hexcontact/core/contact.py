@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from .lattice import Lattice
 
 Method = Literal["direct", "fft"]
 Iteration = Literal["newton", "dissertation"]
+Part = Literal["problem", "operator", "set-up of the operator", "problem with friction"]
 Interface = tuple[float, float, float]
 """Coefficient c (Pa/m^m) and exponent m of an interface, p = c (-gap)^m, and the stiffness (Pa/m) of its
 tangential springs, 0 without."""
@@ -430,19 +431,15 @@ def memory_needed(
     n_col: int,
     *,
     contact: int | None = None,
-    part: Literal["problem", "operator", "set-up of the operator"] = "problem",
+    part: Part = "problem",
+    loads: int = 4,
+    coupled: bool = True,
     spectra: int = 5,
     threads: int = 1,
     periodic: bool = False,
 ) -> int:
-    """Return the memory (bytes) of a frictionless problem on a window, which may repeat."""
-    code = ("problem", "operator", "set-up of the operator").index(part)
-    window = window_size(method, n_row, n_col, contact)
-    return int(flat.normal_memory(*window, code, spectra, *checked(threads=threads), periodic))
-
-
-def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:
-    """Return method, extent and number of nodes in contact as the core takes them."""
+    """Return the memory (bytes) of a problem on a window, which may repeat, or of its operator."""
     extent = [*checked(n_col=n_col, n_row=n_row)]
     nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
-    return method_code(method), extent, nodes
+    given = method_code(method), extent, nodes, get_args(Part).index(part), loads, coupled, spectra
+    return int(flat.memory_of_problem(*given, *checked(threads=threads), periodic))

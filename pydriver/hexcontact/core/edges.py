@@ -16,7 +16,6 @@ from . import flat, memory
 from .contact import ElasticPair
 from .friction import FrictionLaw
 from .lattice import Lattice, Nodes
-from .measures import Ellipse
 
 _UNLIMITED, _LIMITED = 5, 11  # arrays of a traction field
 _GIVEN = 12  # arrays that it is made from, with copies and zones
@@ -26,24 +25,18 @@ _MARGIN = 6  # nodes about a contact from which its edge follows, at most, and o
 _Part = tuple[slice, slice]
 Source = Literal["edges", "nodes"]
 _FRICTIONLESS = FrictionLaw(0.0)
-_Zone = tuple[Array, Mask, bool]  # fields and zones of the core; whether it is the stick area
-
-
-def tractions_memory(
-    n_row: int, n_col: int, contact: int, sheared: bool, spectra: int, threads: int = 0
-) -> int:
-    """Return the memory (bytes) of `ContactEdges.tractions`, besides its arguments and its result."""
-    return int(flat.memory_of_edges(n_col, n_row, contact, sheared, spectra, threads))
+_Zone = tuple[Mask, Array, bool]  # nodes, reserve of friction, whether it is the stick area
 
 
 class Edge(NamedTuple):
-    """An area of the plane whose edge runs between the nodes."""
+    """An area of the plane whose edge runs between the nodes, with the half-axes of its second moments."""
 
     area: float
     radius: float
     length: float
+    semi_major: float
+    semi_minor: float
     segments: Array
-    ellipse: Ellipse
 
 
 class ZoneMesh(NamedTuple):
@@ -130,32 +123,32 @@ class ContactEdges:
         basis: Array,
         start: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self._nodes = Nodes(basis, start, pressure.shape)
-        self._fields, self._zones = (pressure, gap), (contact, candidate)
+        self.nodes = Nodes(basis, start, pressure.shape)
+        self.pressure, self.gap, self.touching, self.candidate = pressure, gap, contact, candidate
 
     def contact(self) -> Edge:
         """Return the contact area."""
-        return self._edge(self._whole())
+        return self._edge(self._whole)
 
     def stick(self, stick: Mask, reserve: Array) -> Edge:
         """Return the part of the contact area that sticks, with the reserve of friction mu p - |q| there."""
-        return self._edge(self._zone(stick, reserve, True))
+        return self._edge((stick, reserve, True))
 
     def contact_mesh(self, field: Array, vanishes: bool) -> ZoneMesh:
         """Return a mesh of the contact area, with a field up to its edge, where tractions vanish."""
-        return self._mesh(self._whole(), field, vanishes)
+        return self._mesh(self._whole, field, vanishes)
 
     def stick_mesh(self, stick: Mask, reserve: Array) -> ZoneMesh:
         """Return a mesh of the part of the contact area that sticks, see `stick`."""
-        return self._mesh(self._zone(stick, reserve, True), reserve, False)
+        return self._mesh((stick, reserve, True), reserve, False)
 
     def contact_distances(self) -> Array:
         """Return the distances of the nodes from the edge of the contact, in spacings, positive inside."""
-        return np.asarray(flat.distances_of_zone(self._nodes, *self._whole()))
+        return np.asarray(flat.distances_of_zone(self, *self._whole))
 
     def stick_distances(self, stick: Mask, reserve: Array) -> Array:
         """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
-        return np.asarray(flat.distances_of_zone(self._nodes, *self._zone(stick, reserve, True)))
+        return np.asarray(flat.distances_of_zone(self, stick, reserve, True))
 
     def field(
         self, shear: Array | None = None, stick: Mask | None = None, friction: FrictionLaw | None = None
@@ -168,23 +161,22 @@ class ContactEdges:
         part = self._around_contact()
         limited = not (shear is None or stick is None or friction is None)
         count = _LIMITED if limited else _UNLIMITED
-        none = np.zeros(self._zones[0][part].shape)
+        none = np.zeros(self.touching[part].shape)
         if none.size > _LARGE:
             needed = 8 * none.size * (_GIVEN + 2 * count)
             memory.require(needed, "the tractions to the edges", 'choose source = "nodes"')
-        pressure, gap, touching, candidate = (given[part] for given in (*self._fields, *self._zones))
+        x, y = self.nodes.start + self.nodes.basis.T @ [part[1].start, part[0].start]
+        arrays = self.pressure[part], self.gap[part], self.touching[part], self.candidate[part]
+        near = ContactEdges(*arrays, self.nodes.basis, (float(x), float(y)))
         along = (none, none) if shear is None else (component[part] for component in shear)
-        zones = np.stack([touching, candidate, none != 0 if stick is None else stick[part]])
         law = (friction or _FRICTIONLESS).on(part)
-        x, y = self._nodes.start + self._nodes.basis.T @ [part[1].start, part[0].start]
-        nodes = Nodes(self._nodes.basis, (float(x), float(y)), none.shape)
-        given = np.stack([pressure, gap]), zones, np.stack([pressure, *along])
-        parts = flat.field_of_tractions(nodes, *given, law, count)
-        return TractionField(parts, nodes, law, whole=(self._nodes.shape, part))
+        sticking = none != 0 if stick is None else stick[part]
+        parts = flat.field_of_tractions(near, sticking, np.stack([arrays[0], *along]), law, count)
+        return TractionField(parts, near.nodes, law, whole=(self.nodes.shape, part))
 
     def _around_contact(self) -> _Part:
         """Return rows and columns of the contact and of the nodes about it, beyond which there is nothing."""
-        places = [np.flatnonzero(self._zones[0].any(axis=axis)) for axis in (1, 0)]
+        places = [np.flatnonzero(self.touching.any(axis=axis)) for axis in (1, 0)]
         if not places[0].size:
             return slice(0, 1), slice(0, 1)
         rows, cols = (slice(max(k[0] - _MARGIN, 0), k[-1] + 1 + _MARGIN) for k in places)
@@ -196,10 +188,8 @@ class ContactEdges:
         Without friction, or with an infinite coefficient, the shear traction does not change. Loads
         are those of the nodal tractions; nodes next to the edge but outside carry small values.
         """
-        zones, given = np.stack([*self._zones, stick]), np.stack([self._fields[0], *shear])
-        return np.asarray(
-            flat.tractions_to_edges(self._nodes, pair, np.stack(self._fields), zones, friction, given)
-        )
+        given = np.stack([self.pressure, *shear])
+        return np.asarray(flat.tractions_to_edges(self, stick, friction, pair, given))
 
     def stress(
         self,
@@ -217,29 +207,23 @@ class ContactEdges:
         The share of the edge of the contact near them follows where the pressure does not vanish like a
         root, so that nothing is corrected.
         """
-        zones, given = np.stack([*self._zones, stick]), np.stack([self._fields[0], *shear])
-        found: tuple[Array, float] = flat.stress_to_edges(
-            *(self._nodes, np.stack(self._fields), zones, friction, given, corrected),
-            *(body, poisson_ratio, points),
-        )
+        given = stick, friction, np.stack([self.pressure, *shear]), corrected
+        found: tuple[Array, float] = flat.stress_to_edges(self, *given, body, poisson_ratio, points)
         return found
 
+    @property
     def _whole(self) -> _Zone:
-        return self._zone(self._zones[0], self._fields[0], False)
-
-    def _zone(self, nodes: Mask, reserve: Array, sticks: bool) -> _Zone:
-        return np.stack([*self._fields, reserve]), np.stack([*self._zones, nodes]), sticks
+        return self.touching, self.pressure, False
 
     def _edge(self, zone: _Zone) -> Edge:
-        edge, segments, count = flat.edge_of_zone(self._nodes, *zone, flat.count_cut_triangles(zone[1][2]))
-        return Edge(edge.area, edge.radius, edge.length, segments[:count], Ellipse.of(edge))
+        edge, segments, count = flat.edge_of_zone(self, *zone, flat.count_cut_triangles(zone[0]))
+        return Edge(**edge._asdict(), segments=segments[:count])
 
     def _mesh(self, zone: _Zone, field: Array, vanishes: bool) -> ZoneMesh:
-        inside = zone[1][2]
-        nodes, cut = int(inside.sum()), flat.count_cut_triangles(inside)
+        nodes, cut = int(zone[0].sum()), flat.count_cut_triangles(zone[0])
         room = nodes + 3 * cut, 2 * nodes + 3 * cut  # a cut triangle has at most three points and parts
         points, values, triangles, (n_point, n_triangle) = flat.mesh_of_zone(
-            self._nodes, *zone, field, vanishes, *room
+            self, *zone, field, vanishes, *room
         )
         x, y = points[:n_point].T
         return ZoneMesh(x, y, values[:n_point], triangles[:n_triangle].astype(np.intp) - 1)

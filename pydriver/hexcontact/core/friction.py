@@ -27,7 +27,6 @@ from .contact import (
     checked_field,
     method_code,
     shaped,
-    window_size,
 )
 from .flat import AdaptiveSteps
 from .handles import HeldState
@@ -401,20 +400,3 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
         return FrictionLaw(mu, limit)
     [found] = checked(friction_coefficient=coefficient)
     return FrictionLaw(found, limit)
-
-
-def memory_needed(
-    method: Method,
-    n_row: int,
-    n_col: int,
-    *,
-    contact: int | None = None,
-    loads: int = 4,
-    coupled: bool = True,
-    spectra: int = 5,
-    threads: int = 1,
-    periodic: bool = False,
-) -> int:
-    """Return the memory (bytes) of a problem with friction on a window, which may repeat."""
-    window = window_size(method, n_row, n_col, contact)
-    return int(flat.friction_memory(*window, loads, coupled, spectra, *checked(threads=threads), periodic))

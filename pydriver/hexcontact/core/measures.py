@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 
@@ -15,51 +15,32 @@ from ..arrays import Array, Mask
 from ..variables import VARIABLES
 from . import flat
 from .contact import Contact, ElasticPair, Interface, NormalSolution
+from .flat import Ellipse as Ellipse
+from .flat import LatticeErrors as LatticeErrors
 from .flat import area_radius as area_radius
 from .flat import boundary as boundary
 from .flat import boundary_circle as boundary_circle
 from .flat import bulk_strain as bulk_strain
+from .flat import edge_ellipse as edge_ellipse
 from .flat import edge_radius as edge_radius
+from .flat import expected_lattice_errors as expected_lattice_errors
 from .flat import is_unbounded as is_unbounded
+from .flat import moment_ellipse as moment_ellipse
 from .flat import pressure_center as pressure_center
 from .flat import slip_ring as slip_ring
+from .flat import turning_errors as turning_errors
 from .flat import unresolved_slip_zones as unresolved_slip_zones
 from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
 
 NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
-LATTICE_ERRORS: tuple[str, ...] = flat.LatticeErrors._fields
 
 
 def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
     major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
     return (major, minor) if minor < ROUND * major else None
-
-
-class Ellipse(NamedTuple):
-    """An ellipse: semi-axes (m), direction of the major axis from x (rad, in (-pi/2, pi/2]), center (m)."""
-
-    semi_major: float
-    semi_minor: float
-    angle: float
-    center: tuple[float, float]
-
-    @classmethod
-    def of(cls, found: Any) -> Self:
-        """Return an ellipse of the core."""
-        return cls(found.semi_major, found.semi_minor, found.angle, (found.x, found.y))
-
-
-def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
-    """Return the ellipse with the second moments of the nodes of a zone that is not empty."""
-    return Ellipse.of(flat.moment_ellipse(x, y, zone))
-
-
-def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
-    """Return the ellipse on which the pressure vanishes: docs/theory/edges.md."""
-    return Ellipse.of(flat.edge_ellipse(x, y, pressure, spacing))
 
 
 def limits_of_error(
@@ -76,12 +57,6 @@ def limits_of_error(
     return np.asarray(flat.limits_of_error(spacings, values.T, *masks))
 
 
-def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> tuple[Array, float]:
-    """Estimate the `LATTICE_ERRORS`, and spacings for a goal: docs/theory/expected_errors.md, (X1), (X2)."""
-    errors, needed = flat.expected_lattice_errors(spacings, load_ratio, goal)
-    return np.array(errors), needed
-
-
 def expected_entry_error(
     before: Array, after: Array, stick: float, load_ratio: float | None, goal: float
 ) -> tuple[float, float, float]:
@@ -94,15 +69,6 @@ def expected_entry_error(
     ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
     entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
     return entry, steps, needed
-
-
-def expected_turning_error(shear: Array) -> float:
-    """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6).
-
-    `shear` has the tangential load or shift along x and y, and torque or twist, each over its largest, a row
-    for the end of each load step.
-    """
-    return float(flat.turning_errors(shear)) if len(shear) else 0.0
 
 
 def nodal_residuals(
@@ -123,24 +89,16 @@ def nodal_residuals(
 
 def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:
     """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
-    frictional = isinstance(solution, ContactState)
+    frictional, periodic = isinstance(solution, ContactState), contact.lattice.periodic
     found = (flat.measure_friction if frictional else flat.measure_pressure)(contact, solution)
-    if frictional and not contact.lattice.periodic:
-        all_known: dict[str, float] = found._asdict()
-        return all_known
-    return recorded(contact.lattice, found, friction=frictional)
-
-
-def recorded(lattice: Lattice, found: Any, *, friction: bool) -> dict[str, float]:
-    """Return the measures of the core that the load history of a window has."""
-    known = {
-        name: value for name, value in found._asdict().items() if friction or not VARIABLES[name].frictional
+    known = {name: (value, VARIABLES[name]) for name, value in found._asdict().items()}
+    return {
+        name: value
+        for name, (value, variable) in known.items()
+        if (frictional or not variable.frictional)
+        # a window that repeats has no edges, and no place of a zone
+        and not (periodic and math.isnan(value) and not variable.required)
     }
-    if lattice.periodic:  # no edges, and no place of a zone
-        known = {
-            name: value for name, value in known.items() if VARIABLES[name].required or not math.isnan(value)
-        }
-    return known
 
 
 def turning_points(values: Array) -> list[int]:

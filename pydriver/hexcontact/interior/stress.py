@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, DataArray, Dataset
-from ..core import kernel_cache, memory
+from ..core import flat, kernel_cache, memory
 from ..core.calls import integer
 from ..core.contact import pair_of
-from ..core.edges import ContactEdges, TractionField, tractions_memory
+from ..core.edges import ContactEdges, TractionField
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import limits_of_error
@@ -356,7 +356,7 @@ def tractions_needed(
     if source == "nodes":
         return loaded
     each, all_of_them = _CORRECTED_ARRAYS
-    correction = _EDGE_ARRAYS * field + tractions_memory(*lattice.shape, contact, sheared, spectra)
+    correction = _EDGE_ARRAYS * field + flat.memory_of_edges(*lattice.extent, contact, sheared, spectra, 0)
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 

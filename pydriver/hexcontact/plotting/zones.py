@@ -183,7 +183,7 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     if view.has("gap"):
         edge = view.edges().contact()
         pieces = LineCollection(cast(Any, edge.segments * part.factor), colors="black", linewidths=0.9)
-        axes_of = edge.ellipse.semi_major, edge.ellipse.semi_minor
+        axes_of = edge.semi_major, edge.semi_minor
         size = rf"$\sqrt{{A/\pi}}$ = {worded(edge.radius, 'm')}"
         if axes_of[1] < ROUND * axes_of[0]:
             size = " by ".join(worded(axis, "m") for axis in axes_of)
@@ -191,14 +191,16 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
         axes.add_collection(pieces)
     fitted, words = _fitted(view, view.contact, "a", view.center)
     color = style.COMPUTED if stick is None else "black"
-    part.outline(axes, fitted, fitted.center, label=f"fitted {words}", linestyle="-", color=color)
+    part.outline(axes, fitted, (fitted.x, fitted.y), label=f"fitted {words}", linestyle="-", color=color)
     if view.hertz is not None:
         a, b = view.hertz.semi_major, view.hertz.semi_minor
         exact = f"a = {worded(a, 'm')}" if b > 0.999 * a else f"{worded(a, 'm')} by {worded(b, 'm')}"
         part.outline(axes, view.hertz, view.center, label=f"Hertz, {exact}")
     if stick is not None and np.count_nonzero(stick) > 2:
         fitted, words = _fitted(view, stick, "c")
-        part.outline(axes, fitted, fitted.center, label=f"stick: {words}", linestyle="-", color=style.THIRD)
+        part.outline(
+            axes, fitted, (fitted.x, fitted.y), label=f"stick: {words}", linestyle="-", color=style.THIRD
+        )
     part.show(axes)
     legend = style.legend_under(canvas, style.handles_of(axes), ax, size=8)
     for handle in legend.legend_handles[: len(groups) + 1]:
@@ -213,7 +215,7 @@ def _fitted(
     """Return the circle of the boundary nodes of a zone, or the ellipse of its moments, and its label."""
     moments = measures.moment_ellipse(view.x, view.y, zone)
     if moments.semi_minor > ROUND * moments.semi_major:
-        center = center or moments.center
+        center = center or (moments.x, moments.y)
         radius = measures.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
-        return measures.Ellipse(radius, radius, 0.0, center), f"circle, {letter} = {worded(radius, 'm')}"
+        return measures.Ellipse(radius, radius, 0.0, *center), f"circle, {letter} = {worded(radius, 'm')}"
     return moments, f"ellipse, {worded(moments.semi_major, 'm')} by {worded(moments.semi_minor, 'm')}"

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.measures import (
-    LATTICE_ERRORS,
     NO_VALUE,
+    LatticeErrors,
     expected_entry_error,
     expected_lattice_errors,
-    expected_turning_error,
     slip_ring,
+    turning_errors,
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
@@ -235,9 +235,9 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if case.accuracy is None:
         errors, needed = expected_lattice_errors(found["spacings"], slipping, _LATTICE_ERROR)
         found |= {
-            "lattice_error": float(errors.max()),
+            "lattice_error": max(errors),
             "needed_spacings": math.ceil(needed),
-            **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
+            **{f"{name}_error": error for name, error in errors._asdict().items()},
         }
     if case.rollers and case.accuracy is None and not case.deck.interface:
         found |= _ends_of_rollers(case)
@@ -245,7 +245,7 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
         found |= {
             "ring_spacings": slip_ring(ring) * found["spacings"],
-            "ring_error": float(errors[LATTICE_ERRORS.index("dissipated_energy")]),
+            "ring_error": errors.dissipated_energy,
         }
     if named := [*_fatigue_at_surface(case)]:
         found |= {"edge_spacings": found["spacings"], "edge_tables": listed(named, "and")}
@@ -298,7 +298,7 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
 
 def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     """Return the words in the sentences of limits that are no numbers."""
-    errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
+    errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LatticeErrors._fields), reverse=True)
     steps = f"{found.get('growing_steps', 0.0):.2g}"
     worth = [f"{_at_most(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
     return {
@@ -456,7 +456,7 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
     turns = case.solver.algorithm == "incremental" and not case.adaptive and slipping >= _NOTICED
     changes = np.diff(shear[:, :2], axis=0)
     returns = 0.0 < largest < _NOTICED and (np.sum(changes[1:] * changes[:-1], axis=1) < 0.0).any()
-    return slipping, expected_turning_error(shear) if turns else None, largest if returns else None
+    return slipping, turning_errors(shear) if turns else None, largest if returns else None
 
 
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:

@@ -329,15 +329,11 @@ class Problem:
 
     def memory_needed(self, lattice: Lattice) -> int:
         """Return the memory (bytes) of the solver on a window, for the estimated contact."""
-        method, shape = self.method_for(lattice), lattice.shape
-        nodes = self.contact_nodes(lattice)
-        if not self.frictional:
-            threads, periodic = memory.threads(), lattice.periodic
-            return contact.memory_needed(method, *shape, contact=nodes, threads=threads, periodic=periodic)
-        return friction.memory_needed(
-            method,
-            *shape,
-            contact=nodes,
+        return contact.memory_needed(
+            self.method_for(lattice),
+            *lattice.shape,
+            contact=self.contact_nodes(lattice),
+            part="problem with friction" if self.frictional else "problem",
             loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
             coupled=self.coupled,
             spectra=self.pair.spectra,

@@ -26,6 +26,17 @@ module hc_projected_gmres
 
   public :: projected_gmres
 
+  !> A direction of the search.
+  type :: direction_t
+    !> Weighted residual v on the active nodes, and M r there, r that residual without its weights: the direction is
+    !> z = M r + M B share with C^T z = 0
+    real(wp), allocatable :: v(:), mr(:)
+    !> The same in single precision
+    real(sp), allocatable :: rounded(:), rounded_mr(:)
+    !> The product A z on the other nodes
+    real(sp), allocatable :: beyond(:)
+  end type direction_t
+
 contains
 
   !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly; the norm of a residual is that of
@@ -48,15 +59,6 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type :: direction_t
-      !> Weighted residual v on the active nodes, and M r there, r that residual without its weights: the direction is
-      !> z = M r + M B share with C^T z = 0
-      real(wp), allocatable :: v(:), mr(:)
-      !> The same in single precision
-      real(sp), allocatable :: rounded(:), rounded_mr(:)
-      !> The product A z on the other nodes
-      real(sp), allocatable :: beyond(:)
-    end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
     !> Residual without its weights, and the one that becomes the next; in its memory also a direction and its product

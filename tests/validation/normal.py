@@ -228,7 +228,7 @@ def ellipse_error(
 ) -> float:
     """E_e: mean distance from the ellipse of the boundary nodes, moved out by l_e/2, divided by b."""
     rim = measures.boundary(zone)
-    x, y = x[rim] - ellipse.center[0], y[rim] - ellipse.center[1]
+    x, y = x[rim] - ellipse.x, y[rim] - ellipse.y
     cosine, sine = math.cos(ellipse.angle), math.sin(ellipse.angle)
     u, v = (x * cosine + y * sine) / ellipse.semi_major, (y * cosine - x * sine) / ellipse.semi_minor
     way = np.hypot(u, v)  # 1 on the ellipse

@@ -360,7 +360,9 @@ contains
       ! all of it ends where there is no tension
       share_of_step = min(best, 1.0_wp)
       if (level%lattice%slenderness() > level%options%preconditioner%slender) share_of_step = min(best, longest_share(level, now))
-      progress%length = min(progress%length*min(max(best, 0.5_wp), 8.0_wp), 2.0_wp)
+      ! twice the last one at most, from far below the first one more
+      progress%length = min(progress%length*min(max(best, 0.5_wp), 8.0_wp), &
+                            max(2.0_wp*progress%length, 0.5_wp*level%options%normal%searched_length), 2.0_wp)
     else if (progress%step == conjugate .and. level%normal_law%is_compliant()) then
       share_of_step = find_sprung_step(level, now)
     else if (progress%step == conjugate) then

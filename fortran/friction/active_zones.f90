@@ -264,7 +264,7 @@ contains
     real(wp) :: motion(n_motion)
     integer :: n, n_col, row, from, to, low, high, i, m
 
-    n = size(now%p)
+    n = size(now%contact)
     n_col = now%problem%lattice%extent(1)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, low, high, i, m)

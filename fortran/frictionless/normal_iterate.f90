@@ -347,13 +347,13 @@ contains
       to = min(from + worth_a_run - 1, size(known))
       n = count(known(from:to))
       if (n == 0) cycle
-      do col = from, to
-        if (n == to - from + 1 .and. n_run > 0) then
-          if (run(2, n_run) == from - 1) then
-            run(2, n_run) = to
-            exit
-          end if
+      if (n == to - from + 1 .and. n_run > 0) then
+        if (run(2, n_run) == from - 1) then
+          run(2, n_run) = to
+          cycle
         end if
+      end if
+      do col = from, to
         if (.not. known(col)) cycle
         if (n_run == 0) then
           n_run = 1

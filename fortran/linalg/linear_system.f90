@@ -87,7 +87,7 @@ module hc_linear_system
     logical :: independent = .true.
     !> Bound of the rounding errors in the product A x, which is carried along
     real(wp) :: drift = 0.0_wp
-    !> GMRES: bound of the error of the product by what is stored in single precision
+    !> GMRES: bound of the error of the product by vectors in single precision
     real(wp) :: rounding = 0.0_wp
   end type iteration_t
 

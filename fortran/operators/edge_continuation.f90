@@ -240,7 +240,7 @@ contains
     integer(int16), intent(inout), contiguous :: mark(:)
     type(field_space_t), intent(in) :: space
     type(preconditioner_options_t), intent(in) :: options
-    integer :: first(0:most_rings + 1), r, n
+    integer :: first(0:most_rings + 1), spare(0:127), r, n
     real(wp) :: found(1), by_number(0:7)
     real(wp), parameter :: number(0:7) = [(real(max(r, 1), wp), r=0, 7)]
 
@@ -265,8 +265,10 @@ contains
       by_number = profile(r, self%n_ring)/profile(r - 1, self%n_ring)/number
       self%fall(:, r) = real(by_number(n_bits), sp)
     end do
+    ! a factor of 0 stands before a neighbor that is summed anyway: other values may be no numbers
+    spare = merge(min(lowest(:, 1), size(self%step)), 1, n_bits > 0)
     do r = 1, size(lowest, 2)
-      self%first(r, :) = self%step(merge(min(lowest(:, r), size(self%step)), 1, n_bits >= r))
+      self%first(r, :) = self%step(merge(min(lowest(:, r), size(self%step)), spare, n_bits >= r))
     end do
     call list_rings(self, n_col, list, first, step, mark, space)
   end subroutine find_rings
@@ -392,7 +394,7 @@ contains
     !> Marks of all nodes, and steps to the neighbors of a node
     integer(int16), intent(inout), contiguous :: mark(:)
     integer, intent(in) :: step(:)
-    !> The nodes, as places in the marks, in room for as many as there are marks: what is not used takes no memory
+    !> The nodes, as places in the marks; as long as these, since pages that nothing is written to take no memory
     integer, allocatable, intent(out) :: edge(:)
     !> Their number
     integer, intent(out) :: n
@@ -631,8 +633,8 @@ contains
     end associate
   end subroutine extend_block
 
-  !> Do a stage of the transpose in a block: what the next ring hands back is added, smoothed along the ring, and made ready for the
-  !> ring before.
+  !> Do a stage of the transpose in a block: the values of the next ring are added and smoothed along the ring, and get their factor
+  !> for the ring before.
   pure subroutine fold_block(self, stage, block, field, value, before, own, first)
     type(edge_extension_t), intent(in) :: self
     !> Stage, from 0, and block

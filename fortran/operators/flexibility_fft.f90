@@ -68,7 +68,7 @@ contains
     integer, intent(in), optional :: kind
     !> Space of the fields; absent: as many threads as OpenMP would take
     type(field_space_t), intent(in), optional :: space
-    !> With `of_pressure`: the kernel, as far as it has been computed
+    !> With `of_pressure`: the kernel where it is known
     type(normal_kernel_t), intent(inout), optional :: kernel
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache

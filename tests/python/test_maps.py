@@ -217,6 +217,27 @@ def test_a_file_that_is_no_map_is_refused(file: Any, name: str, content: Any, ke
     assert len(found.splitlines()) == 1
 
 
+def test_a_coordinate_that_few_points_have_is_refused(file: Any) -> None:
+    lines = columns_of(BALL).splitlines()
+    x, rest = lines[1300].split(",", 1)
+    lines[1300] = f"{float(x) + 1.3},{rest}"
+    found = complaint(of_file(file("a.csv", "\n".join(lines)), holes="fill"))
+    assert "line 1301: expected points of a rectangular grid: few have x = -368.7, beside -370" in found
+    disc = (X**2 + Y[:, None] ** 2 <= 300.0**2).ravel()  # has few points in its first rows
+    assert case(of_file(file("b.csv", columns_of(BALL, disc)), holes="fill"))
+    stretched = columns_of(BALL).replace("\n-400, ", "\n-405, ")
+    rows = case_rows(case(of_file(file("c.csv", stretched))))
+    assert any("apart; 10.0 µm to 15.0 µm in x, " in row[1] for row in rows)
+
+
+def test_an_extent_that_may_be_swapped_is_noted(file: Any) -> None:
+    name = file("a.csv", rows_of(BALL[10:51]))  # points 10 um apart, 800 um by 400 um
+    swapped = case(of_file(name, **{**MATRIX, "extent": ["390 um", "810 um"]}), load={"normal_load": 1.0})
+    found = plausibility.unjudged(swapped)
+    assert found.startswith("the extent of the map of body 1 may be swapped: expected the length in x first")
+    assert "points 4.88 um apart in x and 20.2 um in y, and with the two swapped 10.1 um and 9.75 um" in found
+
+
 def test_a_large_map_is_refused_before_it_is_read(file: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(map_file, "MOST_POINTS", BALL.size - 1)
     for name, content in (("a.csv", rows_of(BALL)), ("b.csv", columns_of(BALL)), ("c.npy", BALL)):
@@ -240,8 +261,8 @@ def test_a_large_map_is_refused_before_it_is_read(file: Any, monkeypatch: pytest
         ),
         (
             {**MATRIX, "extent": ["600 um", "800 um"]},
-            "extent: expected the length in x first: the 61 rows and 81 columns of PATH have points 7.5 um "
-            "apart in x and 13.3 um in y, and 10 um in both with x and y swapped; or give spacing",
+            "extent: expected the length in x first: the 61 rows and 81 columns of ball.csv have points "
+            "7.5 um apart in x and 13.3 um in y, and with the two swapped 10 um and 10 um; or give spacing",
         ),
         (
             {**MATRIX, "spacing": [1e-5, 1e-5]},
@@ -310,15 +331,15 @@ def test_formats_of_microscopes_are_read_by_surface_topography(
         SimpleNamespace(
             name=name,
             nb_grid_pts=BALL.T.shape,
-            physical_sizes=(810.0, 610.0),
-            topography=lambda: SimpleNamespace(
+            physical_sizes=sizes,
+            topography=lambda physical_sizes=(810.0, 610.0): SimpleNamespace(
                 heights=lambda: np.ma.masked_greater(BALL.T, 4.9999),
                 unit="µm",
                 is_uniform=True,
-                physical_sizes=(810.0, 610.0),
+                physical_sizes=physical_sizes,
             ),
         )
-        for name in ("Height", "Phase")
+        for name, sizes in (("Height", (810.0, 610.0)), ("Phase", None))
     ]
 
     class Reader(SimpleNamespace):
@@ -342,6 +363,10 @@ def test_formats_of_microscopes_are_read_by_surface_topography(
     np.testing.assert_allclose(found.x, X + 400.0, atol=1e-12)
     assert np.isnan(found.values).sum() == 1
     assert "holes: 1 point has no height" in complaint(of_file(path, variable="Height"))
+    unsized = of_file(path, variable="Phase", holes="fill")
+    assert "extent: missing; expected extent or spacing" in complaint(unsized)
+    surface: Any = case({**unsized, "extent": ["800 um", "600 um"], "first_row": "bottom"}).body_1.surface
+    np.testing.assert_allclose(surface.points.z, 1e-6 * np.ma.masked_greater(BALL.T, 4.9999).filled(np.nan))
 
 
 def test_a_file_of_surface_topography_itself(tmp_path: Path) -> None:
@@ -349,6 +374,8 @@ def test_a_file_of_surface_topography_itself(tmp_path: Path) -> None:
     library.Topography(BALL.T, (810.0, 610.0), unit="um").to_matrix(str(tmp_path / "ball.asc"))
     found = read_map(tmp_path / "ball.asc")
     np.testing.assert_allclose(found.values, BALL.T, rtol=1e-12)
+    np.savetxt(tmp_path / "bare.asc", BALL)
+    np.testing.assert_allclose(read_map(tmp_path / "bare.asc").values, BALL, rtol=1e-12)
 
 
 # --- levelling, holes, steps, interpolation -----------------------------------------------------------------
@@ -448,16 +475,23 @@ def test_a_window_larger_than_the_map_is_refused(file: Any, grid: Any, words: st
 
 def test_a_contact_at_the_end_of_the_map_is_refused(file: Any) -> None:
     half = of_file(file("half.csv", rows_of(BALL[:, 36:])), **{**MATRIX, "extent": ["440 um", "600 um"]})
-    sentence = (
-        "body.1.surface: the contact of load step 1 reaches the end of the height map; expected heights of"
+    reached = "reaches the end of the height map; expected heights of"
+    assert complaint(half).startswith(f"body.1.surface: the estimated contact {reached}")
+    moved = {**half, "offset": ["30 um", "0 um"]}
+    assert complaint([moved, {"shape": "flat"}]).startswith(
+        f"body.1.surface.1: the estimated contact {reached}"
     )
-    assert complaint(half).startswith(sentence)
+    layer = {"law": "power", "coefficient": 1e16, "exponent": 1}  # beside which no estimate is unbounded
+    bodies = {"1": {**STEEL, "surface": half}, "2": STEEL}
+    rest = {"grid": {"spacing": 8e-6}, "load": [{"normal_load": 20.0}], "interface": layer}
+    with pytest.raises(DeckError, match=f"^body.1.surface: the contact of load step 1 {reached}"):
+        Case.from_dict({"body": bodies, **rest}).run()
     quarter = of_file(
         file("quarter.csv", rows_of(BALL[:, 40:])), **{**MATRIX, "extent": ["400 um", "600 um"]}
     )
-    assert "body.1.surface: the lowest point of the map lies at its end, at x = -200.0 µm" in complaint(
-        quarter
-    )
+    lowest = "body.1.surface: the lowest point of the map lies at its end, at x ="
+    assert f"{lowest} -200.0 µm" in complaint(quarter)
+    assert f"{lowest} -170.0 µm" in complaint({**quarter, "offset": ["30 um", "0 um"]})
 
 
 def waves(points: int) -> Any:
@@ -560,6 +594,17 @@ def test_a_ball_on_a_flat_profile_touches_below_its_center() -> None:
     distance = np.subtract(found.deck.body.separation.first_touch[:2], (1e-3, 0.5e-3))
     assert np.hypot(*distance) < 51e-6  # half of the distance of its points
     assert float(found.run().max_pressure[-1]) == pytest.approx(HERTZ, rel=2e-3)
+
+
+def test_a_tilted_flat_is_a_tilted_ball() -> None:
+    tilt = {"tilt": ["0 deg", "1 deg"]}
+    ball, grid = {"shape": "sphere", "radius": "10 mm"}, {"nodes_in_radius": 10}
+    flat = {"shape": "flat", **tilt}
+    one = case({**ball, **tilt}, **grid)
+    for other in (case(ball, other=flat, **grid), case([ball, flat], **grid)):
+        assert float(other.run().approach[-1]) == pytest.approx(float(one.run().approach[-1]), rel=1e-9)
+        assert not other.surfaces.flat
+    assert "contact has no end" in complaint(flat)
 
 
 def test_roughness_from_a_file_lies_on_a_ball(file: Any) -> None:

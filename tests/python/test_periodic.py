@@ -529,7 +529,11 @@ BAD = {
                 },
             }
         },
-        r'body\.1\.surface\.tilt = \["0 deg", "1e-06 deg"\]: expected none in a window that repeats',
+        r'body\.1\.surface\.tilt = \["0 deg", "1e-6 deg"\]: expected none in a window that repeats',
+    ),
+    "tilted flat": (
+        {"body_2": {**STEEL, "surface": {"shape": "flat", "tilt": ["1 mrad", "0 deg"]}}},
+        r'body\.2\.surface\.tilt = \["1 mrad", "0 deg"\]: expected none in a window that repeats',
     ),
     "waviness": (
         {"body_1": {**STEEL, "surface": {"shape": "waviness", "amplitude": 1e-6, "wavelength": 7e-4}}},
@@ -544,6 +548,12 @@ BAD = {
     "direct": ({"method": "direct"}, 'solver.method = "direct": expected "fft"'),
     "accuracy": ({"accuracy": 0.02}, "accuracy: expected none beside a window that repeats"),
 }
+
+
+def test_a_traction_above_friction_asks_for_no_rotation() -> None:
+    case = waves(16, friction_coefficient=0.3, loads={"mean_gap": 0.1 * HEIGHT, "mean_traction_x": FULL})
+    with pytest.raises(ConvergenceError, match=r"expected a smaller load, .* \(shift_x, shift_y\)"):
+        case.run()
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -41,12 +41,21 @@ def test_heights_have_the_moments_and_waves_that_are_asked_for() -> None:
             "rms_slope": np.sqrt(np.sum((2 * np.pi / length) ** 2 * size**2)),
         }
         assert found[key] == pytest.approx(value, rel=2e-3)
+        assert Rough(**WAVES, **{key: value}, period=[SIDE, SIDE]).rms == pytest.approx(
+            tuple(found.values()), rel=2e-3
+        )
         assert heights.min() == pytest.approx(0.0, abs=3e-3 * np.ptp(heights))
         strange = (length < 15.9e-6) | ((length > 129e-6) & (length < 1.0))
         assert np.sum(size[strange] ** 2) < 1e-4 * np.sum(size[~strange & (length < 1.0)] ** 2)
         # the spectrum falls like k^(-2(1 + H))
         means = [np.mean(size[abs(np.log(length / wave)) < 0.2] ** 2) for wave in (20e-6, 100e-6)]
         assert np.log(means[1] / means[0]) / np.log(5.0) == pytest.approx(3.6, abs=0.6)
+
+
+def test_steep_roughness_is_told() -> None:
+    assert not any("slope by" in sentence for sentence in pressed(64, 1e8).warnings)
+    (found,) = (one for one in pressed(64, 1e8, rms_slope=0.2).warnings if "slope by" in one)
+    assert found.startswith("the rough surfaces slope by 0.2 (rms), expected at most 0.1: ")
 
 
 def test_every_lattice_sees_the_same_surface_and_shorter_waves_add_to_it() -> None:

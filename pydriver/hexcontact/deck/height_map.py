@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 _STEP, _CURVED = 0.1, 0.25
 _ECHO = 4  # points beyond which the ringing of a cubic spline, 0.27 times as high with each, is left
 _BESIDE_HOLE = 2  # points from a hole that no contact may come to
+BEYOND_MAP = (
+    "reaches the end of the height map; expected heights of a larger part, or a function that says what lies "
+    "beyond"
+)
 _TURNED = "expected the gap, such as heights.max() - heights of heights out of the body"
 
 
@@ -49,7 +53,7 @@ class HeightMap:
         # the map ends where its points do
         rows, cols = (_span(np.asarray(there.any(axis=axis))) for axis in (1, 0))
         self.x, self.y, self.gap, there = self.x[rows], self.y[cols], self.gap[rows, cols], there[rows, cols]
-        self._degree, self._there = degree, there
+        self._degree, self.there = degree, there
         self._filled = self.gap if there.all() else self.gap[_nearest(there)]
         row, col = np.unravel_index(np.nanargmin(self.gap), self.gap.shape)
         self.first_touch = float(self.x[row]), float(self.y[col])  # point (m) where the gap is smallest
@@ -91,8 +95,8 @@ class HeightMap:
             inner = np.asarray(x)[near], np.asarray(y)[near]
             monotone = np.clip(self._bicubic(np.stack(inner, axis=-1)), *self._range(*inner))
             found[near] = share[near] * found[near] + (1.0 - share[near]) * monotone
-        if not self._there.all():
-            found[inside & (self._through(~self._there).ev(x, y) > 1e-9)] = np.inf
+        if not self.there.all():
+            found[inside & (self._through(~self.there).ev(x, y) > 1e-9)] = np.inf
         return found
 
     def _through(self, values: Array, degree: int = 1) -> Any:
@@ -109,7 +113,7 @@ class HeightMap:
     @cached_property
     def near_steps(self) -> Mask:
         """Points beside steps, at which the spline leaves the range of the heights, and in holes."""
-        found = ~self._there
+        found = ~self.there
         if self._degree > 1:
             x, y, heights = self.x, self.y, self._filled
             if len(x) > 2:  # two points have a line between them
@@ -160,55 +164,10 @@ class HeightMap:
         largest = float(beyond[np.isfinite(beyond)].max(initial=0.0))
         return largest if largest > 1e-12 * np.ptp(self._filled) else 0.0  # rounding
 
-    # --- contacts that the data do not bound ----------------------------------------------------------------
-
-    def touch_fault(self, turned: str = _TURNED) -> str:
-        """Return the sentence about a lowest point at the end of the map; empty if it lies inside.
-
-        `turned` is the part of the sentence about heights that point the other way.
-        """
-        low, high = (_is_at_end(values) for values in (self.gap, -np.where(self._there, self.gap, -np.inf)))
-        if not low:
-            return ""
-        if not high:
-            return (
-                "the heights point the other way: the lowest point of the map lies at its end, the highest "
-                f"inside; {turned}"
-            )
-        return (
-            f"the lowest point of the map lies at its end, at {place(*self.first_touch)}, so that the data "
-            "do not bound the contact; expected heights of a larger part, or center where the contact lies"
-        )
-
-    def fault_near(self, distance: float, x: Array, y: Array) -> str:
-        """Return the fault of a contact at some points: near a hole, or within a distance (m) of the end."""
-        inside = [along[0] + distance <= at for along, at in ((self.x, x), (self.y, y))]
-        inside += [at <= along[-1] - distance for along, at in ((self.x, x), (self.y, y))]
-        if not np.all(inside):
-            return (
-                "reaches the end of the height map; expected heights of a larger part, or a function that "
-                "says what lies beyond"
-            )
-        if not (holes := np.isnan(self.gap)).any():
-            return ""
-        at = tuple(
-            np.rint(np.interp(p, c, np.arange(len(c)))).astype(int) for p, c in ((x, self.x), (y, self.y))
-        )
-        hole = [index[at] for index in _nearest(holes)]
-        apart = np.maximum(*(abs(of - to) for of, to in zip(at, hole, strict=True)))
-        if not apart.size or apart.min() > _BESIDE_HOLE:
-            return ""
-        row, col = (index[apart.argmin()] for index in hole)
-        return (
-            f"comes within {_BESIDE_HOLE} points of a hole of the height map, at "
-            f"{place(self.x[row], self.y[col])}; fill it, as by gap.interpolate_na, or set it to inf if "
-            "nothing can touch there"
-        )
-
     def __str__(self) -> str:
         """Describe the map and its interpolation."""
         apart = " by ".join(dict.fromkeys(quantity(distance, "m", 3) for distance in self.distances))
-        missing = int(np.count_nonzero(~self._there))
+        missing = int(np.count_nonzero(~self.there))
         return (
             f"map of {len(self.x)} x {len(self.y)} points, {apart} apart"
             f"{f', {missing} without a height' if missing else ''}; {self.interpolated}"
@@ -257,14 +216,54 @@ class Placed(NamedTuple):
         x, y = _turned(x, y, self.angle)
         return x + self.offset[0], y + self.offset[1]
 
+    # --- contacts that the data do not bound ----------------------------------------------------------------
+
     @property
     def touch_fault(self) -> str:
         """Sentence about a lowest point at the end of the map; empty if it lies inside."""
-        return self.map.touch_fault(self.turned)
+        found = self.map
+        low, high = (_is_at_end(values) for values in (found.gap, -np.where(found.there, found.gap, -np.inf)))
+        if not low:
+            return ""
+        if not high:
+            return (
+                "the heights point the other way: the lowest point of the map lies at its end, the highest "
+                f"inside; {self.turned}"
+            )
+        return (
+            f"the lowest point of the map lies at its end, at {self._named(*found.first_touch)}, so that the "
+            "data do not bound the contact; expected heights of a larger part, or center where the contact "
+            "lies"
+        )
+
+    def is_near_end(self, distance: float, x: Array, y: Array) -> bool:
+        """Test whether points of the plane lie within a distance (m) of the end of the map, or beyond it."""
+        ends = zip(self.own(x, y), (self.map.x, self.map.y), strict=True)
+        return any((np.minimum(at - along[0], along[-1] - at) < distance).any() for at, along in ends)
 
     def fault_near(self, distance: float, x: Array, y: Array) -> str:
-        """Return the fault of a contact at some points of the plane."""
-        return self.map.fault_near(distance, *self.own(x, y))
+        """Return the fault of a contact at some points: near a hole, or within a distance (m) of the end."""
+        if self.is_near_end(distance, x, y):
+            return BEYOND_MAP
+        found = self.map
+        if not (holes := np.isnan(found.gap)).any():
+            return ""
+        ends = zip(self.own(x, y), (found.x, found.y), strict=True)
+        index = tuple(np.rint(np.interp(one, c, np.arange(len(c)))).astype(int) for one, c in ends)
+        hole = [nearest[index] for nearest in _nearest(holes)]
+        apart = np.maximum(*(abs(of - to) for of, to in zip(index, hole, strict=True)))
+        if not apart.size or apart.min() > _BESIDE_HOLE:
+            return ""
+        row, col = (nearest[apart.argmin()] for nearest in hole)
+        return (
+            f"comes within {_BESIDE_HOLE} points of a hole of the height map, at "
+            f"{self._named(found.x[row], found.y[col])}; fill it, as by gap.interpolate_na, or set it to inf "
+            "if nothing can touch there"
+        )
+
+    def _named(self, x: float, y: float) -> str:
+        """Return a point of the map in words, in coordinates of the plane."""
+        return place(*(float(at) for at in self.in_plane(np.asarray(x), np.asarray(y))))
 
 
 def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:

@@ -96,7 +96,7 @@ class Body(Table):
     @classmethod
     def _curved(cls, surface: Surface | None) -> Surface | None:
         """Return None for a flat surface."""
-        return None if isinstance(surface, Flat) else surface
+        return None if surface and surface.flat else surface
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

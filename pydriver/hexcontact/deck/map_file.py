@@ -31,6 +31,7 @@ _EXPECTED = "heights as text: a matrix, or columns x, y and z with headers"
 _MOST_SENTENCES = 5
 _SAME = 1e-7  # distance of equal coordinates of columns, as a share of their range
 _EVEN = 0.01  # steps of coordinates may differ by this share, since they are rounded
+_FEW = 0.5  # points with a coordinate, and steps beside it, over the median, from which it counts
 _MOST_EMPTY = 4  # points of the rectangular grid of columns for each line of the file
 
 
@@ -213,6 +214,15 @@ def _gridded(path: Path, x: Array, y: Array, z: Array, lines: Sequence[int]) -> 
     if bad.any():
         raise DeckError(f"{path}, line {lines[int(np.argmax(bad))]}: expected finite coordinates x and y")
     (across, col), (up, row) = _distinct(x), _distinct(y)
+    for name, at, place in (("x", across, col), ("y", up, row)):
+        stray = _stray(at, place)
+        if stray is not None:
+            value, beside = f"{at[stray]:.6g}", f"{at[stray - 1] if stray else at[1]:.6g}"
+            line = lines[int(np.argmax(place == stray))]
+            raise DeckError(
+                f"{path}, line {line}: expected points of a rectangular grid: few have {name} = {value}, "
+                f"beside {beside}"
+            )
     size = len(across) * len(up)
     if size > _MOST_EMPTY * len(z):
         raise DeckError(
@@ -228,6 +238,15 @@ def _gridded(path: Path, x: Array, y: Array, z: Array, lines: Sequence[int]) -> 
     values = np.full(size, np.nan)
     values[index] = z
     return values.reshape(len(across), len(up)), across, up
+
+
+def _stray(at: Array, place: Array) -> int | None:
+    """Return a coordinate nearer to the next one than others are, which few points have; None without one."""
+    steps = np.diff(at)
+    few = np.bincount(place) < _FEW * np.median(np.bincount(place))
+    apart = np.minimum(np.append(steps, np.inf), np.insert(steps, 0, np.inf))
+    found = np.flatnonzero(few & (apart < _FEW * np.median(steps))) if len(at) > 1 else []
+    return int(found[0]) if len(found) else None
 
 
 def _distinct(values: Array) -> tuple[Array, Array]:
@@ -316,7 +335,9 @@ def _by_surface_topography(path: Path, channel: str | None) -> MapFile:
         found = about.topography(**sizes)
         values: Array = np.ma.filled(np.ma.asarray(found.heights(), float), np.nan)
         unit = str(found.unit or "")
-        if sizes or not found.is_uniform:
-            raise DeckError(f"{path}: expected points with a known and even distance")
+        if not found.is_uniform:
+            raise DeckError(f"{path}: expected points with an even distance")
+        if sizes:  # a matrix whose distances the deck gives
+            return MapFile(values.T, None, None, unit, unit)
         x, *y = (size / n * np.arange(n) for size, n in zip(found.physical_sizes, values.shape, strict=True))
         return MapFile(values, x, y[0], unit, unit) if y else MapFile(values, None, x, unit, unit)

@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..errors import DeckError
 from ..text import counted, quantity
 from .faults import MISSING
-from .height_map import HeightMap, Placed
+from .height_map import HeightMap, Placed, place
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
 from .surfaces import Angle, Point, Surface, shape
@@ -31,6 +31,7 @@ _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file al
 _POINTS = ("x", "y", "heights")
 _LONG = 1e6  # half the length (m) of an extruded profile
 _EVEN = 1e-6  # of distances between points that repeat, and of their period
+_UNEVEN = 0.02  # difference of steps between points that is more than rounding
 _ROUNDED = 1e-9  # of heights, over their range
 _BEYOND = 12  # points on each side of a period that its interpolation sees
 _SQUARE, _SLENDER = 1.02, 1.1  # ratios of sides of cells that are squares, and that are not
@@ -142,6 +143,7 @@ class Measured(Surface):
     extruded: ClassVar[bool] = False
     _file_key: ClassVar[str] = "file"
     _period: tuple[float, float] | None = PrivateAttr(None)
+    _doubt: str = PrivateAttr("")  # expected value of an extent that may be swapped
     _placing: ClassVar[tuple[str, ...]] = ()  # further keys that go with a file alone
 
     @classmethod
@@ -371,6 +373,13 @@ class Measured(Surface):
         done = {"fill": "filled with the means of their neighbors", "open": "open: nothing touches there"}
         return f"{counted(count, 'hole')} {done[self.holes]}" if (count := self.holes_found) else "no holes"
 
+    def notes(self, name: str) -> Iterator[str]:
+        """Yield notes on the surface under its name: filled holes, an extent that may be swapped."""
+        if self.holes == "fill" and (count := self.holes_found):
+            yield counted(count, f"hole of {name} is", f"holes of {name} are") + " filled, not measured"
+        if self._doubt:
+            yield f"the extent of {name} may be swapped: expected {self._doubt}"
+
     def __str__(self) -> str:
         """Name the shape and its file."""
         return f"{self.shape} of {self.file.name}" if self.file else self.shape
@@ -437,15 +446,16 @@ class Map(Measured):
             )
         else:
             steps = self.extent[0] / (n_x - 1), self.extent[1] / (n_y - 1)
-            swapped = self.extent[0] / (n_y - 1), self.extent[1] / (n_x - 1)
-            if max(swapped) < _SQUARE * min(swapped) and max(steps) > _SLENDER * min(steps):
-                refuse_key(
-                    "extent",
-                    MISSING,
-                    f"expected the length in x first: the {n_y} rows and {n_x} columns of {self.file} have "
-                    f"points {readable(steps[0])} apart in x and {readable(steps[1])} in y, and "
-                    f"{readable(min(swapped))} in both with x and y swapped; or give spacing",
+            swapped = self.extent[1] / (n_x - 1), self.extent[0] / (n_y - 1)
+            slender, if_swapped = (max(cell) / min(cell) for cell in (steps, swapped))
+            if slender > _SLENDER and if_swapped < slender / _SLENDER:
+                self._doubt = (
+                    f"the length in x first: the {n_y} rows and {n_x} columns of {self._name} have points "
+                    f"{readable(steps[0])} apart in x and {readable(steps[1])} in y, and with the two "
+                    f"swapped {readable(swapped[0])} and {readable(swapped[1])}"
                 )
+            if self._doubt and if_swapped < _SQUARE:
+                refuse_key("extent", MISSING, f"expected {self._doubt}; or give spacing")
         x, y = (step * (np.arange(n) - (n - 1) / 2) for step, n in zip(steps, (n_x, n_y), strict=True))
         z = (rows[::-1] if self.first_row == "top" else rows).T
         return x, y, z, f"columns along x, first row at the {self.first_row}"
@@ -457,9 +467,15 @@ class Map(Measured):
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the map, beside the distance of nodes along a direction."""
         (x, y, _, about), ends = self.points, []
-        of_points = [float(np.median(np.diff(np.sort(at)))) for at in (x, y)]
-        for name, at, step in (("x", x, of_points[0]), ("y", y, of_points[1])):
-            low, high = at.min(), at.max()
+        apart_by = [np.diff(np.sort(at)) for at in (x, y)]
+        of_points = [float(np.median(steps)) for steps in apart_by]
+        uneven = [
+            f"; {quantity(steps.min(), 'm', 3)} to {quantity(steps.max(), 'm', 3)} in {name}"
+            for name, steps in zip("xy", apart_by, strict=True)
+            if np.ptp(steps) > _UNEVEN * steps.max()
+        ]
+        for name, at, step, origin in zip("xy", (x, y), of_points, self._origin, strict=True):
+            low, high = at.min() + origin, at.max() + origin
             cells = quantity(high - low + step, "m")
             ends.append(
                 f"{name} from {quantity(low, 'm')} to {quantity(high, 'm')} ({quantity(high - low, 'm')}, "
@@ -471,9 +487,11 @@ class Map(Measured):
         steps = " by ".join(dict.fromkeys(quantity(step, "m", 3) for step in of_points))
         shares = [f"{step / node:.3g}" for step, node in zip(of_points, of_nodes, strict=True)]
         ratios = " by ".join(dict.fromkeys(shares))
-        yield f"points {steps} apart, {ratios} spacings of the lattice; x to the right, y to the top"
+        of_lattice = f"{ratios} spacings of the lattice"
+        yield f"points {steps} apart{''.join(uneven)}, {of_lattice}; x to the right, y to the top"
         u, v = (a + b for a, b in zip(self._in_period(*self.field.first_touch), self._origin, strict=True))
-        yield f"{self._heights}; nearest to the other body at x = {quantity(u, 'm')}, y = {quantity(v, 'm')}"
+        tilted = " before the tilt" * any(self.tilt)
+        yield f"{self._heights}; nearest to the other body{tilted} at {place(u, v)}"
         yield self.field.interpolated
 
 

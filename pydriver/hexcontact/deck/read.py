@@ -24,7 +24,7 @@ from .interface import FROM_PYTHON
 from .keys import Deck
 from .separation import Separation
 from .series import Series, read_series
-from .surfaces import Flat, Surface
+from .surfaces import Surface
 from .toml import parse_toml, read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
@@ -210,7 +210,7 @@ class RecordedDeck:
     def only_surface(self) -> Surface | None:
         """The surface of a body on a flat one; None if there is none, or both have one."""
         gap = self.separation
-        curved = [one for one in (gap.surface_1, gap.surface_2) if not isinstance(one, Flat)] if gap else []
+        curved = [one for one in (gap.surface_1, gap.surface_2) if not one.flat] if gap else []
         return curved[0] if len(curved) == 1 else None
 
 

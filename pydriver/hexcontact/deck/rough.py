@@ -55,6 +55,7 @@ class Rough(Surface):
     formula: ClassVar[str] = "h = Σ of random waves between shortest and longest"
     as_given: ClassVar[bool] = True
     _sides: tuple[float, float] | None = PrivateAttr(None)
+    _rms: tuple[float, float] = PrivateAttr()
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -125,6 +126,8 @@ class Rough(Surface):
             scale = self.rms_slope / (2 * math.pi * math.sqrt((k**2 * power).sum()))
         spectrum = np.zeros(shape, complex)
         spectrum[chosen] = scale * amplitude
+        power *= scale**2
+        self._rms = math.sqrt(power.sum()), 2 * math.pi * math.sqrt((k**2 * power).sum())
         heights = (np.fft.ifft2(spectrum) * math.prod(shape)).real
         return np.asarray(heights.max() - heights)
 
@@ -136,12 +139,19 @@ class Rough(Surface):
         return np.asarray(map_coordinates(self._heights, places, order=3, mode="grid-wrap"))
 
     @property
+    def rms(self) -> tuple[float, float]:
+        """Root mean square of its heights (m) and of its slope."""
+        self._heights  # noqa: B018 (computed here, cached)
+        return self._rms
+
+    @property
     def _in_words(self) -> str:
         return " by ".join(readable(side) for side in self.sides)
 
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about its period, and its shortest wave beside the distance of nodes."""
         spacing = max(apart(0.0), apart(math.pi / 2))
-        yield f"repeats after {self._in_words}"
+        height, slope = self.rms
+        yield f"repeats after {self._in_words}; rms height {readable(height)}, rms slope {slope:.3g}"
         shortest = counted(f"{self.shortest / spacing:.3g}", "spacing")
         yield f"shortest wave of {shortest}; the contact area needs 8 or more"

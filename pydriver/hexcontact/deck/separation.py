@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..errors import DeckError
 from .height_map import Placed
-from .surfaces import Flat, Surface
+from .surfaces import Surface
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Separation:
 
     @property
     def flat(self) -> bool:
-        """Whether both surfaces are planes."""
-        return isinstance(self.surface_1, Flat) and isinstance(self.surface_2, Flat)
+        """Whether both surfaces are planes without a tilt."""
+        return self.surface_1.flat and self.surface_2.flat
 
     @cached_property
     def first_touch(self) -> tuple[float, float, float]:
@@ -121,14 +121,17 @@ class Separation:
         """Whether one measured surface faces a plane, and neither is tilted."""
         both = (self.surface_1, self.surface_2)
         single = [one for one in both if one.measured == (one,) and not any(one.tilt)]
-        return len(single) == 1 and any(isinstance(one, Flat) and not any(one.tilt) for one in both)
+        return len(single) == 1 and any(one.flat for one in both)
 
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """The measured maps of both bodies."""
-        bodies = ((1, self.surface_1), (2, self.surface_2))
+        bodies = (("body.1.surface", self.surface_1), ("body.2.surface", self.surface_2))
         return tuple(
-            one.placed(f"body.{number}.surface") for number, surface in bodies for one in surface.measured
+            one.placed(name if surface.shapes == (surface,) else f"{name}.{number}")
+            for name, surface in bodies
+            for number, shape in enumerate(surface.shapes, 1)
+            for one in shape.measured
         )
 
     def _search(self) -> tuple[float, float]:

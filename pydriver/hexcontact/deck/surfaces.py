@@ -117,6 +117,11 @@ class Surface(Argument):
     """The shapes that have a key, by keys that this one does not have."""
 
     @property
+    def flat(self) -> bool:
+        """Whether it is the plane z = 0."""
+        return False
+
+    @property
     def shapes(self) -> tuple[Surface, ...]:
         """The shapes that it is the sum of."""
         return (self,)
@@ -226,6 +231,11 @@ class Flat(Surface):
     one_spot: ClassVar[bool] = False
 
     formula: ClassVar[str] = "h = 0"
+
+    @property
+    def flat(self) -> bool:
+        """Whether it is not tilted."""
+        return not any(self.tilt)
 
     @property
     def curvature(self) -> Array:

@@ -103,8 +103,7 @@ def _repeating(
         for place in (place for place, part in enumerate(parts) if any(part.tilt)):
             inner = (place,) if len(parts) > 1 else ()
             fault = "expected none in a window that repeats, which a tilted surface does not"
-            given = [f"{math.degrees(angle):g} deg" for angle in parts[place].tilt]
-            return None, [Mistake(("body", str(number), "surface", *inner, "tilt"), given, fault)]
+            return None, [Mistake(("body", str(number), "surface", *inner, "tilt"), parts[place].tilt, fault)]
     if lattice is None:
         lattice, faults = window.repeating(tables["grid"])
         if faults:

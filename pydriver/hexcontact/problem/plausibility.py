@@ -52,6 +52,14 @@ LIMITS = (
         most=0.1,
     ),
     Limit(
+        "rms_slope",
+        "the rough surfaces slope by {rms_slope:.2g} (rms), expected at most 0.1: the pressure in their "
+        "spots is about half of that times E*, where strains are not small and most solids yield",
+        "Real area over window is 2 p/(E* h') under a mean pressure p, h' the rms slope, so that spots bear "
+        "E* h'/2 (Hyun and Robbins, Tribology International 40, 2007, 1413): 0.05 E* at the limit",
+        most=0.1,
+    ),
+    Limit(
         "pressure_ratio",
         "the largest pressure is {pressure_ratio:.2g} E*, expected at most 0.05: beyond, strains are not "
         "small and solids other than rubber yield",
@@ -201,6 +209,8 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
             apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
             waves = getattr(part, part.wave) / apart
             found["wave_spacings"] = min(found.get("wave_spacings", waves), waves)
+    if slopes := [one.rms[1] for one in case.shapes if isinstance(one, Rough)]:
+        found["rms_slope"] = math.hypot(*slopes)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)
@@ -352,17 +362,13 @@ def notes(case: Problem) -> dict[str, str]:
 
 
 def unjudged(case: Problem) -> str:
-    """Return a note on limits that the warnings do not check, and on filled holes; empty without one."""
+    """Return a note on limits that the warnings do not check, and on measured surfaces; empty without one."""
     if not case.gap_given:
         bodies = ((1, case.body_1), (2, case.body_2))
         maps = [(number, one) for number, b in bodies if b.surface for one in b.surface.measured]
-        filled = [
-            counted(one.holes_found, f"hole {of} is", f"holes {of} are") + " filled, not measured"
-            for number, one in maps
-            if one.holes == "fill" and one.holes_found
-            for of in [f"of the {one.shape} of body {number}"]
-        ]
-        return "; ".join(filled)
+        return "; ".join(
+            note for number, one in maps for note in one.notes(f"the {one.shape} of body {number}")
+        )
     return (
         "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
         "of each body at the edge of the contact, also where surfaces conform"

@@ -18,7 +18,7 @@ from ..core.contact import CoatedPair
 from ..core.lattice import Lattice
 from ..deck.keys import Body, Bulk, Coating
 from ..deck.kinds import Quantity
-from ..deck.surfaces import Flat, Roller, Surface, SurfaceSum
+from ..deck.surfaces import Roller, Surface, SurfaceSum
 from ..text import Row, counted, percent, quantity
 from ..variables import BULK_STRESS, INTERFACE, LOADS, SHEAR_LIMIT
 from . import plausibility
@@ -188,9 +188,10 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
 def _plane_contact(case: Problem) -> str:
     """Return half-width and pressure of plane contact beside a roller on a flat; empty for others."""
     surfaces = case.surfaces.surface_1, case.surfaces.surface_2
-    curved = [surface for surface in surfaces if not isinstance(surface, Flat)]
+    curved = [surface for surface in surfaces if not surface.flat]
     load = largest_loads(case)["normal_load"]
-    if len(curved) != 1 or not isinstance(curved[0], Roller) or not load or case.deck.interface:
+    other = case.deck.interface or isinstance(case.pair, CoatedPair)
+    if len(curved) != 1 or not isinstance(curved[0], Roller) or not load or other:
         return ""
     half_width, pressure = curved[0].plane_contact(case.pair.effective_modulus, load)
     by_length, width = quantity(load / curved[0].length, "N/m"), quantity(half_width, "m")
@@ -302,14 +303,13 @@ def _maps(case: Problem) -> Iterator[Row]:
 def _surface(surface: Surface | None) -> str:
     if surface is None:
         return "flat"
-    if surface.measured == (surface,):
-        return str(surface)
     if isinstance(surface, SurfaceSum):
         return " + ".join(map(_surface, surface.parts))
-    given = [surface.shape]
+    measured = surface.measured == (surface,)
+    given = [str(surface) if measured else surface.shape]
     for name, field in type(surface).model_fields.items():
         value = getattr(surface, name)
-        if name == "shape" or value == field.default:
+        if name == "shape" or value == field.default or (measured and name not in ("offset", "tilt")):
             continue
         kinds = (*field.metadata, *(kind for one in get_args(field.annotation) for kind in get_args(one)))
         unit = next((kind.dimension.unit for kind in kinds if isinstance(kind, Quantity)), "")

@@ -21,7 +21,7 @@ from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
 from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import MISSING, Mistake
-from ..deck.height_map import Placed
+from ..deck.height_map import BEYOND_MAP, Placed
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
@@ -375,9 +375,11 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
         beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
         if not beyond:
             continue
+        moved = [0.0, 0.0] if one.angle else one.offset  # to the plane
         theirs, ours = (
             " and ".join(
-                f"{'xy'[i]} from {readable(ends[i].min())} to {readable(ends[i].max())}" for i in beyond
+                f"{'xy'[i]} from {readable(ends[i].min() + moved[i])} to {readable(ends[i].max() + moved[i])}"
+                for i in beyond
             )
             for ends in (at, own)
         )
@@ -389,6 +391,18 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
         sentence += "a smaller one, or heights of a larger part" + "; are x and y swapped?" * bool(swapped)
         problems.append(Mistake(("grid", key), getattr(grid, key), sentence))
     return problems
+
+
+def check_ends(estimate: Estimate, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
+    """Return the faults of an estimated contact that maps of heights do not bound."""
+    middle = lattice.origin + estimate.bounds.mean(axis=1) / lattice.spacing @ lattice.basis
+    x, y = _rectangle(tuple(middle), tuple(estimate.size))
+    ended = [
+        one for one in maps if math.isinf(estimate.max_pressure) and one.is_near_end(estimate.cell, x, y)
+    ]
+    return [
+        Mistake(tuple(one.name.split(".")), MISSING, f"the estimated contact {BEYOND_MAP}") for one in ended
+    ]
 
 
 def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tuple[Array, Array]:

@@ -136,7 +136,9 @@ def _sliding(
     loads += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
-    motions = ", ".join(motion for _, motion in [*target.drives.values()][1:])
+    motions = ", ".join(
+        motion for _, motion in [*target.drives.values()][1 : 3 if lattice.periodic else None]
+    )
     expected = f"expected a smaller load, or a prescribed motion in its place ({motions})"
     return True, f"friction cannot carry the {listed(loads, 'and the')}{known}", expected
 

@@ -14,6 +14,8 @@ import xarray as xr
 from commands import inside
 
 from hexcontact import Case, DeckError, open_result
+from hexcontact.cli import printed
+from hexcontact.cli.report import report
 from hexcontact.deck import map_file
 from hexcontact.deck.map_file import read_map
 from hexcontact.plotting import surface
@@ -144,6 +146,7 @@ def test_a_ball_from_a_file_has_the_pressure_of_hertz_and_its_own_orientation(fi
         ),
         ("a.csv", "1,2,3,4\n1,b,3,4\n", MATRIX, 'line 2, cell 2: expected a number, not "b"'),
         ("a.csv", "1;2;3;4\n1;2,5;3;4\n", MATRIX, 'not "2,5"; a number has a decimal point'),
+        ("a.csv", "1;2,5;3;4\n1;2;3;4\n", MATRIX, 'line 1, cell 2: expected a number, not "2,5"; a number'),
         (
             "a.csv",
             "1,2,3\n4,5,6\n",
@@ -658,7 +661,14 @@ def test_the_deck_of_a_result_needs_no_file(deck: Path, monkeypatch: pytest.Monk
     outer = Case.from_toml(deck.with_name("outer.toml"), {"body.1.surface.level": "plane"}).run()
     assert float(outer.max_pressure[-1]) == pytest.approx(float(first.max_pressure[-1]), rel=1e-6)
     (deck.parent / "heights/ball.csv").unlink()
-    again = Case.from_text(open_result(deck.with_suffix(".nc")).dataset.attrs["deck"])
+    read = open_result(deck.with_suffix(".nc"))
+    named = "ball.csv, x and y in um, heights in um; columns along x, first row at the top"
+    assert ("surfaces", f"map of body 1: {named}") in printed.file_rows(read)
+    page = report(read)
+    assert named in page
+    assert " lines more, in the result)" in page
+    assert page.count("\n        -") < 100 < read.deck.count("\n        -")
+    again = Case.from_text(read.dataset.attrs["deck"])
     np.testing.assert_array_equal(again.run().dataset.pressure, first.dataset.pressure)
     surface = again.deck_tables["body"]["1"]["surface"]
     assert set(surface) == {"shape", "upwards", "level", "x", "y", "heights"}
@@ -674,7 +684,7 @@ def test_a_map_from_python_is_that_of_the_deck(deck: Path) -> None:
 
 
 def test_check_prints_how_the_map_is_read(deck: Path) -> None:
-    printed = " ".join(inside(deck.parent, "check", deck.name).stdout.split())
+    told = " ".join(inside(deck.parent, "check", deck.name).stdout.split())
     for words in (
         "ball.csv, x and y in um, heights in um; columns along x, first row at the top",
         "81 x 61 points; x from -400.0 µm to 400.0 µm (800.0 µm, with the cells of its ends 810.0 µm); y",
@@ -683,7 +693,7 @@ def test_check_prints_how_the_map_is_read(deck: Path) -> None:
         "subtracted; no holes; nearest to the other body at x = 0 m, y = 0 m",
         "cubic spline; largest overshoot 0 m",
     ):
-        assert words in printed
+        assert words in told
     done = inside(deck.parent, "check", deck.name, "--set", "body.1.surface.units=kg")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1

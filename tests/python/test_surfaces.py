@@ -323,6 +323,20 @@ def test_the_plane_contact_stands_beside_a_roller(tmp_path: Path) -> None:
     assert math.isinf(entry.computed)  # contact reaches the ends
 
 
+def test_a_design_load_belongs_to_a_long_contact() -> None:
+    """At the most of the message the contact is as wide as long, and beyond there is no profile."""
+
+    def loaded(design_load: float) -> Case:
+        roller = Roller(radius=1e-2, length=1e-3, profile="logarithmic", design_load=design_load)
+        return Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, spacing=1e-5, normal_load=10.0)
+
+    with pytest.raises(DeckError, match=r"^body\.1\.surface\.design_load: expected at most 2\.266 kN, under"):
+        loaded(2267.0)
+    half_width, _ = Roller(radius=1e-2, length=1e-3).plane_contact(E_STAR, 2265.0)
+    assert half_width == pytest.approx(0.5e-3, rel=1e-3)
+    assert loaded(2265.0).run().complete
+
+
 @pytest.mark.parametrize("number", ["1", "2"])
 @pytest.mark.parametrize(
     "parts", [[Dent(depth=5e-6, radius=5e-5)], [Sphere(radius=9e-3), Ellipsoid(radius_x=-8e-3, radius_y=1e6)]]

@@ -283,6 +283,7 @@ def file_rows(result: Result) -> list[Row]:
         *([("stopped", str(attributes["stopped"]))] if "stopped" in attributes else []),
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
         ("spacing", result.lattice.cells),
+        *([("surfaces", str(attributes["measured_surfaces"]))] if "measured_surfaces" in attributes else []),
         ("algorithm", algorithm(attributes)),
         *([("accuracy", _reached(attributes))] if "accuracy_reached" in attributes else []),
         ("fields", ", ".join(fields_of(result))),

@@ -12,8 +12,10 @@ import datetime
 import hashlib
 import io
 import json
+import re
 from collections.abc import Iterator, Sequence
 from importlib import resources
+from itertools import groupby
 from pathlib import Path
 
 import jinja2
@@ -36,6 +38,7 @@ from ..variables import RESIDUALS, label_of
 from . import printed
 
 _MOST_PARTS = 200  # segments, and cycles, in the table of energies
+_LINES = 12  # of a long array of numbers in a deck
 _DATA = resources.files("hexcontact").joinpath("data")
 
 
@@ -74,7 +77,7 @@ def report(result: Result) -> str:
         energies=tables["Dissipated energy"],
         below=_below(result),
         pictures=list(_pictures(result)) if numbers else [],
-        deck=result.deck,
+        deck=_shortened(result.deck),
         hertz=tables["Against Hertz"],
         accuracy=tables["Accuracy"],
         residuals=_residuals(histories),
@@ -93,6 +96,17 @@ def _unfinished(result: Result) -> str:
     reason = str(result.dataset.attrs.get("stopped", ""))
     of = f" of {planned}" if planned else ""
     return f"Unfinished run: {counted(f'{len(result)}{of}', 'load step')}. {reason}".strip()
+
+
+def _shortened(deck: str) -> str:
+    """Return a deck with the first lines of long arrays of numbers only."""
+    kept: list[str] = []
+    for of_numbers, lines in groupby(deck.splitlines(), lambda line: not re.search('["=]', line)):
+        run = list(lines)
+        if of_numbers and (left_out := len(run) - _LINES) > _LINES:
+            run[_LINES:] = [f"    ... ({left_out:,} lines more, in the result)"]
+        kept += run
+    return "\n".join(kept)
 
 
 def _kept(shown: int, steps: int) -> str:
@@ -142,6 +156,7 @@ def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tu
         ("run started", str(attributes["created"])),
         ("time in the solver", quantity(sum(float(h["seconds"]) for h in histories), "s", 3)),
         ("run", str(attributes["run"])),
+        ("measured surfaces", str(attributes.get("measured_surfaces", "none"))),
         ("deck, SHA-256", hashlib.sha256(deck.encode()).hexdigest() if deck else "made in Python, no deck"),
         ("layout of the file", str(attributes["schema_version"])),
         ("page written by", f"hexcontact {__version__}, {now}"),

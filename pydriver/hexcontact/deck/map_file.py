@@ -114,7 +114,7 @@ def _of_text(path: Path, variable: str | None, profile: bool) -> MapFile:
     if separator and not any(row[-1] for row in cells):  # each line ends with a separator
         cells = [row[:-1] for row in cells]
     headers: list[str] = []
-    if not all(map(_is_number, cells[0])):
+    if not all(_is_number(cell) or _has_comma(cell) for cell in cells[0]):
         headers = cells.pop(0)
         del numbers[0]
     elif above := [line for n, line in lines if n < rows[0][0]]:
@@ -177,6 +177,10 @@ def _is_number(cell: str) -> bool:
     return True
 
 
+def _has_comma(cell: str) -> bool:
+    return bool(re.fullmatch(r"[+-]?\d+,\d+", cell))
+
+
 def _numbers(path: Path, cells: Sequence[Sequence[str]], lines: Sequence[int]) -> Array:
     """Return the cells as numbers, NaN of those without a value."""
     try:
@@ -186,7 +190,7 @@ def _numbers(path: Path, cells: Sequence[Sequence[str]], lines: Sequence[int]) -
     for line, row in zip(lines, cells, strict=True):
         for place, cell in enumerate(row, 1):
             if not _is_number(cell):
-                hint = "; a number has a decimal point" if re.fullmatch(r"[+-]?\d+,\d+", cell) else ""
+                hint = "; a number has a decimal point" * _has_comma(cell)
                 raise DeckError(
                     f"{path}, line {line}, cell {place}: expected a number, not {shown(cell)}{hint}"
                 )
@@ -245,8 +249,8 @@ def _stray(at: Array, place: Array) -> int | None:
     steps = np.diff(at)
     few = np.bincount(place) < _FEW * np.median(np.bincount(place))
     apart = np.minimum(np.append(steps, np.inf), np.insert(steps, 0, np.inf))
-    found = np.flatnonzero(few & (apart < _FEW * np.median(steps))) if len(at) > 1 else []
-    return int(found[0]) if len(found) else None
+    found = np.flatnonzero(few & (apart < _FEW * np.median(steps))).tolist() if len(at) > 1 else []
+    return found[0] if found else None
 
 
 def _distinct(values: Array) -> tuple[Array, Array]:

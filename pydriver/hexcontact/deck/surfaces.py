@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 from ..arrays import Array, Mask
 from ..errors import DeckError
-from ..text import did_you_mean
+from ..text import did_you_mean, quantity
 from .faults import MISSING
 from .kinds import (
     Flag,
@@ -525,6 +525,15 @@ class Roller(Surface):
         by_length = load / self.length
         half_width = math.sqrt(4.0 * by_length * self.radius / (math.pi * modulus))
         return half_width, 2.0 * by_length / (math.pi * half_width)
+
+    def design_fault(self, modulus: float) -> str:
+        """Return the fault of a design load under which contact is wider than long; empty without one."""
+        load = self.design_load or 0.0
+        half_width, _ = self.plane_contact(modulus, load) if load else (0.0, 0.0)
+        if half_width <= self.reach:
+            return ""
+        most = quantity(load * (self.reach / half_width) ** 2, "N")
+        return f"expected at most {most}, under which contact on a flat is as wide as long"
 
     def share(self, x: Array, y: Array, basis: Array) -> Array:
         """Return the part of a cell of a lattice basis that each node bears: 1 but for the last ones.

@@ -14,6 +14,7 @@ from ..deck.keys import Deck, Grid, Load, Segment, Solver
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MEANS, MOST_STEPS
+from ..deck.surfaces import Roller
 from ..errors import DeckError
 from ..text import counted, did_you_mean, listed, quantity, shown
 from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WORN
@@ -455,12 +456,18 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
         if body.surface and any(one.taper for one in body.surface.measured):
             sentence = 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
             yield ("body", number, "surface"), sentence
+        for place, part in enumerate(body.surface.shapes if body.surface else ()):
+            if isinstance(part, Roller) and (fault := part.design_fault(bodies.modulus)):
+                inner = (place,) if len(body.surface.shapes) > 1 else ()
+                yield ("body", number, "surface", *inner, "design_load"), fault
+                return
     if not gap_given and bodies.separation.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:
         if grid and grid.spacing == "auto" and not any(part.one_spot for part in bodies.separation.shapes):
             yield ("grid", "spacing"), "expected a length: surfaces that touch in one ellipse alone give one"
-        yield from _touching_problems(bodies.separation)
+        if grid:  # which may be to repeat
+            yield from _touching_problems(bodies.separation)
     elif bodies.body_1.surface or bodies.body_2.surface:
         yield ("gap",), "expected either a gap or surfaces of the bodies, not both"
 

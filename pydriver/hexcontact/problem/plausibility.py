@@ -314,22 +314,22 @@ def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
     return {
         **_steepest(case, found),
         "lattice_words": listed(worth, "and") if worth else "",
-        **{
-            f"{name}_words": counted(f"{found[name]:.2g}", "spacing")
-            for name in _IN_SPACINGS
-            if name in found
-        },
+        **{f"{name}_words": _in_spacings(found[name]) for name in _IN_SPACINGS if name in found},
         "holes_words": counted(count, "hole of the height map lies", "holes of the height map lie")
         if (count := found.get("holes_near_contact"))
         else "",
         **{name: quantity(found[name], "m", 2) for name in ("end_cell", "end_needed") if name in found},
-        "spacing_words": counted(f"{found.get('spacings', 0.0):.2g}", "spacing"),
+        "spacing_words": _in_spacings(found.get("spacings", 0.0)),
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": "one step" if steps == "1" else f"{steps} even steps",
         "step_percent": percent(found.get("step_error", 0.0)),
         "turning_percent": percent(found.get("turning_error", 0.0)),
         "ring_percent": _at_most(found.get("ring_error", 0.0)),
     }
+
+
+def _in_spacings(number: float) -> str:
+    return counted(f"{number:.2g}" if number < 99.5 else f"{number:.0f}", "spacing")
 
 
 def row(case: Problem) -> str:
@@ -340,7 +340,7 @@ def row(case: Problem) -> str:
     pressures, axes = "unbounded at an end of a surface", _half_axes(found)
     if "pressure_ratio" in found:
         pressures = f"about {quantity(found['max_pressure'], 'Pa', 3)}, {found['pressure_ratio']:.2g} E*"
-    spacings = counted(f"{found['spacings']:.2g}", "spacing")
+    spacings = _in_spacings(found["spacings"])
     size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {spacings}"
     if axes:
         major, minor = (quantity(axis, "m", 3) for axis in axes)

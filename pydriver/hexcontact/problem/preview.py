@@ -95,6 +95,12 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "entry": solver.entry,
         "iteration": solver.iteration if solver.iteration != "newton" else None,
         "tolerance": solver.tolerance,
+        "measured_surfaces": "; ".join(
+            f"{shape.shape} of body {number}: {shape.points.about}"
+            for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
+            for shape in surface.measured
+        )
+        or None,
         "bulk_state": deck.bulk and deck.bulk.state,
         "step_tolerance": solver.step_tolerance if case.adaptive else None,
         "cycle_tolerance": wear and wear.cycle_tolerance(solver.tolerance),

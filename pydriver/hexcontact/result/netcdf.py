@@ -86,7 +86,7 @@ _LATER: dict[str, Any] = {  # that some files have
     **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance", "wear_tolerance", "coating_images"), _POSITIVE),
     **{"entry": ("implicit", "interpolated"), "bulk_state": BULK_STATES},
     "coating_fit_error": (0.0, math.nextafter(1.0, 0.0)),
-    **dict.fromkeys(("coating", "friction_law", "machine", "stopped"), str),
+    **dict.fromkeys(("coating", "friction_law", "machine", "measured_surfaces", "stopped"), str),
 }
 
 

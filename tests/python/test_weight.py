@@ -52,4 +52,4 @@ def test_a_load_step_takes_a_short_way(tmp_path: Path) -> None:
     functions, files, moves = json.loads(done.stdout)
     assert functions <= 506
     assert files <= 48
-    assert moves <= 242
+    assert moves <= 238

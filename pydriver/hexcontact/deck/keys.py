@@ -116,17 +116,12 @@ class Bodies(Table):
     body_1: Body = Field(alias="1")
     body_2: Body = Field(alias="2")
 
-    @property
-    def modulus(self) -> float:
-        """E* (Pa) of both."""
-        return 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
-
     @functools.cached_property
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
+        modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
         one, two = (
-            body.surface.beside(self.modulus) if body.surface else Flat()
-            for body in (self.body_1, self.body_2)
+            body.surface.beside(modulus) if body.surface else Flat() for body in (self.body_1, self.body_2)
         )
         return Separation(one, two)
 

@@ -526,10 +526,11 @@ class Roller(Surface):
         half_width = math.sqrt(4.0 * by_length * self.radius / (math.pi * modulus))
         return half_width, 2.0 * by_length / (math.pi * half_width)
 
-    def design_fault(self, modulus: float) -> str:
-        """Return the fault of a design load under which contact is wider than long; empty without one."""
+    @property
+    def design_fault(self) -> str:
+        """The fault of a design load under which contact is wider than long; empty without one."""
         load = self.design_load or 0.0
-        half_width, _ = self.plane_contact(modulus, load) if load else (0.0, 0.0)
+        half_width, _ = self.plane_contact(self._modulus, load) if load else (0.0, 0.0)
         if half_width <= self.reach:
             return ""
         most = quantity(load * (self.reach / half_width) ** 2, "N")

@@ -452,22 +452,23 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
         yield ("bulk", "body"), f"expected an elastic body; body {bulk.body} is rigid"
     if (grid := tables.get("grid")) and grid.periodic:
         return
-    for number, body in (("1", bodies.body_1), ("2", bodies.body_2)):
+    gap = bodies.separation
+    for number, body, surface in (("1", bodies.body_1, gap.surface_1), ("2", bodies.body_2, gap.surface_2)):
         if body.surface and any(one.taper for one in body.surface.measured):
             sentence = 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
             yield ("body", number, "surface"), sentence
-        for place, part in enumerate(body.surface.shapes if body.surface else ()):
-            if isinstance(part, Roller) and (fault := part.design_fault(bodies.modulus)):
-                inner = (place,) if len(body.surface.shapes) > 1 else ()
+        for place, part in enumerate(surface.shapes if body.surface else ()):
+            if isinstance(part, Roller) and (fault := part.design_fault):
+                inner = (place,) if len(surface.shapes) > 1 else ()
                 yield ("body", number, "surface", *inner, "design_load"), fault
                 return
-    if not gap_given and bodies.separation.flat and tables.get("interface"):
+    if not gap_given and gap.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:
-        if grid and grid.spacing == "auto" and not any(part.one_spot for part in bodies.separation.shapes):
+        if grid and grid.spacing == "auto" and not any(part.one_spot for part in gap.shapes):
             yield ("grid", "spacing"), "expected a length: surfaces that touch in one ellipse alone give one"
         if grid:  # which may be to repeat
-            yield from _touching_problems(bodies.separation)
+            yield from _touching_problems(gap)
     elif bodies.body_1.surface or bodies.body_2.surface:
         yield ("gap",), "expected either a gap or surfaces of the bodies, not both"
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -364,11 +365,13 @@ def notes(case: Problem) -> dict[str, str]:
 def unjudged(case: Problem) -> str:
     """Return a note on limits that the warnings do not check, and on measured surfaces; empty without one."""
     if not case.gap_given:
-        bodies = ((1, case.body_1), (2, case.body_2))
-        maps = [(number, one) for number, b in bodies if b.surface for one in b.surface.measured]
-        return "; ".join(
-            note for number, one in maps for note in one.notes(f"the {one.shape} of body {number}")
+        bodies = ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2)) if case.maps else ()
+        words = (
+            one.notes(f"the {one.shape} of body {number}")
+            for number, surface in bodies
+            for one in surface.measured
         )
+        return "; ".join(chain(*words)) if bodies else ""
     return (
         "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
         "of each body at the edge of the contact, also where surfaces conform"

@@ -95,12 +95,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "entry": solver.entry,
         "iteration": solver.iteration if solver.iteration != "newton" else None,
         "tolerance": solver.tolerance,
-        "measured_surfaces": "; ".join(
-            f"{shape.shape} of body {number}: {shape.points.about}"
-            for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
-            for shape in surface.measured
-        )
-        or None,
+        "measured_surfaces": None if case.gap_given or not case.maps else _measured(case),
         "bulk_state": deck.bulk and deck.bulk.state,
         "step_tolerance": solver.step_tolerance if case.adaptive else None,
         "cycle_tolerance": wear and wear.cycle_tolerance(solver.tolerance),
@@ -111,6 +106,13 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "machine": machine(),
     }
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _measured(case: Problem) -> str:
+    """Return the files of measured surfaces, and how they are read."""
+    bodies = (1, case.surfaces.surface_1), (2, case.surfaces.surface_2)
+    measured = [(number, shape) for number, surface in bodies for shape in surface.measured]
+    return "; ".join(f"{shape.shape} of body {number}: {shape.points.about}" for number, shape in measured)
 
 
 def _pair_parameters(case: Problem) -> dict[str, Any]:

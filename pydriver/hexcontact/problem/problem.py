@@ -439,7 +439,8 @@ class Problem:
         problems = window.check(grid, lattice, estimate)
         if self.window_fixed and not self.gap_given:
             problems += window.check_maps(grid, lattice, self.maps)
-        problems += window.check_ends(estimate, lattice, () if self.gap_given else self.maps)
+        if self.maps and not self.gap_given:
+            problems += window.check_ends(estimate, lattice, self.maps)
         if problems:
             raise deck_error(problems, source)
         return lattice

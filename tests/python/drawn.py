@@ -47,6 +47,12 @@ def by_label(axes: Axes) -> dict[str, Any]:
     return {str(line.get_label()): line for line in axes.lines if not str(line.get_label()).startswith("_")}
 
 
+def cells(axes: Axes, label: str) -> np.ndarray:
+    """Return the corners of the cells of nodes that are drawn with a label: cell, corner, x and y."""
+    [drawn] = [one for one in axes.collections if one.get_label() == label]
+    return np.array([path.vertices[:4] for path in drawn.get_paths()])
+
+
 def visible(figure: Figure) -> list[Axes]:
     """Return the axes that are shown, color bars beside several maps left out."""
     return [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != "<colorbar>"]

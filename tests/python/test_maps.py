@@ -525,7 +525,8 @@ def test_a_tapered_map_is_told_and_drawn_as_it_is_solved(file: Any) -> None:
     tapered = case(of_file(path, **keys), {"mean_pressure": "100 MPa"}, **CELL)
     [told] = surfaces_in_words(tapered)
     assert any("tapered over 100.0 µm at its ends" in line for line in told["lines"])
-    axes, bar = surface(tapered).axes
+    [axes] = surface(tapered).axes
+    [bar] = axes.child_axes
     drawn = np.asarray(axes.collections[0].get_array()).reshape(-1)
     x, y, gap = tapered.lattice.x, tapered.lattice.y, tapered.plane_gap.over(tapered.lattice)
     units = {"(mm)": 1e-3, "(µm)": 1e-6, "(nm)": 1e-9}
@@ -823,9 +824,9 @@ def test_a_picture_shows_maps_profiles_or_the_gap_of_a_deck(deck: Path) -> None:
     assert "1 hole filled" not in figure.axes[0].get_legend_handles_labels()[1]
     axes = surface(case([ball, {**rough, "holes": "fill", "offset": ["0.1 mm", "0 mm"]}])).axes[0]
     [hole] = [line for line in axes.lines if line.get_label() == "1 hole filled"]
-    assert (hole.get_xdata()[0], hole.get_ydata()[0]) == pytest.approx((-0.3, -0.5))  # mm
+    assert (hole.get_xdata()[0], hole.get_ydata()[0]) == pytest.approx((-300.0, -500.0))  # um
     plain = surface(case(ball, other=None))
-    assert plain.axes[-1].get_ylabel().startswith("gap (")
+    assert plain.axes[0].child_axes[0].get_ylabel().startswith("gap (")
     done = inside(deck.parent, "plot", deck.name, "--what", "surface", "--step", "2")
     assert done.returncode == 2
     assert "expected one deck, and no other options" in done.stderr

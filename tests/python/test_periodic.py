@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import drawn
 import numpy as np
 import pytest
 import xarray
@@ -689,3 +690,35 @@ def test_fields_go_on_beyond_the_sides_of_a_window_that_repeats() -> None:
             np.testing.assert_allclose(beyond, here, rtol=1e-6, atol=1e-6 * HEIGHT)
     assert result.at("pressure", x, y)[1] > 0.0
     np.testing.assert_allclose(result.at("pressure", -x, -y), result.at("pressure", x, y), rtol=1e-6)
+
+
+def test_pictures_of_a_window_that_repeats() -> None:
+    """Its sides are outlined, its contacts go on there, and no radius or ellipse stands for them."""
+    case = waves(nodes=32, loads=[{"mean_pressure": 0.2 * FULL, "steps": 2}])
+    result, lattice = case.run(), case.lattice
+    axes = plotting.contact_boundary(result).axes[0]
+    lines = drawn.by_label(axes)
+    assert lines.keys() == {"in contact", "boundary node"}
+    x, y = drawn.si(axes, lines["boundary node"])
+    at_sides = (abs(x - lattice.x.min()) < 1e-9) | (abs(y - lattice.y.min()) < 1e-9)
+    assert 0 < at_sides.sum() < 8  # where the edges of the four quarters at the corners cross the sides
+    outline = axes.lines[-1] if axes.lines[-1].get_zorder() == 0 else axes.lines[0]
+    corners = np.array(outline.get_data()) * drawn.units(axes.get_xlabel())
+    np.testing.assert_allclose(np.ptp(corners, axis=1), WAVE, rtol=1e-6)
+    middle = corners.min(axis=1) + 0.5 * WAVE
+    nodes = [0.5 * (at.min() + at.max()) for at in (lattice.x, lattice.y)]
+    np.testing.assert_allclose(middle, nodes, atol=1e-9)
+    (low, high), *_ = axes.get_xlim(), axes.get_ylim()
+    assert low < corners[0].min() / drawn.units(axes.get_xlabel())
+    assert high > corners[0].max() / drawn.units(axes.get_xlabel())
+    assert plotting.section(result).axes[0].get_xlabel() == "x (µm) at y = 0 m"
+    assert "distance from (0, 0)" in plotting.section(result, angle=0.3).axes[0].get_xlabel()
+    panels = [axes for axes in plotting.history(result).axes if axes.get_visible()]
+    names = ["mean pressure (MPa)", "mean gap (nm)", "contact area (% of the window)", "max pressure (MPa)"]
+    assert [axes.get_ylabel() for axes in panels] == names
+    area = panels[2].lines[0].get_ydata()
+    share = result.dataset["contact_area"].values / WAVE**2
+    np.testing.assert_allclose(area, [0.0, *(100.0 * share)], rtol=1e-9)
+    band = panels[2].collections[0].get_paths()[0].vertices
+    error = result.dataset["contact_area_error"].values[-1] / WAVE**2
+    assert band[:, 1].max() == pytest.approx(100.0 * (share[-1] + error))

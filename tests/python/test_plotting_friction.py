@@ -689,6 +689,26 @@ def test_boundary_tells_sticking_nodes_apart() -> None:
     assert (np.ptp(x), np.ptp(y)) == pytest.approx((0.6, 0.6 / 1.3), rel=0.057)
 
 
+def test_cells_of_a_slender_contact_do_not_cover_the_stick_zone() -> None:
+    body = {"young_modulus": 210e9, "poisson_ratio": 0.0}
+    surfaces = [{"shape": "cylinder", "radius": "10 mm", "angle": angle} for angle in ("0 deg", "5 deg")]
+    bodies = {f"body_{k}": {**body, "surface": surface} for k, surface in enumerate(surfaces, 1)}
+    loads: Any = [{"normal_load": 20.0}, {"tangential_load_y": "0.8 mu P"}]
+    lattice = {"lattice": "rectangular", "nodes_in_radius": 12}
+    result = Case(**bodies, **lattice, friction_coefficient=0.3, loads=loads).run()
+    view, axes = StepView(result, -1), plotting.contact_boundary(result).axes[0]
+    scale, node = units(axes.get_xlabel()), view.spacing * view.lattice.cell_ratio
+    for label, nodes in (("stick", view.stick), ("slip", view.contact & ~view.stick)):
+        corners = drawn.cells(axes, label) * scale
+        middle = np.stack([view.x[nodes], view.y[nodes]], axis=1)
+        assert len(corners) == nodes.sum() > 20
+        np.testing.assert_allclose(corners.mean(axis=1), middle, rtol=0, atol=1e-6 * node)
+        turned = corners - corners[:, :1]
+        first, last = turned[:, 1], turned[:, 3]
+        areas = abs(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0])
+        np.testing.assert_allclose(areas, view.lattice.cell_area, rtol=1e-6)
+
+
 # ----------------------------------------------------------------------------------- maps
 
 

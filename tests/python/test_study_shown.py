@@ -149,6 +149,23 @@ def test_plot_draws_curves_over_a_parameter(folder: Path, tmp_path: Path) -> Non
         draw(data, over="load")
 
 
+def test_axes_are_logarithmic_by_decades_and_errors_are_bars(folder: Path) -> None:
+    data = read_study(folder / "study.nc")
+    data = data.assign_coords(radius=("radius", [2.0, 10.0, 40.0], data.radius.attrs))
+    power = (data.radius**1.5 * 1e-6 * xarray.ones_like(data.approach)).assign_attrs(units="m2")
+    made = data.assign(contact_area=power, contact_area_error=0.2 * power)
+    area, approach = draw(made, ["contact_area", "approach"], over="radius").axes
+    assert (area.get_xscale(), area.get_yscale()) == ("log", "log")
+    assert (approach.get_xscale(), approach.get_yscale()) == ("log", "linear")
+    bars = [np.array(bar.get_segments())[:, :, 1] for bar in area.collections]
+    assert len(bars) == 2 and not approach.collections
+    middle = area.lines[0].get_ydata()
+    np.testing.assert_allclose(bars[0], np.outer(middle, [0.8, 1.2]))
+    evenly = made.assign_coords(radius=("radius", [2.0, 21.0, 40.0], data.radius.attrs))
+    even = draw(evenly, ["contact_area"], "radius")
+    assert (even.axes[0].get_xscale(), even.axes[0].get_yscale()) == ("linear", "linear")
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [

@@ -1,5 +1,6 @@
 """Surface shapes against values worked out by hand, sums of two, and where two bodies first touch."""
 
+import itertools
 import math
 import pickle
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import pytest
 
+from hexcontact import plotting
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.case import Case
 from hexcontact.deck.json_schema import deck_schema
@@ -302,6 +304,32 @@ def test_the_pressure_at_a_sharp_end_is_no_number(name: str) -> None:
     assert ("unbounded" in repr(result.compare())) == (name in ("roller", "chamfer"))
     layer = case.changed({"interface": {"coefficient": 1e13}}) if unbounded else case
     assert math.isfinite(float(layer.run().max_pressure[-1]))
+
+
+def test_pictures_of_a_sharp_ended_roller_name_no_end_pressure() -> None:
+    roller = Roller(radius=5e-3, length=2e-3, angle="90 deg")
+    grid = {"spacing": 4e-6, "cell_ratio": 4, "cell_angle": "90 deg"}
+    case = Case(body_1={**STEEL, "surface": roller}, body_2=STEEL, normal_load=14.5, **grid)
+    result = case.run()
+    ended, across, along = plotting.overview(result).axes
+    [bar] = ended.child_axes
+    words = "pressure $p$ (MPa)\nunbounded at an end"
+    assert [axes.get_ylabel() for axes in (across, along)] == [words, words]
+    assert bar._colorbar.extend == "max"  # type: ignore[attr-defined]
+    assert [axes.get_xlabel()[:1] for axes in (across, along)] == ["x", "y"]
+    x, y = along.lines[0].get_data()
+    assert np.interp(0.0, x, y) == pytest.approx(across.lines[0].get_ydata().max(), rel=0.01)
+    assert np.ptp(x[y > 0.0]) == pytest.approx(2.0, abs=0.05)  # mm
+    pressed = plotting.pressure_field(result.dataset.assign(max_pressure=("step", [1e9])))
+    [bar] = pressed.axes[0].child_axes
+    assert (bar.get_ylabel(), bar._colorbar.extend) == ("pressure $p$ (MPa)", "neither")  # type: ignore[attr-defined]
+    shown = plotting.surface(case)
+    shown.draw_without_rendering()
+    low, high = shown.axes[0].get_xlim()
+    labels = [t for t in shown.axes[0].get_xticklabels() if low <= t.get_position()[0] <= high]
+    boxes = [label.get_window_extent() for label in labels]
+    assert len(boxes) > 1
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
 def test_the_plane_contact_stands_beside_a_roller(tmp_path: Path) -> None:

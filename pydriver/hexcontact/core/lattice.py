@@ -202,6 +202,14 @@ class Lattice:
         alone = replace(self, n_row=1, n_col=1)
         return alone.x.item(), alone.y.item()
 
+    @property
+    def outline(self) -> Array:
+        """Closed outline of the window (m): corners in rows; of one that repeats, around its cells."""
+        more = 0.5 * self.periodic
+        col, row = ((at[0] - more, at[-1] + more) for at in (self.cols, self.rows))
+        corners = [(col[i], row[j]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))]
+        return np.asarray(self.origin + np.array(corners) @ self.basis)
+
     def _coordinate(self, axis: int) -> Array:
         along = self.cols * self.basis[0, axis]
         across = self.rows * self.basis[1, axis]

@@ -18,6 +18,7 @@ from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
 from ..errors import DeckError, NotInResult
 from ..result.history_words import LOADS_AND_MOTIONS, worth_showing
+from ..result.layout import lattice_of
 from ..result.result import Result
 from ..result.view import Results, as_list, dataset_of, last_steps, parameters_of, title_of
 from ..text import quantity, scaled, worded
@@ -25,13 +26,13 @@ from ..variables import CREEPAGES, PANELS, ROLLED, SUMMARY, VARIABLES, label_of,
 from . import style
 from .registry import SEVERAL_RUNS, figure
 
+_REPEATED = (("mean_pressure",), ("mean_gap",), ("contact_area",), ("max_pressure",))
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
 _UNSEEN = 1e-6  # share of mu P below which a creep force is not drawn
 _JUMP = 1e-3  # of another creepage over the range of a curve, where it ends
 _MANY = 60  # steps beyond which curves have no markers
-_BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
+_BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # in place of _error
 _CONSTANT = 1e-6  # spread over value of a quantity that does not change
-_BOUNDS["creep_power"] = "creep_power_error"
 
 
 def _known(dataset: Dataset) -> list[str]:
@@ -56,7 +57,10 @@ def _largest(dataset: Dataset, names: Sequence[str]) -> float:
 
 
 def _scaled(dataset: Dataset, names: Sequence[str]) -> tuple[float, str]:
-    """Return factor and unit for an axis with quantities of one unit."""
+    """Return factor and unit for an axis of one unit; areas are shares of a window that repeats."""
+    if dataset.attrs.get("lattice_periodic") and dataset[names[0]].attrs.get("units") == "m2":
+        lattice = lattice_of(dataset)
+        return 100.0 / (lattice.cell_area * lattice.size), "% of the window"
     return scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
 
 
@@ -104,7 +108,8 @@ def _chosen(dataset: Dataset) -> list[tuple[str, ...]]:
     """Return the quantities that a history shows by default, in panels."""
     known = _known(dataset)
     if "stick_area" not in known:
-        return [fitted(known, names) for names in FRICTIONLESS if names[0] in known]
+        chosen = _REPEATED if "mean_gap" in known else FRICTIONLESS
+        return [fitted(known, names) for names in chosen if names[0] in known]
     histories = dataset[known].reset_coords(drop=True).to_dataframe().to_dict("records")
     return [tuple(curves) for curves in panels_of(histories).values()]
 
@@ -174,10 +179,10 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
     for name, (color, dash, mark) in zip(names, lines, strict=False):
         values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
-        if (bound := _BOUNDS.get(name, "")) in dataset:
+        if (bound := _BOUNDS.get(name, f"{name}_error")) in dataset:
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
-            low, high = np.maximum(values - around, 0.0), values + around
-            axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
+            ends = values - around, values + around
+            axes.fill_between(place, *ends, color=color, alpha=0.2, lw=0, label="_nolegend_")
     points = np.concatenate([np.asarray(line.get_xydata(), float) for line in axes.lines])
     drawn = points[np.isfinite(points).all(axis=1), 1]
     if drawn.size and np.ptp(drawn) < _CONSTANT * np.abs(drawn).max():  # rounding errors
@@ -506,18 +511,32 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         for k, label in enumerate(labels):
             place, values = (curves[over].values * to_place), curves[name].isel(curve=k).values * factor
             axes.plot(place[order], values[order], label=label, color=colors[k], **look)
+            if (bound := f"{name}_error") in curves:
+                around = curves[bound].isel(curve=k).values * factor
+                axes.errorbar(place, values, around, fmt="none", ecolor=colors[k], elinewidth=0.8, capsize=2)
         named = _spelled(name) if name in VARIABLES else name
         axes.set(xlabel=style.titled(over, length), ylabel=style.titled(named, unit))
-        steps = np.diff(np.log(place[order])) if place[order[0]] > 0.0 else np.array([])
-        if steps.size > 1 and np.ptp(steps) < 1e-3 * steps.mean():  # evenly spread by their logarithms
+        if _by_decades(place[order]):
             axes.set_xscale("log")
+            if all(_by_decades(curves[name].isel(curve=k).values[order]) for k in range(len(labels))):
+                axes.set_yscale("log")
         axes.grid(color="0.9", lw=0.5)
     if 1 < len(labels) <= _LEGEND:
-        style.legend_under(canvas, panels[0].get_lines())
+        style.legend_under(canvas, style.handles_of(panels[0]))
     elif others:
         style.color_scale(canvas, panels, labels, colors)
     style.set_title(canvas, str(study.attrs.get("title", "")))
     return canvas
+
+
+def _by_decades(values: Array) -> bool:
+    """Test whether values are over more than a decade, and spread far more evenly by their logarithms."""
+    values = values[np.isfinite(values)]
+    if values.size < 3 or not values.min() > 0.0 or values.max() < 10.0 * values.min():
+        return False
+    logs = np.log(values)
+    uneven, uneven_logs = (np.std(np.diff(at)) / np.ptp(at) for at in (values, logs))
+    return bool(uneven_logs < 0.5 * uneven)
 
 
 def _label(study: Dataset, dims: Sequence[object], place: object) -> str:

@@ -26,7 +26,7 @@ from ..result.view import Results, StepView, as_list, dataset_of, title_of
 from ..text import scaled
 from ..variables import MAPS, VARIABLES
 from .registry import figure, styled
-from .style import EXACT, drawing, legend_above, panels_of, set_title
+from .style import EXACT, GUIDE, drawing, legend_above, panels_of, set_title
 
 Limits = tuple[float, float, float, float]
 
@@ -44,6 +44,7 @@ class Part:
     limits: Limits  # x_min, x_max, y_min, y_max, m
     factor: float  # from m to the unit
     unit: str
+    cell: Array | None = None  # outline of a window that repeats, m
 
     @classmethod
     def around(cls, views: Iterable[StepView], margin: float = 1.25, least_aspect: float = 0.0) -> Part:
@@ -51,17 +52,18 @@ class Part:
 
         Height over width and width over height are at least `least_aspect`.
         """
-        known = [(view.contact.any(), view.window(margin), view.spacing) for view in views]
+        known = [(view.contact.any(), view.window(margin), view.lattice) for view in views]
         touching = [entry for entry in known if entry[0]]
-        _, windows, spacings = zip(*(touching or known), strict=True)
+        _, windows, lattices = zip(*(touching or known), strict=True)
         limits = np.array(windows)
         x_min, _, y_min, _ = limits.min(axis=0)
         _, x_max, _, y_max = limits.max(axis=0)
         more_x = max(0.5 * (least_aspect * (y_max - y_min) - (x_max - x_min)), 0.0)
         more_y = max(0.5 * (least_aspect * (x_max - x_min) - (y_max - y_min)), 0.0)
         shown = [float(v) for v in (x_min - more_x, x_max + more_x, y_min - more_y, y_max + more_y)]
-        factor, unit = scaled(max(abs(shown[0]), abs(shown[1]), spacings[0]), "m")
-        return cls((shown[0], shown[1], shown[2], shown[3]), factor, unit)
+        factor, unit = scaled(max(abs(shown[0]), abs(shown[1]), lattices[0].spacing), "m")
+        cell = lattices[0].outline if lattices[0].periodic else None
+        return cls((shown[0], shown[1], shown[2], shown[3]), factor, unit, cell)
 
     @property
     def width(self) -> float:
@@ -100,7 +102,7 @@ class Part:
         return 4.6, 3.4 * self.aspect + 0.9
 
     def show(self, axes: Axes) -> None:
-        """Set limits and labels of axes to this part."""
+        """Set limits and labels of axes to this part; outline a window that repeats."""
         x_min, x_max, y_min, y_max = (self.factor * limit for limit in self.limits)
         times = self.stretch if self.is_wide else 1.0 / self.stretch
         axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect=times)
@@ -112,6 +114,19 @@ class Part:
             axes.locator_params(axis="y" if self.is_wide else "x", nbins=4)
         if self.is_tall:
             axes.locator_params(axis="x", nbins=2)
+        if self.cell is not None:
+            axes.plot(*(self.cell * self.factor).T, color=GUIDE, lw=0.7, zorder=0)
+
+    def bar(
+        self, canvas: FigureBase, shades: Any, axes: Axes, label: str, below: bool = False, **options: Any
+    ) -> Any:
+        """Draw the color bar of one map at its side, as high as the axes, or below it."""
+        if below:
+            options |= {"ax": axes, "orientation": "horizontal", "aspect": 50, "shrink": 0.8}
+        else:
+            thick = min(0.045 * self.aspect, 0.2)
+            options["cax"] = axes.inset_axes((1.0 + 0.6 * thick, 0.0, thick, 1.0))
+        return canvas.colorbar(shades, label=label, **options)
 
     def outline(
         self, axes: Axes, ellipse: Any, center: tuple[float, float], ratio: float = 1.0, **style: Any
@@ -381,14 +396,13 @@ def draw_field(
         if view.hertz is not None:
             part.outline(axes, view.hertz, view.center, label="Hertz contact area", lw=1.0)
     if shades is not None:
-        if len(panels) == 1 and not below:  # as high as the axes
-            thick = min(0.045 * part.aspect, 0.2)
-            bar = canvas.colorbar(shades, cax=panels[0].inset_axes((1.0 + 0.6 * thick, 0.0, thick, 1.0)))
-        elif len(panels) == 1:
-            bar = canvas.colorbar(shades, ax=panels[0], orientation="horizontal", aspect=50, shrink=0.8)
+        is_open = field.unit == "Pa" and any(view.is_unbounded for view in views)
+        extend = ("both" if signed else "max") if is_open else "neither"
+        label = f"{field.label} ({unit})"
+        if len(panels) == 1:
+            bar = part.bar(canvas, shades, panels[0], label, below, extend=extend)
         else:
-            bar = canvas.colorbar(shades, ax=list(panels), aspect=30, pad=0.02)
-        bar.set_label(f"{field.label} ({unit})")
+            bar = canvas.colorbar(shades, ax=list(panels), aspect=30, pad=0.02, label=label, extend=extend)
         cast(Any, bar.outline).set_linewidth(0.5)
 
 

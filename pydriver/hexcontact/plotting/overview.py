@@ -23,8 +23,8 @@ from .zones import draw_zones, zone_legend
 def overview(result: Result | Dataset, step: int = -1, source: str | None = None) -> Figure:
     """Draw maps, a section and the history of a load step.
 
-    Without friction: the pressure over the plane and along x; with friction also the shear traction, the
-    zones and the history.
+    Without friction: the pressure over the plane and along x, and along y if the contact is long and not
+    that of Hertz; with friction also the shear traction, the zones and the history.
     """
     view = StepView(result, step, source)
     with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
@@ -46,7 +46,12 @@ def _frictionless(view: StepView) -> Figure:
     draw_field(left, [axes], [view], "pressure", part)
     if view.hertz is not None:
         legend_above(axes)
-    draw_section(right, view, 0.0)
+    if view.hertz is None and (part.is_wide or part.is_tall):
+        sides = right.subfigures(*((1, 2) if part.is_wide else (2, 1)))
+        for side, angle in zip(sides, (0.0, 0.5 * np.pi), strict=True):
+            draw_section(side, view, angle)
+    else:
+        draw_section(right, view, 0.0)
     return canvas
 
 

@@ -58,7 +58,7 @@ class Cut:
     angle: float  # its direction from x, rad
     place: Array  # distances (m) from its start
     at_nodes: bool  # whether the places are nodes, drawn as circles
-    through: Point | None  # a given point, m
+    through: Point | None  # a given point, or one of a window that repeats, m
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
@@ -68,6 +68,9 @@ class Cut:
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
         if through and not ((index > -1.0) & (index < lattice.shape[::-1])).all(axis=1).any():
             raise DeckError(f"expected a line that crosses the window; it goes through {through} m")
+        if lattice.periodic and not through:  # no contact is the middle one
+            x, y = line.points(np.array(line.zero))
+            through = float(x), float(y)
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
         on_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
         at_nodes = on_nodes and nodes.size < _APART and len(views) == 1
@@ -177,7 +180,8 @@ def draw_pressures(axes: Axes, views: Sequence[StepView], cut: Cut, always: bool
             line = cut.beside(style.EXACT) if single else {**_THIN, "zorder": 5}
             name = "Hertz" if view.hertz_holds else "Hertz (no friction)"
             axes.plot(fine, cut.hertz(view, cut.fine) * to_stress, label=name, **line)
-    axes.set(ylabel=f"pressure $p$ ({stress})", ylim=(0.0, 1.08 * largest * to_stress or 1.0))
+    note = "\nunbounded at an end" * any(view.is_unbounded for view in views)
+    axes.set(ylabel=f"pressure $p$ ({stress}){note}", ylim=(0.0, 1.08 * largest * to_stress or 1.0))
     cut.show(axes)
 
 

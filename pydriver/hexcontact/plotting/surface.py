@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,10 +13,12 @@ from matplotlib.figure import Figure
 from ..arrays import Array
 from ..deck.measured import Measured
 from ..text import counted, scaled
+from .maps import Part
 from .registry import figure
 from .style import EDGED, EXACT, legend_below, new_figure, set_title
 
 _WIDTH, _HEIGHT = 4.8, 4.2  # inches of a panel
+_ENDS = np.min, np.max
 _POINTS = 201  # along a side of the gap, if no surface was measured
 
 
@@ -56,7 +58,7 @@ def _map(axes: Axes, one: Measured, case: Any) -> None:
 
 def _gap(axes: Axes, case: Any) -> None:
     """Draw the gap over the rectangle about the window."""
-    u, v = _window(case)
+    u, v = case.lattice.outline.T
     x, y = (np.linspace(at.min(), at.max(), _POINTS) for at in (u, v))
     # of rough surfaces, that over the period of the window
     gap = case.plane_gap.at(*np.meshgrid(x, y, indexing="ij"))
@@ -77,27 +79,23 @@ def _colored(
     """Draw values over the plane, with the window, the point of first touch and filled holes."""
     shown = np.ma.masked_invalid(values)
     times, unit = scaled(float(shown.max() - shown.min()), "m")
-    scale, length = scaled(max(float(np.ptp(x)), float(np.ptp(y))), "m")
+    u, v = case.lattice.outline.T
+    x_min, x_max, y_min, y_max = (float(end(np.append(a, b))) for a, b in ((x, u), (y, v)) for end in _ENDS)
+    part = Part((x_min, x_max, y_min, y_max), *scaled(x_max - x_min, "m"))
+    scale = part.factor
+    part.show(axes)
+    if part.is_tall:
+        cast(Figure, axes.figure).set_figheight(part.size()[1])
     axes.set_facecolor("0.7")
     drawn = axes.pcolormesh(x * scale, y * scale, times * shown.T, shading="nearest", rasterized=True)
-    axes.figure.colorbar(drawn, ax=axes, label=f"{words} ({unit})")
-    u, v = _window(case)
+    part.bar(axes.figure, drawn, axes, f"{words} ({unit})", below=part.is_wide)
     axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
     axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
     if filled and filled[0].size:
         holes: dict[str, Any] = {"mfc": "k", "mec": "w", "mew": 0.4, "ms": 3.5}
         holes["label"] = f"{counted(filled[0].size, 'hole')} filled"
         axes.plot(filled[0] * scale, filled[1] * scale, "o", **holes)
-    axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})", aspect="equal")
     legend_below(axes, ncols=3, fontsize=8)
-
-
-def _window(case: Any) -> tuple[Array, Array]:
-    """Return the closed outline of the window (m)."""
-    lattice = case.lattice
-    col, row = (at[[0, 0, -1, -1, 0]] for at in (lattice.cols, lattice.rows))
-    corners = lattice.origin + np.stack([col[[0, 2, 3, 1, 0]], row], axis=1) @ lattice.basis
-    return corners[:, 0], corners[:, 1]
 
 
 def _line(axes: Axes, one: Measured, case: Any) -> None:
@@ -107,7 +105,7 @@ def _line(axes: Axes, one: Measured, case: Any) -> None:
     scale, length = scaled(float(np.ptp(y)), "m")
     times, unit = scaled(float(np.ptp(height[np.isfinite(height)])), "m")
     axes.plot(scale * y, times * height)
-    _, across = placed.own(*_window(case))
+    _, across = placed.own(*case.lattice.outline.T)
     for end in (across.min(), across.max()):
         axes.axvline(scale * end, color=EXACT, lw=0.8, ls="--")
     words = "height" if one.upwards else "gap"

@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
@@ -143,6 +143,7 @@ def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None 
     return canvas
 
 
+_FULL = 0.7  # share of its ellipse that a zone fills
 _APART = 80  # spacings across the picture up to which nodes are distinguishable
 
 
@@ -150,7 +151,8 @@ _APART = 80  # spacings across the picture up to which nodes are distinguishable
 def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
-    With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).
+    With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4). Nodes too close to be
+    distinguished are drawn as cells; nothing is fitted to several spots.
     """
     view = StepView(result, step)
     if not view.contact.any():
@@ -159,8 +161,10 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     width, height = part.size()
     canvas, axes = style.drawing(ax, max(width, 4.6), height + 0.6, equal=True)
     x_min, x_max, y_min, y_max = part.limits
-    x, y, rim = view.x * part.factor, view.y * part.factor, measures.boundary(view.contact)
-    across = part.width / view.spacing
+    around = np.pad(view.contact, 1, mode="wrap" if view.lattice.periodic else "constant")
+    x, y, rim = view.x * part.factor, view.y * part.factor, measures.boundary(around)[1:-1, 1:-1]
+    wide = np.array([1.0, part.stretch] if part.is_wide else [part.stretch, 1.0])  # as in the picture
+    across = part.width * wide[0] / np.linalg.norm(view.basis * wide, axis=1).min()
     pitch = 70.0 * (6.4 if part.is_wide else min(3.4, 6.0 / part.aspect)) / across  # points between nodes
     if across < _APART:
         shown = (view.x > x_min) & (view.x < x_max) & (view.y > y_min) & (view.y < y_max)
@@ -168,7 +172,7 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
         mesh = Triangulation(x.ravel(), y.ravel(), corners[shown.ravel()[corners].any(axis=1)])
         links = np.stack([mesh.x, mesh.y], axis=1)[mesh.edges]
         axes.add_collection(LineCollection(cast(Any, links), colors="0.85", linewidths=0.4, zorder=0))
-    inside_size = 0.45 * pitch if across < _APART else 2.0 * pitch  # too many: an area
+    cell = 0.5 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) @ view.basis
     dot: dict[str, Any] = {"marker": "o", "mew": 0, "ls": "", "rasterized": across > _APART}
     stick = view.contact & view.stick if view.friction else None
     if stick is None:
@@ -176,10 +180,16 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     else:
         groups = [(stick, STICK, "stick"), (view.contact & ~stick, SLIP, "slip")]
     for nodes, color, label in groups:
-        axes.plot(x[nodes], y[nodes], ms=inside_size, mfc=color, label=label, **dot)
+        if across < _APART:
+            axes.plot(x[nodes], y[nodes], ms=0.45 * pitch, mfc=color, label=label, **dot)
+            continue
+        cells = np.stack([view.x[nodes], view.y[nodes]], axis=1)[:, None] + cell
+        look: dict[str, Any] = {"color": color, "lw": 0, "antialiased": False, "rasterized": True}
+        axes.add_collection(PolyCollection(cast(Any, cells * part.factor), label=label, **look))
     if stick is not None:
         dot |= {"mfc": "none", "mew": 0.8}  # boundary nodes as rings
     axes.plot(x[rim], y[rim], ms=max(0.45 * pitch, 1.0), color="black", label="boundary node", **dot)
+    one = _is_spot(view, view.contact)
     if view.has("gap"):
         edge = view.edges().contact()
         pieces = LineCollection(cast(Any, edge.segments * part.factor), colors="black", linewidths=0.9)
@@ -187,16 +197,17 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
         size = rf"$\sqrt{{A/\pi}}$ = {worded(edge.radius, 'm')}"
         if axes_of[1] < ROUND * axes_of[0]:
             size = " by ".join(worded(axis, "m") for axis in axes_of)
-        pieces.set_label(f"edge, {size}")
+        pieces.set_label(f"edge, {size}" if one else "edge")
         axes.add_collection(pieces)
-    fitted, words = _fitted(view, view.contact, "a", view.center)
-    color = style.COMPUTED if stick is None else "black"
-    part.outline(axes, fitted, (fitted.x, fitted.y), label=f"fitted {words}", linestyle="-", color=color)
+    if one:
+        fitted, words = _fitted(view, view.contact, "a", view.center)
+        color = style.COMPUTED if stick is None else "black"
+        part.outline(axes, fitted, (fitted.x, fitted.y), label=f"fitted {words}", linestyle="-", color=color)
     if view.hertz is not None:
         a, b = view.hertz.semi_major, view.hertz.semi_minor
         exact = f"a = {worded(a, 'm')}" if b > 0.999 * a else f"{worded(a, 'm')} by {worded(b, 'm')}"
         part.outline(axes, view.hertz, view.center, label=f"Hertz, {exact}")
-    if stick is not None and np.count_nonzero(stick) > 2:
+    if stick is not None and np.count_nonzero(stick) > 2 and _is_spot(view, stick):
         fitted, words = _fitted(view, stick, "c")
         part.outline(
             axes, fitted, (fitted.x, fitted.y), label=f"stick: {words}", linestyle="-", color=style.THIRD
@@ -204,9 +215,17 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     part.show(axes)
     legend = style.legend_under(canvas, style.handles_of(axes), ax, size=8)
     for handle in legend.legend_handles[: len(groups) + 1]:
-        cast(Line2D, handle).set_markersize(4.0)
+        if isinstance(handle, Line2D):
+            handle.set_markersize(4.0)
     style.set_title(canvas, view.title, ax)
     return canvas
+
+
+def _is_spot(view: StepView, zone: Mask) -> bool:
+    """Test whether a zone fills most of the ellipse with its moments; none is fitted to several spots."""
+    moments = measures.moment_ellipse(view.x, view.y, zone)
+    ellipse = np.pi * moments.semi_major * moments.semi_minor
+    return not view.lattice.periodic and view.lattice.cell_area * np.count_nonzero(zone) > _FULL * ellipse
 
 
 def _fitted(

@@ -86,6 +86,11 @@ class StepView:
         x, y = (float(self.data.get(f"tangential_load_{axis}", 0.0)) for axis in "xy")
         return math.copysign(math.hypot(x, y), x if abs(x) > abs(y) else y)
 
+    @property
+    def is_unbounded(self) -> bool:
+        """Whether the pressure rises to an end of a surface, where nodal values depend on the spacing."""
+        return bool(np.isinf(self.data["max_pressure"]))
+
     def field(self, name: str) -> Array:
         """Return the values of a field at the nodes; NotInResult if the output lacks it in this step."""
         words = spelled(name)
@@ -172,10 +177,15 @@ class StepView:
         return np.asarray(self.at(x, y, distances) > 0.0)
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
-        """Return the limits of a picture of the contact and the worn area: x_min, x_max, y_min, y_max."""
+        """Return the limits of a picture: x_min, x_max, y_min, y_max.
+
+        It shows the contact and the worn area, or all of a window that repeats.
+        """
         zone = self.contact | (self.field("worn_depth") > 0.0) if self.has("worn_depth") else self.contact
         zone = zone if zone.any() else np.ones_like(zone)
         x, y = self.x[zone], self.y[zone]
+        if self.lattice.periodic:
+            (x, y), margin = self.lattice.outline.T, min(margin, 1.1)
         middle_x, middle_y = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
         half_x = max(0.5 * margin * (x.max() - x.min()), 2 * self.spacing)
         half_y = max(0.5 * margin * (y.max() - y.min()), 2 * self.spacing)

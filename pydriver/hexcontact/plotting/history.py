@@ -181,8 +181,8 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, f"{name}_error")) in dataset:
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
-            ends = values - around, values + around
-            axes.fill_between(place, *ends, color=color, alpha=0.2, lw=0, label="_nolegend_")
+            low, high = np.maximum(values - around, VARIABLES[name].least * factor), values + around
+            axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     points = np.concatenate([np.asarray(line.get_xydata(), float) for line in axes.lines])
     drawn = points[np.isfinite(points).all(axis=1), 1]
     if drawn.size and np.ptp(drawn) < _CONSTANT * np.abs(drawn).max():  # rounding errors

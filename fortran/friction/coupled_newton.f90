@@ -342,21 +342,25 @@ contains
 
     n = size(step%x)/3
     n_shear = size(step%driven%motion)
-    associate (x => step%x, ax => step%ax, system => step%system, multiplier => step%constraints%multiplier)
-      call step%driven%set_motions(multiplier(:n_shear), now%motion)
-      if (size(multiplier) > n_shear) now%motion(normal) = multiplier(n_shear + 1)
+    associate (c => step%constraints, x => step%x, ax => step%ax, system => step%system)
+      call step%driven%set_motions(c%multiplier(:n_shear), now%motion)
+      if (size(c%multiplier) > n_shear) now%motion(normal) = c%multiplier(n_shear + 1)
+      ! fields go as soon as they are copied: a window is too large for two of each
+      c = constraints_t()
       now%p = x(:n)
       x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
-      allocate (now%closing(n))
-      now%w = ax(:n)
-      call now%pressure%stretch(-1.0_wp, now%p, now%w)
-      now%closing = 0.0_wp
-      now%cut = .false.
-      now%joint = .true.
       if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
       call now%shear%leave_frames(x(n + 1:), ax(n + 1:), rounding)
+      deallocate (system%slope)
       now%q = x(n + 1:)
+      deallocate (step%x)
       now%u = ax(n + 1:)
+      now%w = ax(:n)
+      deallocate (step%ax)
+      call now%pressure%stretch(-1.0_wp, now%p, now%w)
+      allocate (now%closing(n), source=0.0_wp)
+      now%cut = .false.
+      now%joint = .true.
     end associate
     if (rounding > now%problem%options%newton%displacement_rounding*now%problem%tangential_compliance*now%traction_scale()) then
       call now%refresh(error)

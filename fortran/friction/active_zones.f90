@@ -88,80 +88,70 @@ contains
     logical, intent(in) :: fixing
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical(lk), allocatable, intent(out) :: active(:)
+    !> Zones of the nodes in contact
     integer, allocatable :: zone(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy, bound, ahead, aside
     real(wp) :: r, p_max, soft
-    integer :: n, n_col, row, i, from, to, low, high
+    integer :: n, k, i, from, to, at, last, m
 
     n = size(now%p)
-    n_col = now%problem%lattice%extent(1)
-    allocate (zone(n), active(2*n))
-    r = sliding_parameter(now)
-    soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
-    associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
+    call now%shear%set_contact(now%contact)
+    associate (friction => now%problem%friction, nodes => now%shear%nodes, direction => now%shear%direction, &
+               compliance => now%shear%compliance, threads => now%operators%space%threads)
+      allocate (zone(nodes%n_active), active(2*n))
+      if (allocated(now%shear%rest)) deallocate (now%shear%rest)
+      if (.not. friction%is_isotropic()) allocate (now%shear%rest(nodes%n_active))
+      r = sliding_parameter(now)
+      soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
       p_max = now%operators%space%max(now%p)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(dsx, dsy, i, from, to, low, high)
-      do row = 1, n/n_col
-        to = row*n_col
-        from = to - n_col + 1
-        do i = from, to
-          now%q(i) = merge(now%q(i), 0.0_wp, now%contact(i))
-          now%q(n + i) = merge(now%q(n + i), 0.0_wp, now%contact(i))
-        end do
-        call find_span(now%contact(from:to), low, high)
-        call leave(from, from + low - 2)
-        call leave(from + high, to)
-        if (high < low) cycle
-        to = from + high - 1
-        from = from + low - 1
-        associate (m => to - from + 1)
-          call now%slip_row(row, low, dsx(:m), dsy(:m))
-          call friction%linearize(from, p_max, r, logical(now%contact(from:to)), now%p(from:to), now%q(from:to), &
-                                  now%q(n + from:n + to), dsx(:m), dsy(:m), zone(from:to), direction(:, from:to), &
-                                  compliance(from:to))
-        end associate
+      !$omp parallel do schedule(static) num_threads(threads)
+      do i = 1, n
+        active(i) = now%contact(i)
+        active(n + i) = .false.
+        now%q(i) = merge(now%q(i), 0.0_wp, now%contact(i))
+        now%q(n + i) = merge(now%q(n + i), 0.0_wp, now%contact(i))
+      end do
+      !$omp end parallel do
+      !$omp parallel do schedule(static) num_threads(threads) private(dsx, dsy, from, to, at, last, m)
+      do k = 1, size(nodes%first)
+        call take_run(k, from, to, at, last, m)
+        call now%slip_row((from - 1)/size(dsx) + 1, modulo(from - 1, size(dsx)) + 1, dsx(:m), dsy(:m))
+        call friction%linearize(from, p_max, r, logical(now%contact(from:to)), now%p(from:to), now%q(from:to), &
+                                now%q(n + from:n + to), dsx(:m), dsy(:m), zone(at:last), direction(:, at:last), compliance(at:last))
       end do
       !$omp end parallel do
       now%fixed = fixing
       if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, ahead, aside, i, from, to)
-      do row = 1, n/n_col
-        to = row*n_col
-        from = to - n_col + 1
-        do i = from, to
-          active(i) = zone(i) /= separated
-          active(n + i) = zone(i) == stick
-        end do
-        if (.not. any(active(from:to))) then
-          if (allocated(now%shear%rest)) now%shear%rest(from:to) = 0.0_wp
-          cycle
-        end if
-        call friction%find_bounds(from, now%p(from:to), bound)
-        call friction%find_boundary(direction(:, from:to), ahead, aside)
-        if (allocated(now%shear%rest)) now%shear%rest(from:to) = bound*aside
-        call put_on_boundary(n_col, zone(from:to), direction(:, from:to), bound*ahead, bound*aside, &
-                             compliance(from:to) < soft, now%q(from:to), now%q(n + from:n + to))
+      !$omp parallel do schedule(static) num_threads(threads) private(bound, ahead, aside, from, to, at, last, m)
+      do k = 1, size(nodes%first)
+        call take_run(k, from, to, at, last, m)
+        active(n + from:n + to) = zone(at:last) == stick
+        call friction%find_bounds(from, now%p(from:to), bound(:m))
+        call friction%find_boundary(direction(:, at:last), ahead(:m), aside(:m))
+        ahead(:m) = bound(:m)*ahead(:m)
+        aside(:m) = bound(:m)*aside(:m)
+        if (allocated(now%shear%rest)) now%shear%rest(at:last) = aside(:m)
+        call put_on_boundary(m, zone(at:last), direction(:, at:last), ahead, aside, compliance(at:last) < soft, now%q(from:to), &
+                             now%q(n + from:n + to))
       end do
       !$omp end parallel do
     end associate
-    call now%shear%set_contact(now%contact)
+    call now%shear%use_frames(now%contact)
 
   contains
 
-    !> Set nodes off the contact.
-    subroutine leave(first, last)
-      !> The first and the last of them
-      integer, intent(in) :: first, last
-      integer :: k
+    !> Find the nodes of a run of the contact, the places of the first and the last of them, and their number.
+    pure subroutine take_run(k, from, to, at, last, m)
+      integer, intent(in) :: k
+      integer, intent(out) :: from, to, at, last, m
 
-      do k = first, last
-        zone(k) = separated
-        now%shear%direction(1, k) = 1.0_wp
-        now%shear%direction(2, k) = 0.0_wp
-        now%shear%compliance(k) = 0.0_wp
-      end do
-    end subroutine leave
+      from = now%shear%nodes%first(k)
+      to = now%shear%nodes%last(k)
+      at = now%shear%nodes%place(k)
+      m = to - from + 1
+      last = at + m - 1
+    end subroutine take_run
 
   end subroutine classify
 
@@ -199,30 +189,23 @@ contains
     !> Loads less those of the present traction, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
-    integer :: n_t, n_col, k, run, from, to, m, at
+    integer :: n_t, k, run, from, m, at
 
     n_t = nodes%pairs%n_first
-    n_col = now%problem%lattice%extent(1)
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, to, m, at)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, m, at)
       do run = 1, size(nodes%pairs%first)
         from = nodes%pairs%first(run)
-        ! a run goes on in the next row where the contact reaches the rim
-        do while (from <= nodes%pairs%last(run))
-          to = min(nodes%pairs%last(run), from + n_col - 1 - modulo(from - 1, n_col))
-          m = to - from + 1
-          call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
-          at = nodes%pairs%place(run) + from - nodes%pairs%first(run)
-          ! into the frames, which takes the same reflection as out of them
-          call plane_row(m, now%shear%direction(:, from:to), ux, uy, constraint(at:at + m - 1, k), across)
-          if (nodes%pairs%second(run) > 0) then
-            at = n_t + nodes%pairs%second(run) + from - nodes%pairs%first(run)
-            constraint(at:at + m - 1, k) = across(:m)
-          end if
-          from = to + 1
-        end do
+        m = nodes%pairs%last(run) - from + 1
+        call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
+        at = nodes%pairs%place(run)
+        ! into the frames, which takes the same reflection as out of them
+        call plane_row(m, now%shear%direction(:, at:at + m - 1), ux, uy, constraint(at:at + m - 1, k), across)
+        if (nodes%pairs%second(run) == 0) cycle
+        at = n_t + nodes%pairs%second(run)
+        constraint(at:at + m - 1, k) = across(:m)
       end do
       !$omp end parallel do
       missing(k) = driven%load(k, now%problem, now%target) - carried_load(now, driven, k)
@@ -262,27 +245,26 @@ contains
     real(wp), intent(inout), contiguous :: frame(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: along, across
     real(wp) :: motion(n_motion)
-    integer :: n, n_col, row, from, to, low, high, i, m
+    integer :: n, k, from, to, i, m, at
 
     n = size(now%contact)
-    n_col = now%problem%lattice%extent(1)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, low, high, i, m)
-    do row = 1, n/n_col
-      from = (row - 1)*n_col
-      call find_span(now%contact(from + 1:from + n_col), low, high)
-      to = from + high
-      from = from + low
-      m = high - low + 1
-      if (m <= 0) cycle
-      call now%problem%rigid_displacement_row(motion, row, along(:m), across(:m), low)
-      do i = 1, m
-        along(i) = along(i) + now%origin(from + i - 1)
-        across(i) = across(i) + now%origin(n + from + i - 1)
+    associate (nodes => now%shear%nodes, n_col => size(along))
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, i, m, at)
+      do k = 1, size(nodes%first)
+        from = nodes%first(k)
+        to = nodes%last(k)
+        at = nodes%place(k)
+        m = to - from + 1
+        call now%problem%rigid_displacement_row(motion, (from - 1)/n_col + 1, along(:m), across(:m), modulo(from - 1, n_col) + 1)
+        do i = 1, m
+          along(i) = along(i) + now%origin(from + i - 1)
+          across(i) = across(i) + now%origin(n + from + i - 1)
+        end do
+        call plane_row(m, now%shear%direction(:, at:at + m - 1), along, across, frame(from:to), frame(n + from:n + to))
       end do
-      call plane_row(m, now%shear%direction(:, from:to), along, across, frame(from:to), frame(n + from:n + to))
-    end do
-    !$omp end parallel do
+      !$omp end parallel do
+    end associate
   end subroutine find_prescribed_displacement
 
 end module hc_active_zones

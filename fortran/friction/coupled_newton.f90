@@ -40,8 +40,8 @@ module hc_coupled_newton
   !> A step: the linear problem (F7) and its solution.
   type :: coupled_step_t
     type(coupled_system_t) :: system
-    !> Nodes that carry unknowns (of 3 n), those of the shear traction (of 2 n) and of the pressure (of n)
-    type(active_set_t) :: nodes, sheared, pressed
+    !> Nodes that carry unknowns (of 3 n), and those of the shear traction (of 2 n)
+    type(active_set_t) :: nodes, sheared
     !> Pressure, then shear traction in the frames, and its product (3 n)
     real(wp), allocatable :: x(:), ax(:)
     !> Motions that are driven by their loads; the loads as constraints, the normal one last
@@ -130,8 +130,9 @@ contains
     logical(lk), intent(in), contiguous :: shear_active(:)
     !> The step
     type(coupled_step_t), intent(inout) :: step
-    real(wp), dimension(:), allocatable :: ahead, aside, bound
-    integer :: n
+    real(wp), allocatable :: ahead(:), aside(:)
+    real(wp) :: bound(now%problem%lattice%extent(1))
+    integer :: n, k, i, from, to, at
 
     n = size(now%p)
     associate (system => step%system, friction => now%problem%friction)
@@ -140,29 +141,37 @@ contains
       if (.not. allocated(now%pressure%compliance)) call now%operators%normal%set_active(now%contact)
       if (allocated(now%pressure%compliance)) system%compliance = now%pressure%compliance
       system%space = now%operators%space
-      allocate (step%x(3*n), ahead(n), aside(n), bound(n))
-      allocate (system%slope(n), source=0.0_wp)
-      call friction%find_boundary(now%shear%direction, ahead, aside)
-      if (friction%is_bounded()) then
-        call friction%find_slopes(1, now%p, system%slope)
-        where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
-        if (allocated(now%shear%rest)) then
-          system%tilt = aside*system%slope
-          now%shear%rest = now%shear%rest - system%tilt*now%p
-        end if
-        system%slope = ahead*system%slope
-      end if
+      system%pressed => now%shear%nodes
+      allocate (step%x(3*n), ahead(system%pressed%n_active), aside(system%pressed%n_active))
+      allocate (system%slope(system%pressed%n_active), source=0.0_wp)
       step%x(:n) = now%p
       step%x(n + 1:) = now%q
       call now%shear%turn(step%x(n + 1:))
-      ! the part of q that p carries is not counted twice
-      step%x(2*n + 1:) = step%x(2*n + 1:) - system%slope*now%p
-      where (.not. shear_active) step%x(n + 1:) = 0.0_wp
-      if (friction%is_bounded()) then
-        ! the part of a bound that does not grow with the pressure stays as it is
-        call friction%find_bounds(1, now%p, bound)
-        where (now%contact .and. .not. shear_active(n + 1:)) step%x(2*n + 1:) = ahead*bound - system%slope*now%p
-      end if
+      if (.not. friction%is_bounded()) return
+      call friction%find_boundary(now%shear%direction, ahead, aside)
+      if (allocated(now%shear%rest)) allocate (system%tilt(system%pressed%n_active), source=0.0_wp)
+      !$omp parallel do schedule(static) num_threads(system%space%threads) private(bound, i, from, to, at)
+      do k = 1, size(system%pressed%first)
+        from = system%pressed%first(k)
+        to = system%pressed%last(k)
+        at = system%pressed%place(k) - from
+        call friction%find_slopes(from, now%p(from:to), system%slope(at + from:at + to))
+        call friction%find_bounds(from, now%p(from:to), bound(:to - from + 1))
+        do i = from, to
+          if (shear_active(n + i)) then
+            system%slope(at + i) = 0.0_wp
+            cycle
+          end if
+          if (allocated(system%tilt)) then
+            system%tilt(at + i) = aside(at + i)*system%slope(at + i)
+            now%shear%rest(at + i) = now%shear%rest(at + i) - system%tilt(at + i)*now%p(i)
+          end if
+          ! the part of q that p carries is not counted twice; that of a bound that does not grow with p stays as it is
+          system%slope(at + i) = ahead(at + i)*system%slope(at + i)
+          step%x(2*n + i) = ahead(at + i)*bound(i - from + 1) - system%slope(at + i)*now%p(i)
+        end do
+      end do
+      !$omp end parallel do
     end associate
   end subroutine enter_frames
 
@@ -178,10 +187,8 @@ contains
 
     n = size(now%p)
     call new_active_set(step%nodes, [now%contact, shear_active], step%system%space, now%problem%own_extent())
-    call new_active_set(step%sheared, shear_active, step%system%space)
+    call new_active_set(step%sheared, shear_active, step%system%space, now%problem%own_extent())
     call step%sheared%pair(2*n)
-    call new_active_set(step%pressed, now%contact, step%system%space)
-    step%system%pressed => step%pressed
     step%system%sheared => step%sheared
     step%sticks = step%system%space%count(shear_active(n + 1:)) > 0
     deallocate (shear_active)
@@ -198,32 +205,33 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy
-    real(wp), allocatable :: ones(:, :), along(:)
+    real(wp), allocatable :: ones(:, :)
     real(sp), allocatable :: punch(:, :)
-    integer :: n, k, from, to
+    integer :: k, run, m, from, to
 
-    n = size(now%p)
-    associate (c => step%constraints)
-      c%n_before = step%pressed%n_active
+    associate (c => step%constraints, pressed => now%shear%nodes)
+      c%n_before = pressed%n_active
       call find_constraints(now, step%sheared, step%driven, c%columns, missing)
       c%multiplier = step%driven%multipliers(now%motion)
       call find_rigid_traction(now, step%sheared, c%columns, .false., c%mb, error)
       if (allocated(error)) return
       ! the traction mu p e belongs to the pressure
-      allocate (c%rows(step%pressed%n_active, size(missing)), along(n))
+      allocate (c%rows(pressed%n_active, size(missing)))
       do k = 1, size(missing)
-        do from = 1, n, size(ux)
-          to = from + size(ux) - 1
-          call step%driven%direction_row(k, now%problem, from, ux, uy)
-          along(from:to) = step%system%slope(from:to)*(now%shear%direction(1, from:to)*ux + now%shear%direction(2, from:to)*uy)
+        do run = 1, size(pressed%first)
+          from = pressed%place(run)
+          m = pressed%last(run) - pressed%first(run) + 1
+          to = from + m - 1
+          call step%driven%direction_row(k, now%problem, pressed%first(run), ux(:m), uy(:m))
+          c%rows(from:to, k) = step%system%slope(from:to)*(now%shear%direction(1, from:to)*ux(:m) &
+                                                           + now%shear%direction(2, from:to)*uy(:m))
         end do
-        call step%pressed%pack(along, c%rows(:, k))
       end do
       if (now%target%control(normal) /= force_control) return
       missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()]
       c%multiplier = [c%multiplier, now%motion(normal)]
-      allocate (ones(step%pressed%n_active, 1), source=1.0_wp)
-      call find_punch_pressure(now, step%pressed, ones, punch, error)
+      allocate (ones(pressed%n_active, 1), source=1.0_wp)
+      call find_punch_pressure(now, pressed, ones, punch, error)
       if (allocated(error)) return
       c%of_sum = punch(:, 1)
     end associate
@@ -267,7 +275,7 @@ contains
       if (ahead) then
         if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
         call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
-        if (allocated(system%tilt)) step%ax(n + 1:2*n) = step%ax(n + 1:2*n) - now%shear%compliance*system%tilt*step%x(:n)
+        call system%add_tilt(-1.0_wp, step%x(:n), step%ax(n + 1:2*n))
         allocate (unknown(step%nodes%n_active))
         call step%nodes%pack(step%x, unknown)
         call find_rhs(now, step, rhs, error)
@@ -348,8 +356,8 @@ contains
       ! fields go as soon as they are copied: a window is too large for two of each
       c = constraints_t()
       now%p = x(:n)
-      x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
-      if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
+      call system%add_slope(now%p, x(2*n + 1:))
+      call system%add_tilt(1.0_wp, now%p, ax(n + 1:2*n))
       call now%shear%leave_frames(x(n + 1:), ax(n + 1:), rounding)
       deallocate (system%slope)
       now%q = x(n + 1:)

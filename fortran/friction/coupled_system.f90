@@ -24,13 +24,15 @@ module hc_coupled_system
     type(active_set_t), pointer :: pressed => null(), sheared => null()
     !> Compliance of the springs of a compliant law of contact; not there without [m/Pa]
     real(wp), allocatable :: compliance(:)
-    !> mu at slipping nodes, 0 elsewhere; traction across at rest over the pressure, not there if all are 0
+    !> Of the nodes in contact: mu where they slip, else 0; traction across at rest over the pressure, not there if all are 0
     real(wp), allocatable :: slope(:), tilt(:)
   contains
     procedure :: product => coupled_product
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
     procedure :: take_image => coupled_image
+    !> Add what the pressure carries to the traction along e, and the stretch by its rest to the displacement along t
+    procedure :: add_slope, add_tilt
   end type coupled_system_t
 
 contains
@@ -41,33 +43,62 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: t, e
-    integer :: n, i
+    integer :: n
 
     n = size(x)/3
-    associate (direction => self%shear%direction)
-      !$omp parallel do schedule(static) num_threads(self%space%threads) private(t, e)
-      do i = 1, n
-        t = x(n + i)
-        e = x(2*n + i) + self%slope(i)*x(i)
-        y(i) = x(i)
-        y(n + i) = -direction(2, i)*t + direction(1, i)*e
-        y(2*n + i) = direction(1, i)*t + direction(2, i)*e
-      end do
-      !$omp end parallel do
-    end associate
+    call self%space%copy(x, y)
+    call self%add_slope(x(:n), y(2*n + 1:))
+    call self%shear%turn(y(n + 1:))
     call self%operators%replace([normal, along_x, along_y], y, error)
     if (allocated(error)) return
     if (allocated(self%compliance)) y(:n) = y(:n) + self%compliance*x(:n)
     call self%shear%add_springs(x(n + 1:), y(n + 1:))
-    if (allocated(self%tilt)) then
-      !$omp parallel do schedule(static) num_threads(self%space%threads)
-      do i = 1, n
-        y(n + i) = y(n + i) - self%shear%compliance(i)*self%tilt(i)*x(i)
+    call self%add_tilt(-1.0_wp, x(:n), y(n + 1:2*n))
+  end subroutine coupled_product
+
+  !> Add y <- y + mu p along e of slipping nodes.
+  subroutine add_slope(self, p, y)
+    class(coupled_system_t), intent(in) :: self
+    !> Pressure (n)
+    real(wp), intent(in), contiguous :: p(:)
+    !> Traction along e (n)
+    real(wp), intent(inout), contiguous :: y(:)
+    integer :: k, i
+
+    associate (contact => self%pressed)
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
+      do k = 1, size(contact%first)
+        do i = contact%first(k), contact%last(k)
+          y(i) = y(i) + self%slope(contact%place(k) + i - contact%first(k))*p(i)
+        end do
       end do
       !$omp end parallel do
-    end if
-  end subroutine coupled_product
+    end associate
+  end subroutine add_slope
+
+  !> Add y <- y + factor D tilt p along t of slipping nodes.
+  subroutine add_tilt(self, factor, p, y)
+    class(coupled_system_t), intent(in) :: self
+    !> 1 or -1
+    real(wp), intent(in) :: factor
+    !> Pressure (n)
+    real(wp), intent(in), contiguous :: p(:)
+    !> Displacement along t (n)
+    real(wp), intent(inout), contiguous :: y(:)
+    integer :: k, i, at
+
+    if (.not. allocated(self%tilt)) return
+    associate (contact => self%pressed)
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at)
+      do k = 1, size(contact%first)
+        do i = contact%first(k), contact%last(k)
+          at = contact%place(k) + i - contact%first(k)
+          y(i) = y(i) + factor*(self%shear%compliance(at)*self%tilt(at)*p(i))
+        end do
+      end do
+      !$omp end parallel do
+    end associate
+  end subroutine add_tilt
 
   !> Multiply values at the active nodes: pressure and component along t of all nodes in contact, that along e of some.
   subroutine coupled_product_packed(self, nodes, x, y, error)
@@ -89,9 +120,9 @@ contains
         do i = contact%first(k), contact%last(k)
           at = contact%place(k) + i - contact%first(k)
           y(i) = x(at)
-          e = self%slope(i)*x(at)
-          y(n + i) = y(n + i) + direction(1, i)*e
-          y(2*n + i) = y(2*n + i) + direction(2, i)*e
+          e = self%slope(at)*x(at)
+          y(n + i) = y(n + i) + direction(1, at)*e
+          y(2*n + i) = y(2*n + i) + direction(2, at)*e
         end do
       end do
       !$omp end parallel do
@@ -103,7 +134,7 @@ contains
         do i = contact%first(k), contact%last(k)
           at = contact%place(k) + i - contact%first(k)
           if (allocated(self%compliance)) y(i) = y(i) + self%compliance(i)*x(at)
-          if (allocated(self%tilt)) y(n + i) = y(n + i) - self%shear%compliance(i)*self%tilt(i)*x(at)
+          if (allocated(self%tilt)) y(n + i) = y(n + i) - self%shear%compliance(at)*self%tilt(at)*x(at)
         end do
       end do
       !$omp end parallel do
@@ -132,7 +163,7 @@ contains
       do k = 1, size(contact%first)
         do i = contact%first(k), contact%last(k)
           at = contact%place(k) + i - contact%first(k)
-          shear(at) = shear(at) + self%shear%compliance(i)*self%tilt(i)*z(at)
+          shear(at) = shear(at) + self%shear%compliance(at)*self%tilt(at)*z(at)
         end do
       end do
       call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:), error)

@@ -207,7 +207,6 @@ contains
     self%pressure%operators => operators
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
-    if (.not. problem%friction%is_isotropic()) allocate (self%shear%rest(n), source=0.0_wp)
     self%shear_feels_pressure = problem%medium%couples()
     self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
     self%h(1:n) => problem%initial_gap
@@ -268,7 +267,6 @@ contains
     self%joint = .false.
     self%rounding = 0.0_wp
     if (.not. allocated(self%w)) call allocate_displacements(self)
-    if (.not. allocated(self%shear%compliance)) call self%shear%reset_frames()
     allocate (moved(3*n))
     if (self%shear_feels_pressure .and. .not. (self%without_start .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
@@ -314,7 +312,7 @@ contains
     class(friction_iterate_t), intent(inout) :: self
 
     call self%forget_displacements()
-    call self%shear%forget_frames()
+    if (allocated(self%shear%compliance)) deallocate (self%shear%direction, self%shear%compliance)
     if (allocated(self%punch_pressure)) deallocate (self%punch_pressure)
     if (allocated(self%rigid_traction)) deallocate (self%rigid_traction)
   end subroutine forget

@@ -32,7 +32,9 @@ module hc_shear_system
   !> Shear traction in the frames of the nodes.
   type, extends(linear_system_t) :: shear_system_t
     type(operators_t), pointer :: operators => null()
-    !> Direction e of each node; t is a quarter turn ahead
+    !> Nodes in contact, in runs along the rows
+    type(active_set_t) :: nodes
+    !> Direction e of each of them; t is a quarter turn ahead
     real(wp), allocatable :: direction(:, :)
     !> Compliance D along t, 0 in stick [m/Pa]
     real(wp), allocatable :: compliance(:)
@@ -40,8 +42,6 @@ module hc_shear_system
     real(wp), allocatable :: rest(:)
     !> Elastic compliance of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
-    !> Nodes in contact
-    type(active_set_t), private :: nodes
   contains
     procedure :: product => shear_product
     procedure :: product_packed => shear_product_packed
@@ -49,10 +49,8 @@ module hc_shear_system
     procedure :: take_image => shear_image
     !> Turn components along x and y into the frames, or back
     procedure :: turn
-    !> Let every node stick; free frames and compliances until then
-    procedure :: reset_frames, forget_frames
-    !> Set the nodes in contact, with their frames and compliances
-    procedure :: set_contact
+    !> Set the nodes in contact, all of which stick; prepare for their frames and compliances
+    procedure :: set_contact, use_frames
     !> Add the stretch of springs at rest
     procedure :: add_rest
     !> Reduce the traction of slipping nodes by their compliance
@@ -67,7 +65,7 @@ module hc_shear_system
 
 contains
 
-  !> Set up a shear system in which every node sticks.
+  !> Set up a shear system without contact.
   subroutine new_shear_system(self, operators)
     !> System to be set up
     type(shear_system_t), intent(out) :: self
@@ -78,41 +76,38 @@ contains
     self%space = operators%space
     self%symmetric = .not. operators%rolling%steady
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%medium)
-    call self%reset_frames()
   end subroutine new_shear_system
 
-  !> Let every node stick, in a frame along x and y.
-  subroutine reset_frames(self)
+  !> Set the nodes in contact: they stick, in frames along x and y.
+  subroutine set_contact(self, contact)
     class(shear_system_t), intent(inout) :: self
-    integer :: n, i
+    !> Nodes in contact (n)
+    logical(lk), intent(in), contiguous :: contact(:)
+    integer :: i
 
-    n = product(self%space%own_extent(self%operators%flexibility%lattice%extent))
-    allocate (self%direction(2, n), self%compliance(n))
+    if (allocated(self%compliance)) then
+      if (.not. self%nodes%is_set(contact)) deallocate (self%direction, self%compliance)
+    end if
+    if (.not. allocated(self%compliance)) then
+      call new_active_set(self%nodes, contact, self%space, self%space%own_extent(self%operators%flexibility%lattice%extent))
+      allocate (self%direction(2, self%nodes%n_active), self%compliance(self%nodes%n_active))
+    end if
     !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
+    do i = 1, size(self%compliance)
       self%direction(:, i) = [1.0_wp, 0.0_wp]
       self%compliance(i) = 0.0_wp
     end do
     !$omp end parallel do
-    call new_active_set(self%nodes, spread(.true._lk, 1, n), self%space)
-  end subroutine reset_frames
+  end subroutine set_contact
 
-  !> Free frames and compliances.
-  subroutine forget_frames(self)
-    class(shear_system_t), intent(inout) :: self
-
-    deallocate (self%direction, self%compliance)
-  end subroutine forget_frames
-
-  !> Set the nodes in contact; their directions and compliances are known.
-  subroutine set_contact(self, contact)
+  !> Prepare the preconditioner for the frames and compliances of the nodes in contact.
+  subroutine use_frames(self, contact)
     class(shear_system_t), intent(inout), target :: self
     !> Nodes in contact (n)
     logical(lk), intent(in), contiguous :: contact(:)
 
-    if (.not. self%nodes%is_set(contact)) call new_active_set(self%nodes, contact, self%space)
     call self%operators%tangential%set_active(contact, self%compliance, self%direction)
-  end subroutine set_contact
+  end subroutine use_frames
 
   !> Reduce tractions by springs in series with the stiffness that a node was found to have in stick.
   subroutine apply_slip_compliance(self, runs, along_t, along_e, plane, traction_t, traction_e)
@@ -128,7 +123,7 @@ contains
     real(wp), dimension(most) :: q_t, q_e, u_e
     integer :: i, k, n, from, to, m, at
 
-    n = size(self%compliance)
+    n = size(plane)/2
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, from, to, m, at, q_t, q_e, u_e)
     do k = 1, size(runs%first)
       do from = runs%first(k), runs%last(k), most
@@ -136,7 +131,7 @@ contains
         m = to - from + 1
         at = runs%place(k) + from - runs%first(k)
         do i = 1, m
-          associate (e => self%direction(:, from + i - 1), q_x => plane(from + i - 1), q_y => plane(n + from + i - 1))
+          associate (e => self%direction(:, at + i - 1), q_x => plane(from + i - 1), q_y => plane(n + from + i - 1))
             q_t(i) = -e(2)*q_x + e(1)*q_y
             q_e(i) = e(1)*q_x + e(2)*q_y
           end associate
@@ -144,7 +139,7 @@ contains
         ! a slipping node does not move along e
         u_e(:m) = 0.0_wp
         if (runs%second(k) > 0) u_e(:m) = along_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k))
-        call slip_compliance_row(m, self%compliance(from:to), along_t(at:at + m - 1), u_e, q_t, q_e)
+        call slip_compliance_row(m, self%compliance(at:at + m - 1), along_t(at:at + m - 1), u_e, q_t, q_e)
         traction_t(at:at + m - 1) = real(q_t(:m), sp)
         if (runs%second(k) == 0) cycle
         traction_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k)) = real(q_e(:m), sp)
@@ -160,15 +155,16 @@ contains
     real(wp), intent(in), contiguous :: traction(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to
+    integer :: n, k, from, to, at
 
-    n = size(self%compliance)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
+    n = size(displacement)/2
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
-      call add_springs_row(to - from + 1, self%direction(:, from:to), self%compliance(from:to), traction(from:to), &
-                           displacement(from:to), displacement(n + from:n + to))
+      at = self%nodes%place(k)
+      call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
+                           traction(from:to), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine add_springs
@@ -178,13 +174,14 @@ contains
     class(shear_system_t), intent(in) :: self
     !> In the frames (2 n)
     real(wp), intent(inout) :: displacement(:)
-    integer :: k, i
+    integer :: k, i, at
 
     if (.not. allocated(self%rest)) return
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
-        displacement(i) = displacement(i) + self%compliance(i)*self%rest(i)
+        at = self%nodes%place(k) + i - self%nodes%first(k)
+        displacement(i) = displacement(i) + self%compliance(at)*self%rest(at)
       end do
     end do
     !$omp end parallel do
@@ -199,19 +196,19 @@ contains
     !> Rounding error of the displacements [m]: very soft springs stretch by so much that the displacements of the nodes are
     !> lost in it
     real(wp), intent(out) :: rounding
-    integer :: n, k, from, to
+    integer :: k, from, to, at
 
-    n = size(self%compliance)
     rounding = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to) reduction(max: rounding)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at) reduction(max: rounding)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
-      call take_off_row(to - from + 1, self%compliance(from:to), traction(from:to), displacement(from:to), rounding)
-      call turn_row(to - from + 1, self%direction(:, from:to), traction(from:to), traction(n + from:n + to))
-      call turn_row(to - from + 1, self%direction(:, from:to), displacement(from:to), displacement(n + from:n + to))
+      at = self%nodes%place(k)
+      call take_off_row(to - from + 1, self%compliance(at:at + to - from), traction(from:to), displacement(from:to), rounding)
     end do
     !$omp end parallel do
+    call self%turn(traction)
+    call self%turn(displacement)
     rounding = epsilon(1.0_wp)*self%space%largest(rounding)
   end subroutine leave_frames
 
@@ -221,14 +218,15 @@ contains
     class(shear_system_t), intent(in) :: self
     !> The components (2 n)
     real(wp), intent(inout), contiguous :: values(:)
-    integer :: n, k, from, to
+    integer :: n, k, from, to, at
 
     n = size(values)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
-      call turn_row(to - from + 1, self%direction(:, from:to), values(from:to), values(n + from:n + to))
+      at = self%nodes%place(k)
+      call turn_row(to - from + 1, self%direction(:, at:at + to - from), values(from:to), values(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine turn
@@ -239,17 +237,9 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: n, k, from, to
 
-    n = size(self%compliance)
-    call self%space%fill(y, 0.0_wp)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
-    do k = 1, size(self%nodes%first)
-      from = self%nodes%first(k)
-      to = self%nodes%last(k)
-      call plane_row(to - from + 1, self%direction(:, from:to), x(from:to), x(n + from:n + to), y(from:to), y(n + from:n + to))
-    end do
-    !$omp end parallel do
+    call self%space%copy(x, y)
+    call self%turn(y)
     call self%operators%replace(shear, y, error)
     if (allocated(error)) return
     call self%add_springs(x, y)
@@ -291,11 +281,11 @@ contains
       at = runs%place(k)
       if (runs%second(k) == 0) then
         do i = from, to
-          plane(i) = -self%direction(2, i)*along_t(at + i - from)
-          plane(n + i) = self%direction(1, i)*along_t(at + i - from)
+          plane(i) = -self%direction(2, at + i - from)*along_t(at + i - from)
+          plane(n + i) = self%direction(1, at + i - from)*along_t(at + i - from)
         end do
       else
-        call plane_row(to - from + 1, self%direction(:, from:to), along_t(at:at + to - from), &
+        call plane_row(to - from + 1, self%direction(:, at:at + to - from), along_t(at:at + to - from), &
                        along_e(runs%second(k):runs%second(k) + to - from), plane(from:to), plane(n + from:n + to))
       end if
     end do
@@ -311,16 +301,16 @@ contains
     real(wp), intent(in), contiguous :: along_t(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to
+    integer :: n, k, from, to, at
 
-    n = size(self%compliance)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
+    n = size(displacement)/2
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
     do k = 1, size(runs%first)
       from = runs%first(k)
       to = runs%last(k)
-      call add_springs_row(to - from + 1, self%direction(:, from:to), self%compliance(from:to), &
-                           along_t(runs%place(k):runs%place(k) + to - from), displacement(from:to), &
-                           displacement(n + from:n + to))
+      at = runs%place(k)
+      call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
+                           along_t(at:at + to - from), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine add_springs_packed
@@ -355,7 +345,7 @@ contains
     integer :: n, k, i, m, at, to_ahead
     logical :: forward
 
-    n = size(self%compliance)
+    n = product(self%space%own_extent(self%operators%flexibility%lattice%extent))
     allocate (plane(2*n), source=0.0_wp)
     associate (n_t => runs%n_first, rolling => self%operators%rolling)
       call self%put_in_plane(runs, z(:n_t), z(n_t + 1:), plane)
@@ -363,16 +353,15 @@ contains
       forward = to_ahead > 0
       do k = merge(size(runs%first), 1, forward), merge(1, size(runs%first), forward), merge(-1, 1, forward)
         do i = merge(runs%last(k), runs%first(k), forward), merge(runs%first(k), runs%last(k), forward), merge(-1, 1, forward)
-          own = self%elastic_compliance/(self%elastic_compliance + self%compliance(i))
+          at = runs%place(k) + i - runs%first(k)
+          own = self%elastic_compliance/(self%elastic_compliance + self%compliance(at))
           do m = 0, n, n
             plane(m + i) = plane(m + i)/rolling%share
             if (i + to_ahead >= 1 .and. i + to_ahead <= n) plane(m + i) = plane(m + i) + own*plane(m + i + to_ahead)
           end do
-          at = runs%place(k) + i - runs%first(k)
-          z(at) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
+          z(at) = -self%direction(2, at)*plane(i) + self%direction(1, at)*plane(n + i)
           if (runs%second(k) == 0) cycle
-          at = n_t + runs%second(k) + i - runs%first(k)
-          z(at) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
+          z(n_t + runs%second(k) + i - runs%first(k)) = self%direction(1, at)*plane(i) + self%direction(2, at)*plane(n + i)
         end do
       end do
     end associate

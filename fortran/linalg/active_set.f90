@@ -9,7 +9,7 @@ module hc_active_set
   implicit none
   private
 
-  public :: active_set_t, new_active_set, paired_runs_t, find_span
+  public :: active_set_t, new_active_set, paired_runs_t, pair_runs, find_span
 
   !> Nodes that one thread looks through at a time.
   integer, parameter :: block_size = 8192
@@ -95,7 +95,7 @@ contains
     end do
   end subroutine positive_span
 
-  !> Find the runs of active nodes; they end at the ends of blocks, too.
+  !> Find the runs of active nodes; they end at the ends of rows, if these are known, else of blocks.
   subroutine new_active_set(self, active, space, extent)
     !> Set to be set up
     type(active_set_t), intent(out) :: self
@@ -106,10 +106,13 @@ contains
     !> Columns and own rows of the window, by pairs of whose rows vectors are summed; absent: in blocks
     integer, intent(in), optional :: extent(2)
     !> Where the runs of each block begin in the list, less one
-    integer :: before((size(active) + block_size - 1)/block_size + 1)
-    integer :: k, n_block
+    integer, allocatable :: before(:)
+    integer :: k, n_block, length
 
-    n_block = size(before) - 1
+    length = block_size
+    if (present(extent)) length = extent(1)
+    n_block = (size(active) + length - 1)/length
+    allocate (before(n_block + 1))
     before(1) = 0
     !$omp parallel do schedule(static) num_threads(space%threads)
     do k = 1, n_block
@@ -138,7 +141,7 @@ contains
     !> Return the first node of a block.
     pure integer function start(block)
       integer, intent(in) :: block
-      start = (block - 1)*block_size + 1
+      start = (block - 1)*length + 1
     end function start
 
   end subroutine new_active_set

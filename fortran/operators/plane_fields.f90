@@ -17,7 +17,7 @@ contains
     !> Active nodes
     type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
-    !> Direction e (2, n)
+    !> Direction e of the nodes of the first component (2, n_first)
     real(wp), intent(in), contiguous :: direction(:, :)
     !> Displacement along x and y (n)
     real(sp), intent(inout), contiguous :: x(:), y(:)
@@ -34,10 +34,10 @@ contains
       at = runs%place(k)
       second = runs%second(k)
       if (second > 0 .and. present(along_e)) then
-        call stick_to_plane(to - from + 1, direction(:, from:to), factor, along_t(at:at + to - from), &
+        call stick_to_plane(to - from + 1, direction(:, at:at + to - from), factor, along_t(at:at + to - from), &
                             along_e(second:second + to - from), x(from:to), y(from:to))
       else
-        call slip_to_plane(to - from + 1, direction(:, from:to), along_t(at:at + to - from), x(from:to), y(from:to))
+        call slip_to_plane(to - from + 1, direction(:, at:at + to - from), along_t(at:at + to - from), x(from:to), y(from:to))
       end if
     end do
     !$omp end parallel do
@@ -48,7 +48,7 @@ contains
     !> Active nodes
     type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
-    !> Direction e (2, n)
+    !> Direction e of the nodes of the first component (2, n_first)
     real(wp), intent(in), contiguous :: direction(:, :)
     !> Components along x and y (n), and along t and e at the active nodes; absent: not wanted
     real(sp), intent(in), contiguous :: x(:), y(:)
@@ -61,33 +61,35 @@ contains
       from = runs%first(k)
       to = runs%last(k)
       at = runs%place(k)
-      call add_turned(to - from + 1, -1.0_wp, direction(:, from:to), y(from:to), x(from:to), along_t(at:at + to - from))
+      call add_turned(to - from + 1, -1.0_wp, direction(:, at:at + to - from), y(from:to), x(from:to), along_t(at:at + to - from))
       if (.not. present(along_e)) cycle
       second = runs%second(k)
-      if (second > 0) call add_turned(to - from + 1, 1.0_wp, direction(:, from:to), x(from:to), y(from:to), &
+      if (second > 0) call add_turned(to - from + 1, 1.0_wp, direction(:, at:at + to - from), x(from:to), y(from:to), &
                                       along_e(second:second + to - from))
     end do
     !$omp end parallel do
   end subroutine add_in_frames
 
-  !> Keep the part of a field along e at some nodes.
-  subroutine keep_along(nodes, threads, direction, x, y)
+  !> Keep the part of a field along e at the nodes of a second component.
+  subroutine keep_along(runs, threads, direction, x, y)
     !> The nodes
-    type(active_set_t), intent(in) :: nodes
+    type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
-    !> Direction e (2, n)
+    !> Direction e of the nodes of the first component (2, n_first)
     real(wp), intent(in), contiguous :: direction(:, :)
     !> Components along x and y (n)
     real(sp), intent(inout), contiguous :: x(:), y(:)
     real(wp) :: along
-    integer :: i, k
+    integer :: i, k, at
 
-    !$omp parallel do schedule(static) num_threads(threads) private(i, along)
-    do k = 1, size(nodes%first)
-      do i = nodes%first(k), nodes%last(k)
-        along = direction(1, i)*x(i) + direction(2, i)*y(i)
-        x(i) = real(direction(1, i)*along, sp)
-        y(i) = real(direction(2, i)*along, sp)
+    !$omp parallel do schedule(static) num_threads(threads) private(i, at, along)
+    do k = 1, size(runs%first)
+      if (runs%second(k) == 0) cycle
+      do i = runs%first(k), runs%last(k)
+        at = runs%place(k) + i - runs%first(k)
+        along = direction(1, at)*x(i) + direction(2, at)*y(i)
+        x(i) = real(direction(1, at)*along, sp)
+        y(i) = real(direction(2, at)*along, sp)
       end do
     end do
     !$omp end parallel do

@@ -39,10 +39,11 @@ module hc_preconditioner
       class(preconditioner_t), intent(inout) :: self
       !> Active nodes (n)
       logical(lk), intent(in), contiguous :: active(:)
-      !> Compliance D of the springs along the first component of a vector (n); absent: no springs [m/Pa]. It has to outlive
-      !> the applications
+      !> Compliance D of the springs along the first component of a vector (n; with directions at the active nodes only); absent:
+      !> no springs [m/Pa]. It has to outlive the applications
       real(wp), intent(in), optional, target, contiguous :: compliance(:)
-      !> With two components: the second axis e of the frame (t, e) of each node (2, n); it has to outlive the applications
+      !> With two components: the second axis e of the frame (t, e) of each active node (2, n_active); it has to outlive the
+      !> applications
       real(wp), intent(in), optional, target, contiguous :: direction(:, :)
     end subroutine set_active
 

@@ -24,7 +24,7 @@ module hc_shear_preconditioner
   use hc_field_space, only: field_space_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
   use hc_plane_fields, only: to_plane, add_in_frames, keep_along, copy_nodes, add_nodes, set_to_zero
   use hc_inverse_symbol, only: node_compliance
   use hc_edge_continuation, only: edge_extension_t, new_edge_extension
@@ -41,7 +41,7 @@ module hc_shear_preconditioner
     real(wp) :: elastic_compliance = 0.0_wp
     !> Rows of the window
     integer, private :: n_row = 0
-    !> Direction e
+    !> Direction e of each node in contact
     real(wp), pointer, contiguous :: direction(:, :) => null()
     !> Shares a and f of each node in contact
     real(sp), allocatable :: own(:), far(:)
@@ -49,6 +49,8 @@ module hc_shear_preconditioner
     logical :: slips = .false.
     !> Nodes in contact; those that slip, and those near them that stick; both together, and the others
     type(active_set_t) :: nodes, slipping, sticking, near, apart
+    !> Nodes in contact, and which of them slip
+    type(paired_runs_t) :: slips_among
     !> Continuation from stick into slip; none if no node slips
     type(edge_extension_t), allocatable :: front
     !> Fields along x and y, zero off the nodes near slip: averaged, and the mean (n with a margin, 2); beside the displacements
@@ -104,20 +106,16 @@ contains
       if (allocated(self%own)) deallocate (self%own, self%far)
       allocate (self%own(self%nodes%n_active), self%far(self%nodes%n_active))
     end if
+    allocate (slips(size(active)), source=.false._lk)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, ratio)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
         at = self%nodes%place(k) + i - self%nodes%first(k)
-        ratio = compliance(i)/self%elastic_compliance
+        ratio = compliance(at)/self%elastic_compliance
         self%own(at) = real(self%options%short_waves/(self%options%short_waves + ratio), sp)
         self%far(at) = real(self%options%long_waves/(self%options%long_waves + ratio), sp)
+        slips(i) = compliance(at) > 0.0_wp
       end do
-    end do
-    !$omp end parallel do
-    allocate (slips(size(active)))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, size(slips)
-      slips(i) = active(i) .and. compliance(i) > 0.0_wp
     end do
     !$omp end parallel do
     self%slips = self%space%count(slips) > 0
@@ -126,6 +124,7 @@ contains
     if (known) known = self%slipping%is_set(slips)
     if (all_know(self, known)) return
     call new_active_set(self%slipping, slips, self%space)
+    call pair_runs(self%nodes, self%slipping, self%slips_among)
     call find_near(self, self%extent, active, slips)
     if (.not. allocated(self%front)) allocate (self%front)
     call new_front(self, self%extent, active, slips)
@@ -399,7 +398,7 @@ contains
       call set_to_zero(self%slipping, self%space%threads, self%mean(1:n, m))
       call self%front%extend(self%mean(1:n, m))
     end do
-    call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
+    call keep_along(self%slips_among, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
     do m = 1, 2
       call add_nodes(self%slipping, self%space%threads, self%mean(1:n, m), self%values((m - 1)*n + 1:m*n))
     end do
@@ -414,7 +413,7 @@ contains
     do m = 1, 2
       call copy_nodes(self%near, self%space%threads, self%values((m - 1)*n + 1:m*n), self%mean(1:n, m))
     end do
-    call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
+    call keep_along(self%slips_among, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
     do m = 1, 2
       call self%front%fold(self%mean(1:n, m))
       call copy_nodes(self%sticking, self%space%threads, self%mean(1:n, m), self%values((m - 1)*n + 1:m*n))

@@ -437,12 +437,13 @@ contains
     call new_dense_flexibility(dense, lattice, pair, error)
     if (allocated(error)) return
     call new_shear_system(system, operators)
+    call system%set_contact(spread(.true._lk, 1, n))
     call random_number(angle)
     system%direction(1, :) = cos(2.0_wp*pi*angle)
     system%direction(2, :) = sin(2.0_wp*pi*angle)
     ! stick, and slip with compliances from far below to far above that of a node
     system%compliance = [(merge(0.0_wp, system%elastic_compliance*10.0_wp**(0.4_wp*(i - 14)), modulo(i, 3) == 0), i=1, n)]
-    call system%set_contact(spread(.true._lk, 1, n))
+    call system%use_frames(spread(.true._lk, 1, n))
     call random_number(x)
     call system%product(x, y, error)
     if (allocated(error)) return
@@ -509,10 +510,11 @@ contains
       call lattice%coordinates(x, y)
       call new_shear_system(system, operators)
       ! compliances from nothing to that of the whole contact, as they grow across a slip zone
-      system%compliance = reshape(2.0_wp*sqrt(x**2 + y**2)**3, [n])
       active = [reshape(x**2 + y**2 < 0.8_wp, [n]), spread(.false., 1, n)]
       system%space = field_space_t()
       call system%set_contact(active(:n))
+      system%compliance = pack(2.0_wp*sqrt(x**2 + y**2)**3, reshape(active(:n), [side, side]))
+      call system%use_frames(active(:n))
       image = 0.0_wp
       call new_active_set(nodes, active, system%space)
       allocate (unknown(nodes%n_active), source=0.0_wp)

@@ -125,7 +125,7 @@ contains
     type(operators_t), target :: operators
     type(shear_system_t), target :: system
     real(wp), dimension(side, side) :: x, y, radius
-    real(wp), dimension(n) :: distance, turn
+    real(wp), dimension(n) :: distance, turn, compliance
     real(wp), dimension(2*n) :: traction, moved, answer, other, other_moved, other_answer
     logical(lk) :: unknown(2*n)
     integer :: front, frame
@@ -140,16 +140,18 @@ contains
     do front = 4, 16, 4
       distance = reshape(max(radius - front, 0.0_wp), [n])
       ! from nothing at the front to far above that of the whole contact at its edge
-      system%compliance = system%elastic_compliance*merge(0.2_wp*distance**1.5_wp/max(18.0_wp - reshape(radius, [n]), 1.0e-4_wp), &
-                                                          0.0_wp, reshape(radius < 18.0_wp, [n]))
+      compliance = system%elastic_compliance*merge(0.2_wp*distance**1.5_wp/max(18.0_wp - reshape(radius, [n]), 1.0e-4_wp), &
+                                                   0.0_wp, reshape(radius < 18.0_wp, [n]))
       do frame = 1, 2
         ! slip along x, but for a turn; in stick the same frames, or any
         call random_number(turn)
-        turn = merge(turn*6.0_wp*(frame - 1), 0.1_wp*reshape(x - y, [n])/18.0_wp, .not. system%compliance > 0.0_wp)
-        system%direction(1, :) = cos(turn)
-        system%direction(2, :) = sin(turn)
-        unknown = [reshape(radius < 18.0_wp, [n]), reshape(radius < 18.0_wp, [n]) .and. .not. system%compliance > 0.0_wp]
+        turn = merge(turn*6.0_wp*(frame - 1), 0.1_wp*reshape(x - y, [n])/18.0_wp, .not. compliance > 0.0_wp)
+        unknown = [reshape(radius < 18.0_wp, [n]), reshape(radius < 18.0_wp, [n]) .and. .not. compliance > 0.0_wp]
         call system%set_contact(unknown(:n))
+        system%compliance = pack(compliance, unknown(:n))
+        system%direction(1, :) = pack(cos(turn), unknown(:n))
+        system%direction(2, :) = pack(sin(turn), unknown(:n))
+        call system%use_frames(unknown(:n))
         call random_number(traction)
         call random_number(other)
         traction = merge(traction - 0.5_wp, 0.0_wp, unknown)
@@ -212,9 +214,10 @@ contains
       radius(:) = reshape(sqrt((x - 0.3_wp)**2 + (y + 0.2_wp)**2), [n])/spacings
       ! slip grows like the power 1.5 of the distance from stick, and the pressure falls like the root of that from the edge
       slip(:) = max(radius - 0.794_wp, 0.0_wp)**1.5_wp/sqrt(max(1.0_wp - radius**2, 1.0e-6_wp))
-      system%compliance = merge(2.0_wp*spacings*system%elastic_compliance*slip, 0.0_wp, radius < 1.0_wp)
       unknown(:) = [radius < 1.0_wp, radius < 0.794_wp]
       call system%set_contact(unknown(:n))
+      system%compliance = pack(2.0_wp*spacings*system%elastic_compliance*slip, unknown(:n))
+      call system%use_frames(unknown(:n))
       call random_number(v)
       v = merge(v - 0.5_wp, 0.0_wp, unknown)
       do k = 1, 60

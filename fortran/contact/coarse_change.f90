@@ -12,7 +12,7 @@
 !>
 !> Equations: docs/theory/multilevel.md, (M1).
 module hc_coarse_change
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_lattice, only: lattice_t, floor_half
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
@@ -47,7 +47,7 @@ contains
     call problem%restrict(fine%pressure, coarse_problem, coarse%pressure)
     call problem%restrict(fine%gap, coarse_problem, coarse%gap)
     call problem%restrict(real(fine%zone, wp), coarse_problem, zone)
-    coarse%zone = nint(zone)
+    coarse%zone = nint(zone, zk)
     coarse%traction = restricted(problem, fine%traction, coarse_problem)
     coarse%relative_displacement = restricted(problem, fine%relative_displacement, coarse_problem)
     call coarse_problem%friction%begin_step(coarse%zone)

@@ -1,7 +1,7 @@
 !> The state of a contact: tractions, gap, zones, loads and rigid motions over a window.
 module hc_contact_state
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp, lk, zk
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_rolling, only: rolling_t
@@ -22,7 +22,7 @@ module hc_contact_state
   public :: remote_displacement
 
   !> Zone of a node; without friction every node in contact slips.
-  integer, parameter :: separated = 0, stick = 1, slip = 2
+  integer(zk), parameter :: separated = 0_zk, stick = 1_zk, slip = 2_zk
 
   !> The motions of the remote parts: approach, shift along x and along y, and twist about z, each with its load, and the bulk
   !> strain of body 1 relative to body 2, which is always prescribed (docs/theory/conditions.md, bulk strain).
@@ -74,7 +74,7 @@ module hc_contact_state
     !> Pressure and gap (n_col, n_row) [Pa], [m]
     real(wp), allocatable :: pressure(:, :), gap(:, :)
     !> Zone of each node (n_col, n_row)
-    integer, allocatable :: zone(:, :)
+    integer(zk), allocatable :: zone(:, :)
     !> With friction: shear traction on body 1 (n_col, n_row, 2) [Pa]
     real(wp), allocatable :: traction(:, :, :)
     !> With friction: relative displacement s = (u1 - u2) + strain r - shift - twist x r (n_col, n_row, 2) [m]

@@ -22,7 +22,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F3), (F6), (F16).
 module hc_disc_law
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_friction_law, only: friction_law_t
   use hc_contact_state, only: separated, stick, slip
   implicit none
@@ -100,7 +100,7 @@ contains
     integer, intent(in) :: first
     real(wp), intent(in) :: unit, r
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
-    integer, intent(out), contiguous :: zone(:)
+    integer(zk), intent(out), contiguous :: zone(:)
     real(wp) :: slope, pressed(size(p))
 
     call self%find_disc(first, p, slope, pressed)
@@ -185,7 +185,7 @@ contains
     real(wp), intent(in) :: p_max, r
     logical, intent(in), contiguous :: in_contact(:)
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
-    integer, intent(out), contiguous :: zone(:)
+    integer(zk), intent(out), contiguous :: zone(:)
     real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
     real(wp) :: bound(size(p)), squares(2), largest, largest_r, length, unit
     real(wp), allocatable :: normal(:, :)
@@ -258,7 +258,7 @@ contains
     !> Nodes in contact; the others are separated
     logical, intent(in), contiguous :: in_contact(:)
     !> separated, stick or slip
-    integer, intent(out), contiguous :: zone(:)
+    integer(zk), intent(out), contiguous :: zone(:)
     !> Direction e (2, n) and compliance D (n) of the nodes that slip
     real(wp), intent(inout), contiguous :: direction(:, :), compliance(:)
     integer :: i
@@ -280,7 +280,7 @@ contains
   end function normal_to
 
   !> Classify a node by |q - r ds|.
-  elemental integer function zone_of(p, x, y, radius) result(zone)
+  elemental integer(zk) function zone_of(p, x, y, radius) result(zone)
     !> Pressure; components of q - r ds and radius of the disc, in the unit of pressure
     real(wp), intent(in) :: p, x, y, radius
 

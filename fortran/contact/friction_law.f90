@@ -19,7 +19,7 @@
 !> A law may depend on the zones at the end of the step before, as static and kinetic friction do. Solvers give them to it at the
 !> beginning of each step, on every lattice.
 module hc_friction_law
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_error, only: error_t
   implicit none
   private
@@ -98,7 +98,7 @@ module hc_friction_law
 
     !> Classify the nodes of a row by q - r ds.
     pure subroutine law_zones(self, first, unit, r, p, qx, qy, dsx, dsy, zone)
-      import :: friction_law_t, wp
+      import :: friction_law_t, wp, zk
       class(friction_law_t), intent(in) :: self
       !> Number of the first node
       integer, intent(in) :: first
@@ -107,7 +107,7 @@ module hc_friction_law
       !> Pressure, traction and slip of the step
       real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
       !> separated, stick or slip
-      integer, intent(out), contiguous :: zone(:)
+      integer(zk), intent(out), contiguous :: zone(:)
     end subroutine law_zones
 
     !> Project the tractions of a row on the admissible set.
@@ -141,7 +141,7 @@ module hc_friction_law
 
     !> Linearise the law at the nodes of a row: zones, directions and compliances.
     pure subroutine law_linearize(self, first, p_max, r, in_contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
-      import :: friction_law_t, wp
+      import :: friction_law_t, wp, zk
       class(friction_law_t), intent(in) :: self
       !> Number of the first node
       integer, intent(in) :: first
@@ -152,7 +152,7 @@ module hc_friction_law
       !> Pressure, traction and slip of the step, of the last iterate
       real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
       !> separated, stick or slip
-      integer, intent(out), contiguous :: zone(:)
+      integer(zk), intent(out), contiguous :: zone(:)
       !> Direction of the traction in slip, or the normal of the boundary; (1, 0) elsewhere (2, n)
       real(wp), intent(out), contiguous :: direction(:, :)
       !> Compliance D across that direction, 0 elsewhere [m/Pa]
@@ -269,7 +269,7 @@ contains
   pure subroutine begin_step(self, zone)
     class(friction_law_t), intent(inout) :: self
     !> Zone of each node (n_col, n_row)
-    integer, intent(in) :: zone(:, :)
+    integer(zk), intent(in) :: zone(:, :)
   end subroutine begin_step
 
   !> Return a number of each node, row by row; a law whose nodes are not alike overrides this.

@@ -7,7 +7,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F4), (F14).
 module hc_load_constraints
-  use hc_precision, only: wp, pi, lk
+  use hc_precision, only: wp, pi, lk, zk
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
   use hc_active_set, only: active_set_t, new_active_set, find_span
@@ -296,7 +296,7 @@ contains
     !> Compliance of each node, the less the closer it is to sticking; 0 where it is fixed [m/Pa]
     real(wp), intent(inout), contiguous :: compliance(:)
     !> Zone of each node
-    integer, intent(inout) :: zone(:)
+    integer(zk), intent(inout) :: zone(:)
     logical(lk) :: slips(size(zone))
     real(wp) :: low, high, middle
     integer :: i, n_slip

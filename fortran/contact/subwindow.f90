@@ -5,7 +5,7 @@
 !> the bodies overlap outside of it: the next part is around these nodes, too. The whole window is next where a part has no
 !> solution, where it saves no work, or after some parts.
 module hc_subwindow
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_error, only: error_t
   use hc_normal_problem, only: normal_problem_t
   use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_step_t
@@ -144,7 +144,7 @@ contains
       end associate
     else
       call whole%cut(real(state%zone, wp), low, part, zone)
-      values%zone = nint(zone)
+      values%zone = nint(zone, zk)
     end if
     values%traction = cut_vector(whole, state%traction, low, part)
     values%relative_displacement = cut_vector(whole, state%relative_displacement, low, part)

@@ -2,7 +2,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F5) to (F8).
 module hc_direct_iterate
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp, lk, zk
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, load_step_t, separated, stick, slip, normal, along_x, n_motion, &
@@ -31,7 +31,7 @@ module hc_direct_iterate
     real(wp) :: motion(n_motion) = 0.0_wp
     !> Frozen state of the nodes in contact: stick or slip, its direction (2, n) and
     !> compliance across it; a node with an infinite one has no traction across
-    integer, allocatable :: zone(:)
+    integer(zk), allocatable :: zone(:)
     real(wp), allocatable :: direction(:, :), compliance(:)
     !> Under a compliant law of contact: compliance [m/Pa] and offset [m] of the spring along the normal, 0 off the contact
     real(wp), allocatable :: spring(:), offset(:)

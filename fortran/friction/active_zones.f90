@@ -2,7 +2,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp, lk, zk
   use hc_contact_state, only: separated, stick, slip, along_x, along_y, n_motion, force_control
   use hc_active_set, only: active_set_t, find_span
   use hc_frame_rows, only: plane_row
@@ -48,7 +48,8 @@ contains
     type(friction_iterate_t), intent(in) :: now
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy
     real(wp) :: total(3, now%problem%own_rows()), sums(3), unit, scale
-    integer :: zone(now%problem%lattice%extent(1)), n, n_col, row, from, to, k
+    integer(zk) :: zone(now%problem%lattice%extent(1))
+    integer :: n, n_col, row, from, to, k
 
     r = shear_parameter(now)
     if (.not. (now%problem%lattice%is_periodic() .and. now%problem%friction%is_bounded())) return
@@ -89,7 +90,7 @@ contains
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical(lk), allocatable, intent(out) :: active(:)
     !> Zones of the nodes in contact
-    integer, allocatable :: zone(:)
+    integer(zk), allocatable :: zone(:)
     real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy, bound, ahead, aside
     real(wp) :: r, p_max, soft
     integer :: n, k, i, from, to, at, last, m
@@ -158,7 +159,8 @@ contains
   !> Put the tractions of the slipping nodes of a row on the boundary of the admissible ones, with a start across.
   pure subroutine put_on_boundary(n, zone, direction, ahead, aside, stiff, qx, qy)
     !> Number of nodes, and their zones
-    integer, intent(in) :: n, zone(n)
+    integer, intent(in) :: n
+    integer(zk), intent(in) :: zone(n)
     !> Directions e; components of the boundary along e and across [Pa]
     real(wp), intent(in) :: direction(2, n), ahead(n), aside(n)
     !> The spring of a node is stiff: its component across is left as a start

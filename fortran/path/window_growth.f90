@@ -3,7 +3,7 @@
 !> The nodes of a window stay those of the larger one. Where nothing was solved before, gap and relative displacement follow
 !> from the tractions and the rigid motions, and nothing has slipped.
 module hc_window_growth
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
@@ -131,7 +131,7 @@ contains
       where (.not. problem%candidate) extended%gap = 0.0_wp
       allocate (zone, source=0.0_wp*extended%gap)
       call put_field(real(state%zone, wp), zone)
-      extended%zone = nint(zone)
+      extended%zone = nint(zone, zk)
       do m = 1, 2
         call put_field(state%relative_displacement(:, :, m), extended%relative_displacement(:, :, m))
       end do

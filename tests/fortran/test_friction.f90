@@ -2,7 +2,7 @@
 module test_friction
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_invalid, ieee_get_halting_mode, &
     ieee_set_halting_mode
-  use hc_precision, only: wp, pi, lk
+  use hc_precision, only: wp, pi, lk, zk
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
@@ -84,28 +84,29 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: e(2), compliance
     real(wp), parameter :: r(3) = [0.01_wp, 1.0_wp, 300.0_wp]
-    integer :: zone, i
+    integer :: i
+    integer(zk) :: zone
 
     ! d = (1, 0) - 10 (0.05, 0) = (0.5, 0), inside of the radius 2
     call linearize([1.0_wp, 0.0_wp], [0.05_wp, 0.0_wp], 2.0_wp, 9.0_wp, 10.0_wp, zone, e, compliance)
-    call check(error, zone, stick, 'inside')
+    call check(error, int(zone), int(stick), 'inside')
     if (allocated(error)) return
     call check(error, [e, compliance], [1.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'direction and compliance in stick')
     if (allocated(error)) return
     ! on the rim of the disc without slip: stick
     call linearize([0.0_wp, 2.0_wp], [0.0_wp, 0.0_wp], 2.0_wp, 9.0_wp, 10.0_wp, zone, e, compliance)
-    call check(error, zone, stick, 'on the rim')
+    call check(error, int(zone), int(stick), 'on the rim')
     if (allocated(error)) return
     ! d = (1, 1) - 10 (-0.2, -0.3) = (3, 4): D = (5 - 2)/(10*2)
     call linearize([1.0_wp, 1.0_wp], [-0.2_wp, -0.3_wp], 2.0_wp, 9.0_wp, 10.0_wp, zone, e, compliance)
-    call check(error, zone, slip, 'outside')
+    call check(error, int(zone), int(slip), 'outside')
     if (allocated(error)) return
     call check(error, [e, compliance], [0.6_wp, 0.8_wp, 0.15_wp], 1.0e-15_wp, 'direction and compliance in slip')
     if (allocated(error)) return
     ! a slip of 0.1 against the traction (1.2, 1.6) of length mu p = 2
     do i = 1, 3
       call linearize([1.2_wp, 1.6_wp], [-0.06_wp, -0.08_wp], 2.0_wp, 2.0_wp, r(i), zone, e, compliance)
-      call check(error, zone, slip, 'slip at the solution')
+      call check(error, int(zone), int(slip), 'slip at the solution')
       if (allocated(error)) return
       call check(error, [e, compliance], [0.6_wp, 0.8_wp, 0.05_wp], 1.0e-14_wp, 'D = |ds|/(mu p) at the solution')
       if (allocated(error)) return
@@ -115,17 +116,17 @@ contains
     call check(error, compliance*5.0e-12_wp, 1.0_wp, 1.0e-12_wp, 'compliance without pressure')
     if (allocated(error)) return
     call linearize([1.0e200_wp, 0.0_wp], [-1.0e200_wp, 0.0_wp], 1.0e200_wp, 1.0e200_wp, 1.0_wp, zone, e, compliance, no_slip=.true.)
-    call check(error, zone, stick, 'never slip under an infinite coefficient')
+    call check(error, int(zone), int(stick), 'never slip under an infinite coefficient')
   end subroutine test_linearize
 
   !> Linearise the law at a node.
   subroutine linearize(traction, slip_increment, bound, largest_bound, r, zone, direction, compliance, no_slip)
     real(wp), intent(in) :: traction(2), slip_increment(2), bound, largest_bound, r
-    integer, intent(out) :: zone
+    integer(zk), intent(out) :: zone
     real(wp), intent(out) :: direction(2), compliance
     logical, intent(in), optional :: no_slip
     type(coulomb_t) :: law
-    integer :: zones(1)
+    integer(zk) :: zones(1)
     real(wp) :: directions(2, 1), compliances(1)
 
     law = coulomb_t(1.0_wp, present(no_slip))
@@ -354,7 +355,7 @@ contains
       displacement(2, 1, 3) = 0.7_wp - merge(0.9e-8_wp, 1.1e-8_wp, i == 1)*5.0_wp*1.5_wp*sqrt(3.0_wp)*log(3.0_wp)
       call take(displacement)
       call problem%complete_state(target, 1.0e-8_wp, reference, state)
-      call check(error, state%zone(2, 1), merge(stick, slip, i == 1), 'zone of a node that hardly moves')
+      call check(error, int(state%zone(2, 1)), int(merge(stick, slip, i == 1)), 'zone of a node that hardly moves')
       if (allocated(error)) return
     end do
 
@@ -365,7 +366,7 @@ contains
     call problem%complete_state(target, 0.0_wp, reference, state)
     call check(error, state%slip_increment(2, 1, :), [0.0_wp, 0.0_wp], 0.0_wp, 'no slip')
     if (allocated(error)) return
-    call check(error, state%zone(2, 1), stick, 'zone of a node that does not move')
+    call check(error, int(state%zone(2, 1)), int(stick), 'zone of a node that does not move')
     if (allocated(error)) return
     state%traction(2, 1, 2) = 2.0_wp
 

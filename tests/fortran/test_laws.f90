@@ -1,6 +1,6 @@
 !> Laws of friction that the core does not know, how nodes are fixed, and parts of the window.
 module test_laws
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp, lk, zk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t
@@ -161,7 +161,7 @@ contains
   subroutine test_fixed_nodes(error)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: compliance(10)
-    integer :: zone(10)
+    integer(zk) :: zone(10)
 
     compliance = [8.0_wp, 0.0_wp, 2.0_wp, 7.0_wp, huge(1.0_wp), 1.0_wp, 3.0_wp, 5.0_wp, 0.0_wp, 4.0_wp]
     zone = slip
@@ -267,7 +267,7 @@ contains
     integer, intent(in) :: first
     real(wp), intent(in) :: unit, r
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
-    integer, intent(out), contiguous :: zone(:)
+    integer(zk), intent(out), contiguous :: zone(:)
     call self%unit_law%find_zones(first, unit, r, self%coefficient(first:first + size(p) - 1)*p, qx, qy, dsx, dsy, zone)
   end subroutine find_zones
 
@@ -296,7 +296,7 @@ contains
     real(wp), intent(in) :: p_max, r
     logical, intent(in), contiguous :: in_contact(:)
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
-    integer, intent(out), contiguous :: zone(:)
+    integer(zk), intent(out), contiguous :: zone(:)
     real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
     call self%unit_law%linearize(first, self%strength(p_max)*p_max, r, in_contact, self%coefficient(first:first + size(p) - 1)*p, &
                                  qx, qy, dsx, dsy, zone, direction, compliance)

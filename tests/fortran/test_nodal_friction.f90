@@ -1,7 +1,7 @@
 !> Friction that differs from node to node, and a bound of the shear traction.
 module test_nodal_friction
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use hc_precision, only: wp
+  use hc_precision, only: wp, zk
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
@@ -38,7 +38,7 @@ contains
   !> Set the coefficients of a step by the zones before it.
   pure subroutine remember(self, zone)
     class(kinetic_t), intent(inout) :: self
-    integer, intent(in) :: zone(:, :)
+    integer(zk), intent(in) :: zone(:, :)
     self%coefficient = reshape(merge(outer, inner, zone == slip), [size(zone)])
   end subroutine remember
 

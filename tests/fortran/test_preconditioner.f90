@@ -240,7 +240,7 @@ contains
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
     self%spring = spread(0.0_wp, 1, size(active))
-    if (present(direction)) self%spring = [compliance, self%spring]
+    if (present(direction)) self%spring = [unpack(compliance, logical(active), 0.0_wp), self%spring]
   end subroutine set_active
 
   subroutine apply_packed(self, nodes, n, displacement, traction, work)

@@ -1,7 +1,7 @@
 !> Fields and packed ones: whatever the number of threads, the same bits.
 module test_vectors
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
-  use hc_precision, only: wp, sp, lk
+  use hc_precision, only: wp, sp, lk, zk
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
@@ -255,7 +255,8 @@ contains
     type(coulomb_t) :: law
     real(wp), dimension(n) :: p, qx, qy, dsx, dsy, compliance
     real(wp) :: direction(2, n), d(2), e(2), spring
-    integer :: zone(n), expected, i
+    integer(zk) :: zone(n), expected
+    integer :: i
     logical :: contact(n)
 
     p = 1.0e9_wp*sample(n)
@@ -367,7 +368,8 @@ contains
     real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp, compliance = 3.0e-13_wp
     type(coulomb_t), parameter :: law = coulomb_t(mu)
     real(wp), dimension(n) :: p, qx, qy, dsx, dsy, cut_x, cut_y
-    integer :: zone(n), expected, i
+    integer(zk) :: zone(n), expected
+    integer :: i
     real(wp) :: unit, largest, worst, q(2), ds(2), cut(2), lack
 
     p = 1.0e9_wp*sample(n)

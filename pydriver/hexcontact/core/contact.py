@@ -326,7 +326,7 @@ class Contact(Handle):
         """Return the solution behind a handle, with views of its fields."""
         held = HeldState(handle, self.own.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
-        found |= {"zone": held.view("zone").astype(np.int8), "stopped": STOPPED[found["stopped"]]}
+        found |= {"zone": held.view("zone"), "stopped": STOPPED[found["stopped"]]}
         names = [field.name for field in fields(kind)]
         found |= {name: held.view(name) for name in names if name not in found}
         return kind(**{name: found[name] for name in names}).behind(held)

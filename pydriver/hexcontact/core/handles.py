@@ -58,7 +58,7 @@ class HeldState:
         return self._array(name, owner)
 
     def _array(self, name: str, owner: Any) -> NDArray[Any]:
-        number, kind = (ctypes.c_int, "i4") if name == "zone" else (ctypes.c_double, "f8")
+        number, kind = (ctypes.c_int8, "i1") if name == "zone" else (ctypes.c_double, "f8")
         memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
         memory.held = owner
         return np.frombuffer(memory, dtype=kind).reshape(self.shape)

@@ -355,6 +355,7 @@ contains
       if (size(c%multiplier) > n_shear) now%motion(normal) = c%multiplier(n_shear + 1)
       ! fields go as soon as they are copied: a window is too large for two of each
       c = constraints_t()
+      call give_back(3*n)
       now%p = x(:n)
       call system%add_slope(now%p, x(2*n + 1:))
       call system%add_tilt(1.0_wp, now%p, ax(n + 1:2*n))

@@ -61,8 +61,8 @@ contains
 
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
-    !> Residual without its weights, and the one that becomes the next; in its memory also a direction and its product
-    real(wp), allocatable :: r(:), w(:)
+    !> The residual that becomes the next; in its memory also a direction and its product
+    real(wp), allocatable :: w(:)
     type(active_set_t) :: others
     !> A product over all nodes, and memory for it where the system has none
     real(wp), pointer, contiguous :: image(:)
@@ -107,6 +107,7 @@ contains
     !> Compute the weighted residual of the start, the first direction.
     subroutine begin()
       type(active_set_t) :: of_part
+      real(wp), allocatable :: r(:)
       real(wp) :: unit(size(along))
       integer :: i, part
 
@@ -151,18 +152,17 @@ contains
       g(1) = began
       h = 0.0_wp
       do k = 1, most
+        if (stat == 0) call find_direction(k, stat)
+        if (allocated(error)) return
         if (stat == 0 .and. .not. allocated(basis(k)%beyond)) then
           call give_back(size(ax))
-          allocate (basis(k)%beyond(others%n_active), basis(k)%rounded_mr(merge(nodes%n_active, 0, iteration%single)), &
-                    basis(k)%mr(merge(0, nodes%n_active, iteration%single)), stat=stat)
+          allocate (basis(k)%beyond(others%n_active), stat=stat)
         end if
         if (stat == 0) call system%take_image(size(ax), own, image, stat)
         if (stat /= 0) then
           call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
           return
         end if
-        call find_direction(k)
-        if (allocated(error)) return
         call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
         call nodes%pack(image, w)
@@ -234,10 +234,21 @@ contains
     end subroutine add_residual
 
     !> Compute a direction.
-    subroutine find_direction(k)
+    subroutine find_direction(k, stat)
       !> Its number
       integer, intent(in) :: k
+      !> Not zero: there is not enough memory
+      integer, intent(out) :: stat
+      !> Residual without its weights
+      real(wp), allocatable :: r(:)
 
+      stat = 0
+      if (.not. allocated(basis(k)%beyond)) then
+        allocate (basis(k)%rounded_mr(merge(nodes%n_active, 0, iteration%single)), &
+                  basis(k)%mr(merge(0, nodes%n_active, iteration%single)), stat=stat)
+      end if
+      if (stat == 0) allocate (r(nodes%n_active), stat=stat)
+      if (stat /= 0) return
       if (iteration%single) then
         r = basis(k)%rounded
       else

@@ -43,8 +43,8 @@ module hc_shear_preconditioner
     integer, private :: n_row = 0
     !> Direction e of each node in contact
     real(wp), pointer, contiguous :: direction(:, :) => null()
-    !> Shares a and f of each node in contact
-    real(sp), allocatable :: own(:), far(:)
+    !> Compliance D of its spring [m/Pa]
+    real(wp), pointer, contiguous :: compliance(:) => null()
     !> Some node slips
     logical :: slips = .false.
     !> Nodes in contact; those that slip, and those near them that stick; both together, and the others
@@ -92,29 +92,23 @@ contains
     logical(lk), intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
     logical(lk), allocatable :: slips(:)
-    real(wp) :: ratio
-    integer :: i, k, at
+    integer :: i, k
     logical :: known
 
     self%direction => direction
-    known = allocated(self%own)
+    self%compliance => compliance
+    known = allocated(self%edge)
     if (known) known = self%nodes%is_set(active)
     known = all_know(self, known)
     if (.not. known) then
       call self%continue_beyond(self%extent, active)
       call new_active_set(self%nodes, active, self%space)
-      if (allocated(self%own)) deallocate (self%own, self%far)
-      allocate (self%own(self%nodes%n_active), self%far(self%nodes%n_active))
     end if
     allocate (slips(size(active)), source=.false._lk)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, ratio)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
-        at = self%nodes%place(k) + i - self%nodes%first(k)
-        ratio = compliance(at)/self%elastic_compliance
-        self%own(at) = real(self%options%short_waves/(self%options%short_waves + ratio), sp)
-        self%far(at) = real(self%options%long_waves/(self%options%long_waves + ratio), sp)
-        slips(i) = compliance(at) > 0.0_wp
+        slips(i) = compliance(self%nodes%place(k) + i - self%nodes%first(k)) > 0.0_wp
       end do
     end do
     !$omp end parallel do
@@ -266,9 +260,14 @@ contains
     !> Traction of the springs
     real(wp), intent(out), contiguous :: rest(:)
     real(wp) :: waves, stiffness, displacement
+    real(sp) :: own
     integer :: i, m, pass
 
-    rest = self%far*across
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+    do i = 1, size(across)
+      rest(i) = share(self%options%long_waves, self%compliance(i)/self%elastic_compliance)*across(i)
+    end do
+    !$omp end parallel do simd
     call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e, 1.0_wp/self%unit)
     ! without the average: the mean has to be symmetric
     do m = 1, 2
@@ -281,11 +280,12 @@ contains
     call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest)
     waves = 1.0_wp - self%options%short_waves/self%options%long_waves
     stiffness = self%unit/(self%options%short_waves*self%elastic_compliance)
-    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(displacement)
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(displacement, own)
     do i = 1, size(across)
       displacement = across(i)
-      across(i) = self%own(i)*displacement + (1.0_wp - self%own(i))*(waves*rest(i))
-      rest(i) = self%own(i)*stiffness*(displacement - waves*rest(i))
+      own = share(self%options%short_waves, self%compliance(i)/self%elastic_compliance)
+      across(i) = own*displacement + (1.0_wp - own)*(waves*rest(i))
+      rest(i) = own*stiffness*(displacement - waves*rest(i))
     end do
     !$omp end parallel do simd
   end subroutine share_out
@@ -300,13 +300,15 @@ contains
     !> Traction y of the bodies, then the sum, along t and e at the active nodes
     real(wp), intent(inout), contiguous :: along_t(:), along_e(:)
     real(wp) :: waves, both
+    real(sp) :: own
     integer :: i, pass
 
     waves = 1.0_wp - self%options%short_waves/self%options%long_waves
-    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(both)
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(both, own)
     do i = 1, size(rest)
-      both = self%own(i)*along_t(i) + (1.0_wp - self%own(i))*rest(i)
-      rest(i) = (1.0_wp - self%own(i))*waves*(along_t(i) - rest(i))
+      own = share(self%options%short_waves, self%compliance(i)/self%elastic_compliance)
+      both = own*along_t(i) + (1.0_wp - own)*rest(i)
+      rest(i) = (1.0_wp - own)*waves*(along_t(i) - rest(i))
       along_t(i) = both
     end do
     !$omp end parallel do simd
@@ -318,10 +320,18 @@ contains
     call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e)
     !$omp parallel do simd schedule(static) num_threads(self%space%threads)
     do i = 1, size(rest)
-      along_t(i) = along_t(i) + self%far(i)*rest(i)
+      along_t(i) = along_t(i) + share(self%options%long_waves, self%compliance(i)/self%elastic_compliance)*rest(i)
     end do
     !$omp end parallel do simd
   end subroutine collect
+
+  !> Compute the share of the bodies in a displacement, a of short waves or f of long ones.
+  pure real(sp) function share(waves, ratio)
+    !> Compliance of the waves over that of a node, and that of its spring
+    real(wp), intent(in) :: waves, ratio
+
+    share = real(waves/(waves + ratio), sp)
+  end function share
 
   !> Average the field over each node and its six neighbors at some steps, on the nodes near slip.
   subroutine average(self, step)
@@ -449,9 +459,9 @@ contains
     type(active_set_t) :: none
 
     self%direction => null()
+    self%compliance => null()
     if (allocated(self%edge)) deallocate (self%edge)
     if (allocated(self%front)) deallocate (self%front)
-    if (allocated(self%own)) deallocate (self%own, self%far)
     self%slipping = none
   end subroutine clear_sheared
 

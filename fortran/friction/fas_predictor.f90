@@ -8,6 +8,7 @@
 module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_memory, only: give_back
   use hc_contact_state, only: contact_state_t, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_operator_set, only: operators_t
@@ -76,6 +77,7 @@ contains
         ! fields of the coarse lattice take as much memory as one of the window
         deallocate (displacement, origin, before%gap, before%relative_displacement, after%gap, after%relative_displacement, &
                     after%slip_increment, after%accumulated_slip, after%dissipation_density)
+        call give_back(problem%own_size())
         call add_change(model, before, after, problem, guess)
         if (.not. allocated(estimate)) call find_displacements(problem, start, estimate)
         call add_displacement(model, moved, problem, estimate)

@@ -152,17 +152,17 @@ contains
     n_shear = max(n_force - 1, 1)
     ! all that GMRES may store but one, since mostly a few are enough
     directions = options%max_directions - 1
-    ! iterate without shear traction; shear system
-    everywhere = 4*field + mark + 3*field
-    ! packed: traction estimates; weights of the preconditioner of the shear traction, its vector in the frames; its fields
+    ! iterate without shear traction
+    everywhere = 4*field + mark
+    ! packed: frames and their compliances; traction estimates; a vector of the preconditioner of the shear traction, whose fields
     ! are in the memory of the transforms
-    inside = (1 + 2*n_shear)*half + 2*half + field
+    inside = 3*field + (1 + 2*n_shear)*half + field
     if (coupled) then
-      ! slope; product of the unknowns; those of all directions off the contact; without pressure and displacements of the iterate
-      everywhere = everywhere + (1 + 3 - 4)*field + 3*directions*half
-      ! packed, where half of the nodes stick: unknowns and two residuals; both of all directions, without the products there;
+      ! product of the unknowns; those of all directions off the contact; without pressure and displacements of the iterate
+      everywhere = everywhere + (3 - 4)*field + 3*directions*half
+      ! packed, where half of the nodes stick: slope; unknowns and a residual; both of all directions, without the products there;
       ! constraints with their estimates, and their rows for the pressure
-      inside = inside + 5*3*field/2 + 5*(directions + 1)*half/2 + n_shear*(3*field + 2*half) + half
+      inside = inside + field + 5*2*field/2 + 5*(directions + 1)*half/2 + n_shear*(3*field + 2*half) + half
     else
       ! packed: shear traction, vectors of conjugate gradients, constraints with their estimates
       inside = inside + 2*(1 + 3)*field + 2*n_shear*(field + half)

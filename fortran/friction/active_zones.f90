@@ -11,7 +11,7 @@ module hc_active_zones
   implicit none
   private
 
-  public :: linearize_law, shear_parameter, classify, find_constraints, find_prescribed_displacement
+  public :: linearize_law, shear_parameter, classify, find_constraints, find_constraint, find_prescribed_displacement
 
 contains
 
@@ -190,29 +190,44 @@ contains
     real(wp), allocatable, intent(out) :: constraint(:, :)
     !> Loads less those of the present traction, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
-    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
-    integer :: n_t, k, run, from, m, at
+    integer :: k
 
-    n_t = nodes%pairs%n_first
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, m, at)
-      do run = 1, size(nodes%pairs%first)
-        from = nodes%pairs%first(run)
-        m = nodes%pairs%last(run) - from + 1
-        call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
-        at = nodes%pairs%place(run)
-        ! into the frames, which takes the same reflection as out of them
-        call plane_row(m, now%shear%direction(:, at:at + m - 1), ux, uy, constraint(at:at + m - 1, k), across)
-        if (nodes%pairs%second(run) == 0) cycle
-        at = n_t + nodes%pairs%second(run)
-        constraint(at:at + m - 1, k) = across(:m)
-      end do
-      !$omp end parallel do
+      call find_constraint(now, nodes, driven, k, constraint(:, k))
       missing(k) = driven%load(k, now%problem, now%target) - carried_load(now, driven, k)
     end do
   end subroutine find_constraints
+
+  !> Find the constraint vector of one of the loads.
+  subroutine find_constraint(now, nodes, driven, k, constraint)
+    !> Iterate
+    type(friction_iterate_t), intent(in) :: now
+    !> Unknowns, in the frames (of 2 n)
+    type(active_set_t), intent(in) :: nodes
+    !> Motions that are driven by their loads, and which of them
+    type(driven_motions_t), intent(in) :: driven
+    integer, intent(in) :: k
+    !> Constraint vector at the unknowns (n_active)
+    real(wp), intent(inout), contiguous :: constraint(:)
+    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
+    integer :: run, from, m, at
+
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, m, at)
+    do run = 1, size(nodes%pairs%first)
+      from = nodes%pairs%first(run)
+      m = nodes%pairs%last(run) - from + 1
+      call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
+      at = nodes%pairs%place(run)
+      ! into the frames, which takes the same reflection as out of them
+      call plane_row(m, now%shear%direction(:, at:at + m - 1), ux, uy, constraint(at:at + m - 1), across)
+      if (nodes%pairs%second(run) == 0) cycle
+      at = nodes%pairs%n_first + nodes%pairs%second(run)
+      constraint(at:at + m - 1) = across(:m)
+    end do
+    !$omp end parallel do
+  end subroutine find_constraint
 
   !> Compute the load of the present shear traction along a motion, over the cell area [Pa].
   real(wp) function carried_load(now, driven, k)

@@ -25,12 +25,12 @@ module hc_coupled_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: linearize_law, classify, find_constraints, find_constraint, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
   use hc_active_set, only: active_set_t, new_active_set
-  use hc_linear_system, only: constraints_t, iteration_t, step_ahead
+  use hc_linear_system, only: constraints_t, constraint_source_t, iteration_t, step_ahead
   use hc_projected_gmres, only: projected_gmres
   implicit none
   private
@@ -53,6 +53,14 @@ module hc_coupled_newton
   contains
     procedure :: determined
   end type coupled_step_t
+
+  !> Loads that drive motions, as rows and columns of a step.
+  type, extends(constraint_source_t) :: driving_loads_t
+    type(friction_iterate_t), pointer :: now => null()
+    type(coupled_step_t), pointer :: step => null()
+  contains
+    procedure :: find => find_load
+  end type driving_loads_t
 
 contains
 
@@ -197,36 +205,24 @@ contains
   !> Set the prescribed loads as constraints: loads as rows A B^T E, motions as columns E_t^T B, and M B.
   subroutine constrain(now, step, missing, error)
     !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout), target :: now
     !> The step
     type(coupled_step_t), intent(inout), target :: step
     !> Loads less those of the start, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy
-    real(wp), allocatable :: ones(:, :)
+    real(wp), allocatable :: ones(:, :), columns(:, :)
     real(sp), allocatable :: punch(:, :)
-    integer :: k, run, m, from, to
 
     associate (c => step%constraints, pressed => now%shear%nodes)
       c%n_before = pressed%n_active
-      call find_constraints(now, step%sheared, step%driven, c%columns, missing)
+      call find_constraints(now, step%sheared, step%driven, columns, missing)
       c%multiplier = step%driven%multipliers(now%motion)
-      call find_rigid_traction(now, step%sheared, c%columns, .false., c%mb, error)
+      call find_rigid_traction(now, step%sheared, columns, .false., c%mb, error)
       if (allocated(error)) return
-      ! the traction mu p e belongs to the pressure
-      allocate (c%rows(pressed%n_active, size(missing)))
-      do k = 1, size(missing)
-        do run = 1, size(pressed%first)
-          from = pressed%place(run)
-          m = pressed%last(run) - pressed%first(run) + 1
-          to = from + m - 1
-          call step%driven%direction_row(k, now%problem, pressed%first(run), ux(:m), uy(:m))
-          c%rows(from:to, k) = step%system%slope(from:to)*(now%shear%direction(1, from:to)*ux(:m) &
-                                                           + now%shear%direction(2, from:to)*uy(:m))
-        end do
-      end do
+      deallocate (columns)
+      c%source = driving_loads_t(now, step)
       if (now%target%control(normal) /= force_control) return
       missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()]
       c%multiplier = [c%multiplier, now%motion(normal)]
@@ -236,6 +232,30 @@ contains
       c%of_sum = punch(:, 1)
     end associate
   end subroutine constrain
+
+  !> Compute row and column of a load; the traction mu p e belongs to the pressure.
+  subroutine find_load(self, k, column, row)
+    class(driving_loads_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(wp), intent(inout), contiguous :: column(:)
+    real(wp), intent(inout), contiguous, optional :: row(:)
+    real(wp), dimension(self%now%problem%lattice%extent(1)) :: ux, uy
+    integer :: run, m, from, to
+
+    call find_constraint(self%now, self%step%sheared, self%step%driven, k, column)
+    if (.not. present(row)) return
+    associate (now => self%now, pressed => self%now%shear%nodes, direction => self%now%shear%direction)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, m, from, to)
+      do run = 1, size(pressed%first)
+        from = pressed%place(run)
+        m = pressed%last(run) - pressed%first(run) + 1
+        to = from + m - 1
+        call self%step%driven%direction_row(k, now%problem, pressed%first(run), ux(:m), uy(:m))
+        row(from:to) = self%step%system%slope(from:to)*(direction(1, from:to)*ux(:m) + direction(2, from:to)*uy(:m))
+      end do
+      !$omp end parallel do
+    end associate
+  end subroutine find_load
 
   !> Solve (F7) by GMRES, preconditioned block by block and projected as in (F11).
   subroutine solve(now, step, error)

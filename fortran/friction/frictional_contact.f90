@@ -160,9 +160,9 @@ contains
     if (coupled) then
       ! product of the unknowns; those of all directions off the contact; without pressure and displacements of the iterate
       everywhere = everywhere + (3 - 4)*field + 3*directions*half
-      ! packed, where half of the nodes stick: slope; unknowns and a residual; both of all directions, without the products there;
-      ! constraints with their estimates, and their rows for the pressure
-      inside = inside + field + 5*2*field/2 + 5*(directions + 1)*half/2 + n_shear*(3*field + 2*half) + half
+      ! packed, where half of the nodes stick: slope; unknowns and two residuals; both of all directions, without the products
+      ! there; estimates of the constraints
+      inside = inside + field + 5*3*field/2 + 5*(directions + 1)*half/2 + n_shear*2*half + half
     else
       ! packed: shear traction, vectors of conjugate gradients, constraints with their estimates
       inside = inside + 2*(1 + 3)*field + 2*n_shear*(field + half)

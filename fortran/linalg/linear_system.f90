@@ -19,7 +19,7 @@ module hc_linear_system
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, constraints_t, iteration_t, precondition_constraints, step_ahead
+  public :: linear_system_t, constraints_t, constraint_source_t, iteration_t, precondition_constraints, step_ahead
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
@@ -42,6 +42,12 @@ module hc_linear_system
     procedure :: take_image
   end type linear_system_t
 
+  !> Vectors of constraints that are computed where they are used: a window is too large to store them.
+  type, abstract :: constraint_source_t
+  contains
+    procedure(constraint_vectors), deferred :: find
+  end type constraint_source_t
+
   !> Linear constraints on the unknowns (nodes, number of constraints, may be 0).
   type :: constraints_t
     !> Active nodes at whose unknowns B and M B are zero, the first ones
@@ -52,6 +58,8 @@ module hc_linear_system
     real(sp), allocatable :: mb(:, :)
     !> C at the first active nodes, as far as it is not B
     real(wp), allocatable :: rows(:, :)
+    !> Source of both instead, if it is there
+    class(constraint_source_t), allocatable :: source
     !> M B of one more constraint, the last: the sum of the unknowns at the nodes before
     real(sp), allocatable :: of_sum(:)
     !> Multipliers m
@@ -103,6 +111,20 @@ module hc_linear_system
       !> Allocated on failure
       type(error_t), allocatable, intent(out) :: error
     end subroutine linear_map
+  end interface
+
+  abstract interface
+    !> Compute the vectors of a constraint.
+    subroutine constraint_vectors(self, k, column, row)
+      import :: constraint_source_t, wp
+      class(constraint_source_t), intent(in) :: self
+      !> Its number
+      integer, intent(in) :: k
+      !> B at the active nodes after the first ones
+      real(wp), intent(inout), contiguous :: column(:)
+      !> C at these
+      real(wp), intent(inout), contiguous, optional :: row(:)
+    end subroutine constraint_vectors
   end interface
 
   !> Pivot of the scaled constraints below which they count as dependent.
@@ -297,11 +319,16 @@ contains
   pure integer function number(self)
     class(constraints_t), intent(in) :: self
 
-    number = size(self%columns, 2) + merge(1, 0, allocated(self%of_sum))
+    number = merge(1, 0, allocated(self%of_sum))
+    if (allocated(self%source)) then
+      number = number + size(self%mb, 2)
+    else
+      number = number + size(self%columns, 2)
+    end if
   end function number
 
   !> Add x <- x + B factor.
-  subroutine add_columns(self, space, factor, x)
+  subroutine add_columns(self, space, factor, x, work)
     class(constraints_t), intent(in) :: self
     !> Space of the fields
     type(field_space_t), intent(in) :: space
@@ -309,10 +336,24 @@ contains
     real(wp), intent(in) :: factor(:)
     !> Values at the active nodes
     real(wp), intent(inout), contiguous :: x(:)
-    integer :: i
+    !> Memory for a column of a source, as long as x; absent: own one
+    real(wp), intent(inout), contiguous, optional, target :: work(:)
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: column(:, :)
+    integer :: i, m
 
     associate (n => self%n_before)
-      call space%add_columns(self%columns, factor(:size(self%columns, 2)), x(n + 1:))
+      if (allocated(self%source)) then
+        if (.not. present(work)) allocate (own(size(x)))
+        if (present(work)) column(1:size(x) - n, 1:1) => work
+        if (allocated(own)) column(1:size(x) - n, 1:1) => own
+        do m = 1, size(self%mb, 2)
+          call self%source%find(m, column(:, 1))
+          call space%add_columns(column, factor(m:m), x(n + 1:))
+        end do
+      else
+        call space%add_columns(self%columns, factor(:size(self%columns, 2)), x(n + 1:))
+      end if
       if (.not. allocated(self%of_sum)) return
       !$omp parallel do simd schedule(static) num_threads(space%threads)
       do i = 1, n
@@ -354,19 +395,32 @@ contains
   end subroutine add_mb
 
   !> Compute C^T x of values at the active nodes.
-  function resultants(self, space, x)
+  function resultants(self, space, x, work)
     class(constraints_t), intent(in) :: self
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> The values
     real(wp), intent(in), contiguous :: x(:)
+    !> Memory for the vectors of a source, as long as x; absent: own one
+    real(wp), intent(inout), contiguous, optional, target :: work(:)
     real(wp) :: resultants(self%number())
+    real(wp), allocatable, target :: own(:)
+    real(wp), pointer, contiguous :: vector(:)
     integer :: n, m
 
     n = self%n_before
     resultants = 0.0_wp
     if (allocated(self%rows)) n = size(self%rows, 1)
-    do m = 1, size(self%columns, 2)
+    if (allocated(self%source) .and. .not. present(work)) allocate (own(size(x)))
+    vector => null()
+    if (present(work)) vector => work
+    if (allocated(own)) vector => own
+    do m = 1, size(self%mb, 2)
+      if (allocated(self%source)) then
+        call self%source%find(m, vector(n + 1:), vector(:n))
+        resultants(m) = space%dot(vector(:n), x(:n)) + space%dot(vector(n + 1:), x(n + 1:), n)
+        cycle
+      end if
       resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
       if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
     end do

@@ -61,8 +61,8 @@ contains
 
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
-    !> The residual that becomes the next; in its memory also a direction and its product
-    real(wp), allocatable :: w(:)
+    !> Residual without its weights, and the one that becomes the next; in its memory also a direction and its product
+    real(wp), allocatable :: r(:), w(:)
     type(active_set_t) :: others
     !> A product over all nodes, and memory for it where the system has none
     real(wp), pointer, contiguous :: image(:)
@@ -107,7 +107,6 @@ contains
     !> Compute the weighted residual of the start, the first direction.
     subroutine begin()
       type(active_set_t) :: of_part
-      real(wp), allocatable :: r(:)
       real(wp) :: unit(size(along))
       integer :: i, part
 
@@ -130,7 +129,7 @@ contains
       call move_alloc(rhs, w)
       call nodes%pack(ax, r)
       w = w - r
-      call constraints%add_columns(space, constraints%multiplier, w)
+      call constraints%add_columns(space, constraints%multiplier, w, r)
       call weigh(iteration%weight, w)
       length = sqrt(space%dot(w, w))
       iteration%residual = length
@@ -167,7 +166,7 @@ contains
         if (allocated(error)) return
         call nodes%pack(image, w)
         call others%pack(image, basis(k)%beyond)
-        call constraints%add_columns(space, -share(:, k), w)
+        call constraints%add_columns(space, -share(:, k), w, r)
         call weigh(iteration%weight, w)
         do i = 1, k
           if (iteration%single) then
@@ -239,15 +238,12 @@ contains
       integer, intent(in) :: k
       !> Not zero: there is not enough memory
       integer, intent(out) :: stat
-      !> Residual without its weights
-      real(wp), allocatable :: r(:)
 
       stat = 0
       if (.not. allocated(basis(k)%beyond)) then
         allocate (basis(k)%rounded_mr(merge(nodes%n_active, 0, iteration%single)), &
                   basis(k)%mr(merge(0, nodes%n_active, iteration%single)), stat=stat)
       end if
-      if (stat == 0) allocate (r(nodes%n_active), stat=stat)
       if (stat /= 0) return
       if (iteration%single) then
         r = basis(k)%rounded
@@ -263,7 +259,7 @@ contains
       else
         basis(k)%mr = w
       end if
-      share(:, k) = -matmul(inverse, constraints%resultants(space, w))
+      share(:, k) = -matmul(inverse, constraints%resultants(space, w, r))
       call constraints%add_mb(space, share(:, k), w)
     end subroutine find_direction
 
@@ -290,7 +286,7 @@ contains
         call add_residual(-left(i), i)
       end do
       call weigh(1.0_wp/iteration%weight, w)
-      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w)
+      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w, r)
       call nodes%add(1.0_wp, w, ax)
       w = 0.0_wp
       call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), w)

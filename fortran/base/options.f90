@@ -86,7 +86,7 @@ module hc_options
     !> The same of the shear traction once residuals are small; a tighter one where shear does not act on the pressure, since
     !> Newton's method then converges faster
     real(wp) :: late_accuracy = 0.03_wp, uncoupled_accuracy = 1.0e-3_wp
-    !> The least of a coupled sweep, whose accuracy is that of the residuals before it, too
+    !> Least accuracy of a coupled sweep; it follows the residuals of the sweep before
     real(wp) :: coupled_accuracy = 1.0e-4_wp
     !> Accuracy of the last linear solution, relative to the tolerance; of the last pressure, which the shear traction still moves
     real(wp) :: final_accuracy = 0.8_wp, final_pressure = 0.2_wp

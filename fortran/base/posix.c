@@ -1,5 +1,4 @@
-/* What Fortran has no words for: locks between threads of any kind, memory before it is taken, and who may have
-   written a file. */
+/* Calls of the system that Fortran lacks: locks between threads, memory that is available, owners of files. */
 #include <errno.h>
 #include <fcntl.h>
 #ifdef __GLIBC__

@@ -86,7 +86,7 @@ module hc_spectrum_file
 
 contains
 
-  !> Return the name of the file of some kernels; others have the same by a rare chance only, which the head rules out.
+  !> Return the name of the file of some kernels; a name that two sets share by chance is told by the head.
   pure function file_name(key, maker) result(name)
     !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key

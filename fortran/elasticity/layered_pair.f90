@@ -335,7 +335,7 @@ contains
     largest_point = (1.0_wp + abs(self%largest_coupling))*self%largest_response
   end function largest_point
 
-  !> Return 0: the sum of the blocks xx and yy over that of the pressure is not the same at all distances.
+  !> Return 0: Kxx + Kyy is no multiple of the pressure block.
   pure real(wp) function trace(self)
     class(layered_pair_t), intent(in) :: self
     trace = 0.0_wp
@@ -522,7 +522,7 @@ contains
     if (size(block, 2) > 1) block(0, [2, 4]) = compliance(2)
   end subroutine column
 
-  !> Return the displacements by uniform tractions of one, normal and shear: finite on rigid bases, else none from mean planes
+  !> Return the mean displacements by unit tractions, normal and shear; 0 unless both bases are rigid
   !> [m/Pa].
   pure function uniform_compliance(pair) result(compliance)
     class(layered_pair_t), intent(in) :: pair

@@ -63,7 +63,7 @@ contains
     end if
     call cut(level, now, step_length, step_length*mean, part, punch)
     if (.not. level%space%total(part) > 0.0_wp) then
-      ! none of the pressure is left where it should be
+      ! all nodes were projected to p = 0
       now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
       part = count(now%active, dim=1)
     end if
@@ -92,7 +92,7 @@ contains
     type(normal_iterate_t), intent(inout) :: now
     !> Length of the step before the cut
     real(wp), intent(in) :: length
-    !> d^T K d of the last step, which d and its product are; 0: there is none
+    !> d^T K d; on entry d and K d are those of the last step. 0: there is none
     real(wp), intent(in) :: curved
     !> Fall of the energy along the step by its length, -g^T d; 0: much less than without the cut
     real(wp), intent(out) :: fall

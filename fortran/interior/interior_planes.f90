@@ -262,7 +262,7 @@ contains
       call repeat_history(self, traction, depth, field, error)
       return
     end if
-    ! of too many planes each would drop another one, and the surface, before it is used again
+    ! too many planes evict spectra, also of the surface, that are still needed
     kept => null()
     if (associated(cache)) then
       if (cache%holds(size(depth)*self%spectra_memory())) kept => cache

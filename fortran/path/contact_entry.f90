@@ -107,7 +107,7 @@ contains
       previous = correction
       entry = entry + correction - reshape(extrapolated(changes(:, :stored), corrections(:, :stored), reshape(correction, [n]), &
                                                         options%dependent_corrections), shape(entry))
-      ! nodes that have left again take nothing along
+      ! nodes that have left again have no slip at entry
       where (spread(state%pressure <= 0.0_wp, 3, 2)) entry = 0.0_wp
       from = state
     end do

@@ -98,7 +98,7 @@ contains
     from => state
     do
       call solve_part(solver, origin, from, between(state, goal, way%done + way%part), settings, at_once, next, error)
-      ! it is one of the whole step, and no second attempt begins with it
+      ! the guess holds for the whole step only
       if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
       way%work = way%work + next%operator_applications
@@ -115,12 +115,12 @@ contains
         now = next
         from => now
       else
-        ! where an attempt that failed has pressure means nothing
+        ! the contact of a failed attempt has no meaning
         next%clipped = .false.
         ! no path leads to loads that full sliding does not carry
         if (next%sliding .and. way%done + way%part >= 1.0_wp) exit
         if (way%cuts >= settings%max_cuts) then
-          ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
+          ! sub-steps become accepted states, no longer initial guesses, unless the load cannot be carried anyway
           if (settings%static .or. target%rolling%rolls() .or. .not. at_once .or. settings%max_cuts == 0 .or. next%sliding) exit
           at_once = .false.
           from => state

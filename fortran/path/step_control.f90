@@ -44,7 +44,7 @@ module hc_step_control
     real(wp) :: first = 0.5_wp
     !> Changes of stick area and tractions at the end of the last load step
     real(wp) :: stick = 0.0_wp, traction = 0.0_wp
-    !> Those of all steps, fading
+    !> The same as means over all steps, with decaying weights
     real(wp) :: past_stick = 0.0_wp, past_traction = 0.0_wp
     !> Sums over the steps: dissipated energy, and the part that is uncertain since tractions turn
     real(wp) :: spent = 0.0_wp, turned = 0.0_wp

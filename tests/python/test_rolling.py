@@ -433,7 +433,7 @@ def test_a_map_that_moves_is_the_dent_it_holds() -> None:
     np.testing.assert_allclose(mapped["max_pressure"], dent["max_pressure"], rtol=2e-3)
     np.testing.assert_allclose(mapped["creepage_x"], dent["creepage_x"], rtol=2e-2, atol=1e-6)
     deck["load"][1]["rolling"] = 8e-4
-    with pytest.raises(DeckError, match=r"body.1.surface: the contact of load step \d+ .*end"):
+    with pytest.raises(DeckError, match=r"body.1.surface.2: the contact of load step \d+ .*end"):
         Case.from_dict(deck).run()
 
 

@@ -107,7 +107,7 @@ def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
         (
             *(row["case"], row["quantity"], row["judge"]),
             *(number(row, row["judge"]), number(row, "computed")),
-            *(f"{row['difference']:+.1e}", f"{row['tolerance']:.0e}"),
+            *(f"{row['difference']:+.1e}", f"{row['tolerance']:.1e}"),
             "ok" if row["passed"] else "FAIL",
         )
         for row in rows

@@ -67,7 +67,7 @@ def in_background(
         except BaseException as error:
             raised.append(error)
         with contextlib.suppress(OSError):  # the waiting thread has ended
-            os.write(own, bytes([0]))  # is the number of no signal
+            os.write(own, bytes([0]))  # 0 is not the number of a signal
         os.close(own)
 
     # one heap for all threads: free memory of a second one does not go back to the system

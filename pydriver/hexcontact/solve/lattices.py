@@ -110,7 +110,7 @@ def refine(case: Problem, solver: InMemory | OnDisk) -> Refinement:
         limit = limit_of(case, levels[-1], solver.in_memory)
         if len(levels) < LEAST_LEVELS:
             if limit:
-                raise ResourceError(f"{limit}; errors cannot be told from fewer than {LEAST_LEVELS} lattices")
+                raise ResourceError(f"{limit}; estimates of errors need {LEAST_LEVELS} lattices")
             continue
         if not limit and not _meets(changes(levels[-2], levels[-1], case.load_steps), target):
             continue

@@ -15,7 +15,7 @@ module hc_communicator
   implicit none
   private
 
-  public :: communicator_t, rows_held, block_layout_t, start_ranks, end_ranks
+  public :: communicator_t, rows_held, block_layout_t, start_ranks, end_ranks, abort_ranks
 
   !> Ranks that work together; by default one alone.
   type :: communicator_t
@@ -64,6 +64,12 @@ module hc_communicator
     module subroutine end_ranks(ranks)
       type(communicator_t), intent(inout) :: ranks
     end subroutine end_ranks
+
+    !> End all ranks at once with an exit code; return without MPI.
+    module subroutine abort_ranks(ranks, code)
+      type(communicator_t), intent(in) :: ranks
+      integer, intent(in) :: code
+    end subroutine abort_ranks
 
     !> Sum the values of all ranks in their order.
     module function total(self, part)

@@ -14,6 +14,10 @@ contains
     ranks = communicator_t()
   end procedure end_ranks
 
+  !> This process goes on.
+  module procedure abort_ranks
+  end procedure abort_ranks
+
   !> Sum the values.
   module procedure total
     total = sum(part)

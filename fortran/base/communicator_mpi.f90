@@ -1,7 +1,7 @@
 !> Ranks of MPI.
 submodule (hc_communicator) hc_communicator_mpi
   use, intrinsic :: iso_c_binding, only: c_int, c_f_pointer
-  use mpi_f08, only: MPI_Allgather, MPI_Allreduce, MPI_Alltoallv, MPI_Alltoallw, MPI_Bcast, MPI_CHARACTER, MPI_Comm, &
+  use mpi_f08, only: MPI_Abort, MPI_Allgather, MPI_Allreduce, MPI_Alltoallv, MPI_Alltoallw, MPI_Bcast, MPI_CHARACTER, MPI_Comm, &
     MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_COMM_TYPE_SHARED, MPI_COMM_WORLD, &
     MPI_Datatype, MPI_DOUBLE_PRECISION, MPI_Finalize, MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_Get_count, MPI_IN_PLACE, &
     MPI_INFO_NULL, MPI_Init_thread, MPI_Initialized, MPI_INTEGER, MPI_INTEGER4, MPI_Iprobe, MPI_MAX, MPI_MIN, &
@@ -54,6 +54,11 @@ contains
     if (.not. over) call MPI_Finalize()
     ranks = communicator_t()
   end procedure end_ranks
+
+  !> End all ranks.
+  module procedure abort_ranks
+    call MPI_Abort(world(ranks), code)
+  end procedure abort_ranks
 
   !> Sum on the first rank, in the order of the ranks.
   module procedure total

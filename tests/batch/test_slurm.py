@@ -87,11 +87,16 @@ def test_a_requeued_run_resumes_to_the_bit(slurm: SlurmNode, folder: Path, scrip
     assert same(folder / "cattaneo_mindlin.nc", folder / "whole.nc")
 
 
-def test_the_signal_comes_before_the_time_limit(slurm: SlurmNode, folder: Path) -> None:
+@pytest.mark.parametrize("script", ["run.sh", "mpi.sh"])
+def test_the_signal_comes_before_the_time_limit(slurm: SlurmNode, folder: Path, script: str) -> None:
+    ranks = 1 + (script == "mpi.sh")
+    if ranks > 1 and "MPI: yes" not in flat.BUILT:
+        pytest.skip(USELESS)
     deck = folder.parent / "cattaneo_mindlin.toml"
     deck.write_text(deck.read_text().replace("steps = 27", "steps = 90000"))  # more than a minute's
     limit = ["--time=1", "--signal=USR1@58"]
-    job = slurm.submit(*requested(), *limit, "run.sh", deck, cwd=folder)
+    limit += ["--nodes=1", f"--ntasks-per-node={ranks}"]
+    job = slurm.submit(*requested(), *limit, script, deck, cwd=folder)
     wait_for(lambda: slurm.job(job).get("Restarts") == "1")
     slurm.command("scancel", job)
     slurm.wait(jobs=job)

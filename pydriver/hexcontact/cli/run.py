@@ -44,7 +44,7 @@ def run(
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with ranks.together() as first:
         if not first:
-            return None
+            raise SystemExit  # the first one prints
         with messages.logging(deck, *([output] if output else [])):
             case = frame.case_of(deck, settings)
             target = frame.target_of(case, deck, output)
@@ -82,7 +82,7 @@ def resume(
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     with ranks.together() as first:
         if not first:
-            return None
+            raise SystemExit  # the first one prints
         with messages.logging(file):
             return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
 

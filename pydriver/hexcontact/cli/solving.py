@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..core import ranks
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable, temporary_of
 from ..problem.preview import parameters_of
@@ -62,7 +62,7 @@ class Messages:
                 write_json(self.command, Report(message, signaled.exit_code).content())
             sys.stdout.flush()
             sys.stderr.flush()
-        os._exit(signaled.exit_code)
+        ranks.leave(signaled.exit_code)
 
     def conclude(
         self,

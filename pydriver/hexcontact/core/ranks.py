@@ -13,10 +13,11 @@ import os
 import pickle
 import signal
 import sys
+import threading
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +28,15 @@ from . import flat
 from .calls import status_of
 from .lattice import Lattice
 
-# Number of processes, by launcher: Open MPI, MPICH and its relatives, `srun`. Slurm sets SLURM_NTASKS in
-# scripts of a single process, too, SLURM_STEP_NUM_TASKS for processes of `srun` alone.
+# Variables with the number of processes and that of this one, by launcher: Open MPI, MPICH and its relatives,
+# `srun`. Slurm sets SLURM_NTASKS in scripts of a single process, too, SLURM_STEP_NUM_TASKS for processes of
+# `srun` alone.
 _COUNTS = {
-    "OMPI_COMM_WORLD_SIZE": "mpirun",
-    "PMI_SIZE": "mpirun",
-    "SLURM_STEP_NUM_TASKS": "srun",
+    "OMPI_COMM_WORLD_SIZE": ("OMPI_COMM_WORLD_RANK", "mpirun"),
+    "PMI_SIZE": ("PMI_RANK", "mpirun"),
+    "SLURM_STEP_NUM_TASKS": ("SLURM_PROCID", "srun"),
 }
+_PATIENCE = 5.0  # seconds in which a launcher ends all processes
 _WORD = np.dtype(np.int32).itemsize
 
 rank, count, on_node = 0, 1, 1  # this rank; ranks, and those on this machine
@@ -44,7 +47,7 @@ _forgotten: list[int] = []  # objects that the first rank has freed
 
 def _launched() -> tuple[int, str]:
     """Return how many processes a launcher started, and its name."""
-    for name, launcher in _COUNTS.items():
+    for name, (_, launcher) in _COUNTS.items():
         found = os.environ.get(name, "")
         if found.isdecimal() and int(found) > 1:
             return int(found), launcher
@@ -55,10 +58,25 @@ def refuse_copies(command: str) -> None:
     """Refuse to run a command as one of several copies: each of them would write the same file."""
     launched, launcher = _launched()
     if launched > 1:
-        raise DeckError(
+        _refuse(
             f"{launcher} started {launched} processes; expected one, since {command} does not use MPI. Start "
             f"it without {launcher}, and set OMP_NUM_THREADS to use more cores"
         )
+
+
+def _refuse(sentence: str) -> NoReturn:
+    """Raise an error on the first process of a launcher; end the others, so that it is printed once."""
+    if any(os.environ.get(number, "0") != "0" for number, _ in _COUNTS.values()):
+        raise SystemExit(DeckError.exit_code)
+    raise DeckError(sentence)
+
+
+def leave(code: int) -> NoReturn:
+    """End this process at once with an exit code, and all ranks with it."""
+    if count > 1:
+        threading.Timer(_PATIENCE, os._exit, [code]).start()
+        flat.kill_ranks(code)
+    os._exit(code)
 
 
 @contextlib.contextmanager
@@ -71,7 +89,7 @@ def together() -> Iterator[bool]:
         return
     rank, count, on_node = flat.begin_ranks()
     if count != launched:
-        raise DeckError(
+        _refuse(
             f"{launcher} started {launched} processes; expected one, since this build of hexcontact has no "
             f"MPI, or another than {launcher}. Start it without {launcher}, or install it with -Dmpi=enabled"
         )
@@ -181,7 +199,7 @@ def _serve_to_the_end() -> None:
         _serve()
     except BaseException as error:
         print(f"rank {rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
-        os._exit(HexcontactError.exit_code)
+        leave(HexcontactError.exit_code)
 
 
 def _serve() -> None:

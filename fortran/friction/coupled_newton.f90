@@ -349,6 +349,7 @@ contains
     call step%system%take_image(3*n, own, given, stat)
     if (stat == 0) allocate (rhs(step%nodes%n_active), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the tractions: choose a smaller window')
+    call step%system%space%agree(error)
     if (allocated(error)) return
     given(:n) = -now%h + merge(0.0_wp, now%motion(normal), now%target%control(normal) == force_control)
     if (allocated(now%pressure%offset)) given(:n) = given(:n) - now%pressure%offset

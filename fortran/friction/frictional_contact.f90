@@ -93,8 +93,8 @@ contains
       space = space_over(level%lattice%extent, n_threads)
       space%scratch => scratch
       space%ranks = level%space%ranks
-      level%space = space
       if (present(ranks) .and. space%ranks%size == 1) space%helpers = ranks%over(level%lattice%extent)
+      level%space = space
       call new_operators(operators, level%lattice, level%medium, space, error, cache, level%options%preconditioner, rounded)
     end subroutine prepare
 

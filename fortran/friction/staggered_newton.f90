@@ -457,6 +457,7 @@ contains
     call now%shear%take_image(n, own, given, stat)
     if (stat == 0) allocate (rhs(nodes%n_active), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    call now%shear%space%agree(error)
     if (allocated(error)) return
     call find_prescribed_displacement(now, given)
     call now%shear%add_rest(given)
@@ -606,10 +607,9 @@ contains
     if (size(mb, 2) == 0) return
     call now%shear%take_image(2*n, own, plane, stat)
     if (stat == 0 .and. .not. known) allocate (column(size(mb, 1)), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
-      return
-    end if
+    if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
+    call now%shear%space%agree(error)
+    if (allocated(error)) return
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)

@@ -6,6 +6,7 @@
 module hc_field_space
   use, intrinsic :: iso_c_binding, only: c_loc
   use hc_precision, only: wp, sp, lk
+  use hc_error, only: error_t
   use hc_communicator, only: communicator_t
   use hc_scratch, only: scratch_t
   !$ use omp_lib, only: omp_get_max_threads
@@ -51,6 +52,8 @@ module hc_field_space
     procedure :: count_positive
     !> Sum of values by row; largest values, in place
     procedure :: total, most, largest, number
+    !> Error of any rank on all of them
+    procedure :: agree
     !> First and last row of this rank, and the size of its part of a field
     procedure :: own_rows, own_extent
     !> Rows of a field over the window, wherever they lie
@@ -137,6 +140,15 @@ contains
     call self%ranks%add_counts(values)
     number = values(1)
   end function number
+
+  !> Take the error of the first rank that has one, on all ranks that share the window or its transforms.
+  subroutine agree(self, error)
+    class(field_space_t), intent(in) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    call self%ranks%agree(error)
+    call self%helpers%agree(error)
+  end subroutine agree
 
   !> Return the first and the last row of this rank.
   pure function own_rows(self, n_row) result(rows)

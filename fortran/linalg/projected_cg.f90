@@ -79,6 +79,7 @@ contains
     allocate (d(size(r)))
     call system%take_image(size(ax), own, onto, stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for a product: choose a smaller window')
+    call space%agree(error)
     if (allocated(error)) return
     iteration%made = 0
     iteration%outcome = iterations_used_up

@@ -141,27 +141,22 @@ contains
       !> Directions allowed
       integer, intent(in) :: most
       real(wp) :: rotated
-      integer :: i, k, stat
+      integer :: i, k
 
       directions = 0
       began = length
+      call take_memory(1)
+      if (allocated(error)) return
       w = w/length
-      call keep(1, stat)
+      call keep(1)
       g = 0.0_wp
       g(1) = began
       h = 0.0_wp
       do k = 1, most
-        if (stat == 0) call find_direction(k, stat)
+        if (.not. allocated(basis(k)%beyond)) call take_memory(k)
         if (allocated(error)) return
-        if (stat == 0 .and. .not. allocated(basis(k)%beyond)) then
-          call give_back(size(ax))
-          allocate (basis(k)%beyond(others%n_active), stat=stat)
-        end if
-        if (stat == 0) call system%take_image(size(ax), own, image, stat)
-        if (stat /= 0) then
-          call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
-          return
-        end if
+        call find_direction(k)
+        if (allocated(error)) return
         call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
         call nodes%pack(image, w)
@@ -179,7 +174,7 @@ contains
         h(k + 1, k) = sqrt(space%dot(w, w))
         arnoldi(:, k) = h(:, k)
         if (h(k + 1, k) > 0.0_wp) w = w/h(k + 1, k)
-        call keep(k + 1, stat)
+        call keep(k + 1)
         do i = 1, k - 1
           rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
           h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
@@ -200,22 +195,39 @@ contains
       if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
-    !> Store a residual.
-    subroutine keep(i, stat)
+    !> Take the memory of a direction, of the residuals before and after it, and of a product, on all ranks or on none.
+    subroutine take_memory(k)
       !> Its number
-      integer, intent(in) :: i
-      !> Not zero: there is not enough memory
-      integer, intent(out) :: stat
+      integer, intent(in) :: k
+      integer :: i, stat
 
       stat = 0
+      associate (double => merge(0, nodes%n_active, iteration%single), single => merge(nodes%n_active, 0, iteration%single))
+        if (.not. allocated(basis(k)%beyond)) then
+          call give_back(size(ax))
+          allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k)%beyond(others%n_active), stat=stat)
+        end if
+        do i = k, k + 1
+          if (stat == 0 .and. .not. allocated(basis(i)%v)) allocate (basis(i)%rounded(single), basis(i)%v(double), stat=stat)
+        end do
+      end associate
+      if (stat == 0) call system%take_image(size(ax), own, image, stat)
+      if (stat /= 0) then
+        call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
+      end if
+      call space%agree(error)
+    end subroutine take_memory
+
+    !> Store a residual.
+    subroutine keep(i)
+      !> Its number
+      integer, intent(in) :: i
+
       if (iteration%single) then
-        if (.not. allocated(basis(i)%rounded)) allocate (basis(i)%rounded(size(w)), stat=stat)
-        if (stat /= 0) return
         basis(i)%rounded = real(w, sp)
         rounded_off(i) = 0.5_wp*epsilon(1.0_sp)*space%max_abs(w)
       else
-        if (.not. allocated(basis(i)%v)) allocate (basis(i)%v(size(w)), stat=stat)
-        if (stat == 0) basis(i)%v = w
+        basis(i)%v = w
       end if
     end subroutine keep
 
@@ -233,18 +245,10 @@ contains
     end subroutine add_residual
 
     !> Compute a direction.
-    subroutine find_direction(k, stat)
+    subroutine find_direction(k)
       !> Its number
       integer, intent(in) :: k
-      !> Not zero: there is not enough memory
-      integer, intent(out) :: stat
 
-      stat = 0
-      if (.not. allocated(basis(k)%beyond)) then
-        allocate (basis(k)%rounded_mr(merge(nodes%n_active, 0, iteration%single)), &
-                  basis(k)%mr(merge(0, nodes%n_active, iteration%single)), stat=stat)
-      end if
-      if (stat /= 0) return
       if (iteration%single) then
         r = basis(k)%rounded
       else

@@ -60,7 +60,7 @@ contains
         if (any(high - low >= options%largest_direct_side)) return
         call problem%extract_part(low, high, part)
         call new_direct_friction(direct, part, error)
-        call problem%space%ranks%agree(error)
+        call problem%space%agree(error)
         if (allocated(error)) return
         call solve_part(solver, direct, reshape([low, high], [2, 2]), start, &
                         load_step_t(target, reference, tolerance, max_sweeps), found, solved, error)

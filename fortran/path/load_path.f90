@@ -190,7 +190,7 @@ contains
       return
     end if
     call check_state(state, solver%problem%own_extent(), error)
-    call solver%problem%space%ranks%agree(error)
+    call solver%problem%space%agree(error)
   end subroutine check_step
 
   !> Solve a part of a load step.
@@ -223,7 +223,7 @@ contains
     else
       call solve_step(solver, from, from%relative_displacement, goal, settings%tolerance, settings%max_sweeps, next, error)
     end if
-    call solver%problem%space%ranks%agree(error)
+    call solver%problem%space%agree(error)
   end subroutine solve_part
 
   !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.

@@ -103,6 +103,8 @@ contains
       call part%solve_step(before, cut_vector(whole%problem, step%reference, corners(:, 1), part%problem), step%target, &
                            whole%problem%options%multilevel%part_tolerance*step%tolerance, step%max_sweeps, after, error)
       if (allocated(part%guess)) deallocate (part%guess)
+      ! each rank may have solved all of the part
+      call whole%problem%space%agree(error)
       if (allocated(error)) return
       state%operator_applications = after%operator_applications*lattice%size()/whole%problem%lattice%size()
       state%sweeps = after%sweeps

@@ -44,6 +44,7 @@ contains
     type(friction_problem_t) :: model
     type(contact_state_t) :: before, first, after
     type(load_target_t) :: coarse_target
+    type(load_step_t) :: coarse_step
     real(wp), allocatable, target :: origin(:, :, :)
     real(wp), allocatable :: displacement(:, :, :), moved(:, :, :)
     real(wp) :: work
@@ -64,12 +65,15 @@ contains
       moved = displacement
       associate (options => model%options%multilevel)
         call predict(model, coarse(2:), operators(2:), before, load_step_t(coarse_target, origin), first, error, moved)
-        if (allocated(error)) return
         work = work + first%operator_applications
-        call solve_on_lattice(model, operators(1), first, load_step_t(coarse_target, origin, options%change_tolerance, &
-                                                                      options%change_sweeps), after, error, moved, as_start=.true.)
-        if (allocated(error)) return
+        coarse_step = load_step_t(coarse_target, origin, options%change_tolerance, options%change_sweeps)
+        if (.not. allocated(error)) then
+          call solve_on_lattice(model, operators(1), first, coarse_step, after, error, moved, as_start=.true.)
+        end if
       end associate
+      ! each rank may have solved all of the coarser lattice
+      call problem%space%agree(error)
+      if (allocated(error)) return
       work = work + after%operator_applications
       guess%converged = after%converged
       if (guess%converged) then

@@ -302,6 +302,8 @@ contains
         call solve_on_lattice(problem, self%operators(l), state, &
                               load_step_t(target, origin(l)%value, problem%options%multilevel%nested_tolerance, &
                                           step%max_sweeps), coarser, error, known, as_start=.true.)
+        ! each rank may have solved all of the coarser lattice
+        call self%problem%space%agree(error)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
         ! a start from an unconverged solution saves nothing

@@ -220,6 +220,8 @@ contains
         end if
         if (l > 1) then
           call solve_on_normal_lattice(level, passing, goal, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          ! each rank may have solved all of the coarser lattice
+          call self%ranks%agree(error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -382,6 +384,7 @@ contains
           ! the product over the window contains the errors of single precision
           call solve_on_normal_lattice(inner, self%iterate, target, &
                                        self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
+          call self%ranks%agree(error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
@@ -426,6 +429,7 @@ contains
     self%corner = low
     call self%level(1)%extract_part(low, high, self%inner)
     call self%inner%prepare(self%kernel, .true., .true., space_of(self, self%inner%lattice), error, self%cache)
+    call self%ranks%agree(error)
     if (allocated(error)) deallocate (self%inner)
   end subroutine extract_part
 

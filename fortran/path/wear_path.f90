@@ -500,6 +500,7 @@ contains
     if (allocated(error)) return
     allocate (energy, mold=cycle%energy)
     call energy_ahead(now, pressed, cycles*self%coefficient, self%cycle_tolerance, energy, error, cache)
+    call problem%space%agree(error)
   end subroutine energy_of_jump
 
   !> Compute volume, largest depth and the bound on its error after a cycle.

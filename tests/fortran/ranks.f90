@@ -1,7 +1,7 @@
 !> Tests of what several ranks do together.
 module ranks_tests
   use, intrinsic :: iso_fortran_env, only: int32
-  use hc_precision, only: wp, pi, lk
+  use hc_precision, only: wp, sp, pi, lk
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis, oblique_basis
@@ -9,7 +9,8 @@ module ranks_tests
   use hc_elastic_pair, only: elastic_pair_t, new_elastic_pair, material_t
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, of_pressure, of_all_tractions
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, load_step_t, force_control, &
+    displacement_control
   use hc_power_interface, only: power_interface_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_normal_problem, only: normal_problem_t, new_normal_problem
@@ -22,6 +23,11 @@ module ranks_tests
   use hc_friction_law, only: friction_law_t
   use hc_rolling, only: rolling_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
+  use hc_subwindow, only: solve_part
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_linear_system, only: linear_system_t, constraints_t, iteration_t
+  use hc_step_equation, only: solve_step_equation
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_load_path, only: advance, step_settings_t
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead
@@ -36,6 +42,20 @@ module ranks_tests
   !> All ranks, from windows of one node on
   type(communicator_t) :: ranks
 
+  !> A diagonal matrix; the second rank has no memory for a product
+  type, extends(linear_system_t) :: short_of_memory_t
+  contains
+    procedure :: product => diagonal_product
+    procedure :: take_image => refuse_image
+  end type short_of_memory_t
+
+  !> A solver that fails on the second rank
+  type, extends(friction_solver_t) :: failing_solver_t
+  contains
+    procedure :: solve_step => fail_on_one
+    procedure :: displacements => sum_of_tractions
+  end type failing_solver_t
+
 contains
 
   subroutine collect(tests)
@@ -48,6 +68,8 @@ contains
       new_test('rows', test_rows), &
       new_test('words', test_words), &
       new_test('errors', test_errors), &
+      new_test('one_without_memory', test_memory), &
+      new_test('one_fails_on_a_part', test_failed_part), &
       new_test('products', test_products), &
       new_test('periodic_products', test_periodic_products), &
       new_test('contact', test_contact), &
@@ -187,6 +209,134 @@ contains
     call ranks%agree(found)
     call check_true(error, found%message == 'rank 1: not enough memory', 'an error of all ranks has no name more')
   end subroutine test_errors
+
+  !> Memory that one rank does not get in conjugate gradients or GMRES is an error of all, whether they share rows or transforms.
+  subroutine test_memory(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n_col = 3
+    type(short_of_memory_t) :: system
+    type(active_set_t) :: nodes
+    type(constraints_t) :: constraints
+    type(iteration_t) :: iteration
+    type(error_t), allocatable :: found
+    real(wp), allocatable :: rhs(:), x(:), ax(:)
+    integer :: extent(2), k, n
+
+    if (ranks%size == 1) return
+    do k = 0, 3
+      system%symmetric = modulo(k, 2) == 0
+      system%space = field_space_t()
+      if (k < 2) system%space%ranks = ranks
+      if (k > 1) system%space%helpers = ranks
+      extent = system%space%own_extent([n_col, 2*ranks%size + 1])
+      n = product(extent)
+      call new_active_set(nodes, spread(.true._lk, 1, n), system%space, extent)
+      constraints = constraints_t()
+      allocate (constraints%columns(n, 1), source=1.0_wp)
+      allocate (constraints%mb(n, 1), source=1.0_sp)
+      rhs = spread(1.0_wp, 1, n)
+      x = 0.0_wp*rhs
+      ax = x
+      iteration = iteration_t(most=5)
+      call solve_step_equation(system, nodes, constraints, rhs, x, ax, iteration, found)
+      call check_failure(found, error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_memory
+
+  !> Expect the error of the second rank on all ranks.
+  subroutine check_failure(found, error)
+    type(error_t), allocatable, intent(in) :: found
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_true(error, allocated(found), 'an error on all ranks')
+    if (.not. allocated(error)) call check_true(error, found%code == status%resources .and. index(found%message, 'rank 1: ') == 1, &
+                                                found%message)
+  end subroutine check_failure
+
+  subroutine diagonal_product(self, x, y, error)
+    class(short_of_memory_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    y = [(i*x(i), i=1, size(x))]
+  end subroutine diagonal_product
+
+  subroutine refuse_image(self, n, own, image, stat)
+    class(short_of_memory_t), intent(in) :: self
+    integer, intent(in) :: n
+    real(wp), allocatable, target, intent(inout) :: own(:)
+    real(wp), pointer, contiguous, intent(out) :: image(:)
+    integer, intent(out) :: stat
+
+    stat = merge(1, 0, ranks%rank == 1)
+    if (.not. allocated(own)) allocate (own(n))
+    image => own
+  end subroutine refuse_image
+
+  !> A part of the window that each rank solves alone, where one fails: an error of all, before they share the window again.
+  subroutine test_failed_part(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 40
+    type(elastic_pair_t) :: pair
+    type(lattice_t) :: lattice
+    type(field_space_t) :: space
+    type(failing_solver_t) :: whole, part
+    type(contact_state_t) :: start, found
+    type(load_target_t) :: target
+    type(error_t), allocatable :: failure
+    real(wp) :: gap(n, n)
+    real(wp), allocatable, target :: reference(:, :, :)
+    logical :: solved
+    integer :: rows(2)
+
+    if (ranks%size == 1) return
+    call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.3_wp), error)
+    if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(1.0e-5_wp), [-n/2, -n/2], [n, n], error)
+    if (allocated(error)) return
+    call sphere(lattice, gap)
+    space%ranks = ranks
+    space%ranks%least_nodes = n*n                                              ! parts are too small to be shared
+    rows = space%own_rows(n)
+    associate (own => gap(:, rows(1):rows(2)))
+      call new_friction_problem(whole%problem, lattice, pair, own, own < huge(gap), coulomb_t(0.3_wp), .false., error, space=space)
+    end associate
+    if (allocated(error)) return
+    call whole%problem%extract_part([11, 11], [30, 30], part%problem)
+    call new_friction_state(start, lattice, space)
+    allocate (reference, source=start%relative_displacement)
+    target%value(1) = 30.0_wp
+    call solve_part(whole, part, reshape([11, 11, 30, 30], [2, 2]), start, load_step_t(target, reference, 1.0e-8_wp, 10), &
+                    found, solved, failure)
+    call check_failure(failure, error)
+  end subroutine test_failed_part
+
+  subroutine fail_on_one(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(failing_solver_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    if (ranks%rank == 1) call raise(error, status%resources, 'not enough memory')
+    state = start
+    state%converged = .true.
+  end subroutine fail_on_one
+
+  !> Sum over all ranks.
+  subroutine sum_of_tractions(self, pressure, traction, displacement, error)
+    class(failing_solver_t), intent(inout) :: self
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+
+    displacement = self%problem%space%sum(pressure) + sum(traction)
+  end subroutine sum_of_tractions
 
   !> A product is that of one rank to the bit: even and odd numbers of rows, like and unlike materials.
   subroutine test_products(error)

@@ -38,6 +38,8 @@ module hc_contact_search
   real(wp), parameter :: narrow_nodes = 8.0_wp, least_factor = 2.0_wp, largest_factor = 8.0_wp
   !> Nodes up to which a lattice is refined; lattices, and enlargements among them: a contact along a line has no end.
   real(wp), parameter :: most_nodes = 40000.0_wp
+  !> Times as many, to which one grows: contacts of waves, spot by spot, have no end.
+  real(wp), parameter :: largest_growth = 16.0_wp
   integer, parameter :: most_trials = 24, most_enlargements = 12
   !> Residual and iterations of a rough solution.
   real(wp), parameter :: roughly = 1.0e-4_wp
@@ -107,6 +109,7 @@ contains
         larger = grown_window(lattice, contact, field_space_t())
         self%first = larger%first
         self%extent = larger%extent
+        if (product(self%extent) > largest_growth*most_nodes) self%verdict = failed
       else
         self%n_enlarged = self%n_enlarged + 1
         if (self%n_enlarged > most_enlargements) self%verdict = failed

@@ -226,6 +226,11 @@ def test_a_coordinate_that_few_points_have_is_refused(file: Any) -> None:
     lines[1300] = f"{float(x) + 1.3},{rest}"
     found = complaint(of_file(file("a.csv", "\n".join(lines)), holes="fill"))
     assert "line 1301: expected points of a rectangular grid: few have x = -368.7, beside -370" in found
+    jitter = np.random.default_rng(1).uniform(0.0, 1e-3, BALL.shape)
+    x, y = np.meshgrid(X, Y)
+    points = np.stack([x + jitter, y, BALL], axis=-1).reshape(-1, 3)
+    jittered = "\n".join(["x [um], y [um], z [um]", *(f"{a:.4f}, {b}, {c}" for a, b, c in points)])
+    assert "some nearly the same; round them" in complaint(of_file(file("d.csv", jittered), holes="fill"))
     disc = (X**2 + Y[:, None] ** 2 <= 300.0**2).ravel()  # has few points in its first rows
     assert case(of_file(file("b.csv", columns_of(BALL, disc)), holes="fill"))
     stretched = columns_of(BALL).replace("\n-400, ", "\n-405, ")
@@ -495,6 +500,27 @@ def test_a_contact_at_the_end_of_the_map_is_refused(file: Any) -> None:
     lowest = "body.1.surface: the lowest point of the map lies at its end, at x ="
     assert f"{lowest} -200.0 µm" in complaint(quarter)
     assert f"{lowest} -170.0 µm" in complaint({**quarter, "offset": ["30 um", "0 um"]})
+
+
+def test_a_second_summit_outside_of_the_window_is_told(file: Any) -> None:
+    """Two caps 400 um apart: the window about the higher one has one of two contacts."""
+    two = np.maximum(-((X + 200.0) ** 2), -((X - 200.0) ** 2) - 2e3)
+    heights = rows_of((two - Y[:, None] ** 2) / 20e3)
+    named = of_file(file("two.csv", heights), **MATRIX)
+    load = {"normal_load": 8.0}
+    missed = r"grid\.extent: load step 1: the bodies also touch outside of the window, near x = "
+    with pytest.raises(DeckError, match=missed):
+        case(named, load=load).run()
+    both = case(named, load=load, spacing=8e-6, extent=["640 um", "280 um"], center=[0.0, 0.0]).run()
+    pressure = both.dataset.pressure[-1].values
+    assert 0.6 < pressure[:, : pressure.shape[1] // 2].sum() / pressure.sum() < 0.9
+    assert case(named, load={"normal_load": 0.05}).run().complete  # the other one is too low
+    waves_of_one_direction = {"shape": "formula", "expression": "x**2*50 + sin(y*1e4)*1e-6 + 1e-6"}
+    with pytest.raises(DeckError, match=missed):
+        case(waves_of_one_direction, load=load, nodes_in_radius=10).run()
+    assert "no end" in complaint(
+        {"shape": "formula", "expression": "sin(x*1e4)*1e-6 + 1e-6"}, nodes_in_radius=10
+    )
 
 
 def waves(points: int) -> Any:

@@ -193,6 +193,12 @@ class Placed(NamedTuple):
     extruded: bool = False  # along the first axis
 
     @property
+    def points(self) -> tuple[Array, Array]:
+        """Points of the plane at which it was measured, of an extruded one at two places far away."""
+        x, y = np.meshgrid(self.map.x, self.map.y)
+        return self.in_plane(x.ravel(), y.ravel())
+
+    @property
     def distances(self) -> tuple[float, ...]:
         """Median distances (m) of its points along its axes."""
         return tuple(self.map.distances[axis] for axis in self.axes)

@@ -32,6 +32,8 @@ _MOST_SENTENCES = 5
 _SAME = 1e-7  # distance of equal coordinates of columns, as a share of their range
 _EVEN = 0.01  # steps of coordinates may differ by this share, since they are rounded
 _FEW = 0.5  # points with a coordinate, and steps beside it, over the median, from which it counts
+_SPLIT = 0.1  # smallest over largest step between straight lines
+_FULL = 0.7  # points of a file over those of its grid, some of which may be missing
 _MOST_EMPTY = 4  # points of the rectangular grid of columns for each line of the file
 
 
@@ -228,6 +230,13 @@ def _gridded(path: Path, x: Array, y: Array, z: Array, lines: Sequence[int]) -> 
                 f"beside {beside}"
             )
     size = len(across) * len(up)
+    for name, at in (("x", across), ("y", up)):
+        steps = np.diff(at)
+        if len(z) < _FULL * size and len(steps) > 1 and steps.min() < _SPLIT * steps.max():
+            raise DeckError(
+                f"{path}: expected points of a rectangular grid: {len(z)} of them have {len(at)} different "
+                f"{name}, some nearly the same; round them, or interpolate to even distances"
+            )
     if size > _MOST_EMPTY * len(z):
         raise DeckError(
             f"{path}: expected points of a rectangular grid: {len(z)} of them have {len(across)} different "

@@ -287,6 +287,16 @@ class Problem:
             if fault:
                 raise DeckError(f"{name}: the contact of load step {number} {fault}")
 
+    def check_beyond(self, step: Any) -> None:
+        """Refuse a load step whose bodies also touch outside of a window that follows from the contact."""
+        simple = not self.gap_given and self.surfaces.curvature is not None
+        if simple or self._contact is None or self.moves or self.trial:
+            return
+        compliance = sum(body.compliance for body in (self.body_1, self.body_2))
+        modulus = min(self.pair.effective_modulus, 1.0 / compliance if compliance else math.inf)
+        if fault := window.missed_contact(self._gap, step.lattice, step, modulus):
+            raise DeckError(f"grid.extent: load step {step.number}: {fault}")
+
     def holes_near(self, contact: Estimate) -> int:
         """Return the number of holes of height maps within the bounds of an estimated contact."""
         holes = [one.in_plane(*one.map.holes) for one in self.maps]

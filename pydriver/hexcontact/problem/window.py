@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,12 @@ from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
 from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import MISSING, Mistake
-from ..deck.height_map import BEYOND_MAP, Placed
+from ..deck.height_map import BEYOND_MAP, Placed, place
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
+from ..errors import DeckError
+from .plane_field import PlaneField
 
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
@@ -32,6 +34,10 @@ GapFunction = Callable[[Array, Array], Array]
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 _RIGHT = 1e-6  # rounding of a right angle
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
+_REACH = 20.0  # of the window, within which other contacts are looked for
+_TRIED = 161  # points along a side of it
+_LOADS = 24  # point loads along a side in place of a pressure
+_OVERLAP = 0.95  # share of the approach that counts, since displacements are those of the pressure alone
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
 # Decimal logarithms of the stiffness of an interface over that of the bodies.
@@ -209,6 +215,50 @@ def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     return max(
         float(np.nanmax(np.abs(np.diff(heights, axis=axis)), initial=0.0)) / side
         for axis, side in ((0, across), (1, lattice.spacing))
+    )
+
+
+def missed_contact(gap: PlaneField, lattice: Lattice, step: Any, modulus: float) -> str:
+    """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
+
+    Points of measured surfaces are tested, and those of a grid over twenty times the window. The bodies
+    overlap where the gap is below the approach less the displacement by the pressure, that of point loads on
+    half-spaces (K. L. Johnson, Contact Mechanics, 1985, eq. (3.22a)).
+    """
+    corners = lattice.outline
+    middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0) / 2
+    sides = np.linspace(-_REACH, _REACH, _TRIED)
+    around = np.meshgrid(middle[0] + half[0] * sides, middle[1] + half[1] * sides)
+    measured = (np.stack(one.points) for one in gap.maps)
+    fewer = [points[:, :: points.shape[1] // _TRIED**2 + 1] for points in measured]
+    x, y = np.concatenate([np.reshape(around, (2, -1)), *fewer], axis=1)
+    outside = (np.abs(np.stack([x, y], axis=1) - middle) > half).any(axis=1)
+    x, y = x[outside], y[outside]
+    try:
+        heights = gap.at(x, y)
+    except (DeckError, ValueError):  # it is known near the window only
+        return ""
+    approach = _OVERLAP * float(step.approach)
+    near = heights < approach
+    if not near.any():
+        return ""
+    x, y, heights, p = x[near], y[near], heights[near], step.pressure
+    edges = [np.linspace(at.min(), at.max(), _LOADS + 1) for at in (lattice.x, lattice.y)]
+    load, along, across = (
+        np.histogram2d(lattice.x.ravel(), lattice.y.ravel(), bins=edges, weights=(p * times).ravel())[0]
+        for times in (1.0, lattice.x, lattice.y)
+    )
+    loaded = load > 0.0
+    load, along, across = load[loaded], along[loaded] / load[loaded], across[loaded] / load[loaded]
+    far = np.hypot(x[:, None] - along, y[:, None] - across)
+    left = approach - heights - (load * lattice.cell_area / far).sum(axis=1) / (math.pi * modulus)
+    most = int(np.argmax(left))
+    if left[most] <= 0.0:
+        return ""
+    there = place(float(x[most]), float(y[most]))
+    return (
+        f"the bodies also touch outside of the window, near {there}; expected lengths that hold all of the "
+        "contact, and center in its middle"
     )
 
 

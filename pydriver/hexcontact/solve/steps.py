@@ -73,6 +73,7 @@ def steps(
     targets = case.load_steps[path.position :] if targets is None else targets
     for step in _solved(path, before, targets):
         case.check_contact(step.number, partial(step.bands, "zone"))
+        case.check_beyond(step)
         yield step
         done = step.number
         del step

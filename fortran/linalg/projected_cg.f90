@@ -89,10 +89,9 @@ contains
       change = first_change(b, r, space)
       constraints%multiplier = change
       do
-        ! The share of the constraints is taken out of the residual before it is
-        ! preconditioned: it is the larger part by far, and its rounding errors would stay.
-        ! The rest is normal to M B, so that the projected preconditioner is
-        ! symmetric even if the given M B is only about M times B.
+        ! The share of the constraints is taken out of the residual before it is preconditioned: it is the larger part by far,
+        ! and its rounding errors would stay. The rest is normal to M B, so that the projected preconditioner is symmetric even
+        ! if the given M B is only about M times B.
         call advance_residual(-step, z, change, b, m_b, r, along, space)
         change = -matmul(along, inverse)
         constraints%multiplier = constraints%multiplier + change

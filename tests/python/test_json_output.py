@@ -228,7 +228,7 @@ def test_verify_says_each_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "spheres: 1 of 2 comparisons passed" in done.stdout
     [line] = [line for line in done.stdout.splitlines() if "approach" in line]
     assert line.split()[2:5] == ["approach", "reference", "9.400000"]
-    assert line.split()[-3:] == ["-1.0e-02", "1e-07", "FAIL"]
+    assert line.split()[-3:] == ["-1.0e-02", "1.2e-07", "FAIL"]
 
 
 # --- errors -----------------------------------------------------------------------------------------------

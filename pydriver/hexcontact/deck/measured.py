@@ -237,7 +237,8 @@ class Measured(Surface):
             raise DeckError("expected heights; no point has one")
         if self.holes == "refuse" and (count := self.holes_found):
             row, col = np.argwhere(np.isnan(z))[-1]
-            at = [f"x = {quantity(float(x[row]), 'm')}", f"y = {quantity(float(y[col]), 'm')}"]
+            u, v = (float(at) + more for at, more in zip((x[row], y[col]), self._origin, strict=True))
+            at = [f"x = {quantity(u, 'm')}", f"y = {quantity(v, 'm')}"]
             where = ", ".join(at[self.extruded :])
             sentence = (
                 f"{counted(count, 'point has', 'points have')} no height, one of them at {where}; expected "

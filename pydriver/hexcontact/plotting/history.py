@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..analytic.compare import CIRCULAR, ClosedForms
 from ..analytic.friction import MindlinContact
@@ -517,9 +517,9 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         named = _spelled(name) if name in VARIABLES else name
         axes.set(xlabel=style.titled(over, length), ylabel=style.titled(named, unit))
         if _by_decades(place[order]):
-            axes.set_xscale("log")
+            _set_log(axes, "x")
             if all(_by_decades(curves[name].isel(curve=k).values[order]) for k in range(len(labels))):
-                axes.set_yscale("log")
+                _set_log(axes, "y")
         axes.grid(color="0.9", lw=0.5)
     if 1 < len(labels) <= _LEGEND:
         style.legend_under(canvas, style.handles_of(panels[0]))
@@ -527,6 +527,17 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         style.color_scale(canvas, panels, labels, colors)
     style.set_title(canvas, str(study.attrs.get("title", "")))
     return canvas
+
+
+def _set_log(axes: Axes, name: Literal["x", "y"]) -> None:
+    """Set a logarithmic scale; over a few decades 1, 2 and 5 of each have labels."""
+    axes.set(**{f"{name}scale": "log"})
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    low, high = axis.get_data_interval()
+    if high < 300.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
 
 
 def _by_decades(values: Array) -> bool:

@@ -69,8 +69,10 @@ class Cut:
         if through and not ((index > -1.0) & (index < lattice.shape[::-1])).all(axis=1).any():
             raise DeckError(f"expected a line that crosses the window; it goes through {through} m")
         if lattice.periodic and not through:  # no contact is the middle one
-            x, y = line.points(np.array(line.zero))
-            through = float(x), float(y)
+            x, y = (
+                np.round(at / lattice.spacing, 6) * lattice.spacing for at in line.points(np.array(line.zero))
+            )
+            through = float(x) + 0.0, float(y) + 0.0
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
         on_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
         at_nodes = on_nodes and nodes.size < _APART and len(views) == 1

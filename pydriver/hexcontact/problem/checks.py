@@ -75,7 +75,10 @@ def checked(
     if {"stress", "fatigue", "body", "output"} <= tables.keys():
         found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
-        found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
+        wanted = given.data.get("grid")
+        repeats = isinstance(wanted, Mapping) and wanted.get("boundary") == "periodic"
+        if "grid" in tables or not repeats:  # a window that is to repeat bounds the contact
+            found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
         found += _mistakes(tables, _moving_problems(tables)) if "load" in tables else []
         found += _mistakes(tables, _coating_problems(tables, repeating))
     if found:
@@ -467,8 +470,7 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
     elif not gap_given:
         if grid and grid.spacing == "auto" and not any(part.one_spot for part in gap.shapes):
             yield ("grid", "spacing"), "expected a length: surfaces that touch in one ellipse alone give one"
-        if grid:  # which may be to repeat
-            yield from _touching_problems(gap)
+        yield from _touching_problems(gap)
     elif bodies.body_1.surface or bodies.body_2.surface:
         yield ("gap",), "expected either a gap or surfaces of the bodies, not both"
 

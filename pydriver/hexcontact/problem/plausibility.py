@@ -300,7 +300,7 @@ def warnings(case: Problem, estimated: bool = True) -> list[str]:
         passed = [
             limit
             for limit in LIMITS
-            if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most
+            if not limit.least <= found.get(limit.quantity, limit.least) <= limit.most * (1.0 + _ROUNDED)
         ]
         known = found | _words(case, found) if passed else {}
         case.judged[estimated] = [limit.words.format(**known) for limit in passed]

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NoReturn, Self, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from ..text import dotted, folded, listed, nearest
+from ..text import folded, listed, nearest
 from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .kinds import Kind, Schema
 from .units import LENGTH, UnitError, readable, to_si
@@ -205,7 +205,7 @@ class Table(BaseModel):
             hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"
             return Mistake(key, MISSING, f"unknown key; {hint}")
         if kind == "list_type":
-            return Mistake(key, MISSING, f"expected an array of tables: write [[{dotted(key)}]]")
+            return Mistake(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
         if kind == "too_short":
             return Mistake(key, MISSING, "expected at least one entry")
         if kind in ("model_type", "model_attributes_type", "dict_type"):

@@ -14,7 +14,7 @@ contains
     ranks = communicator_t()
   end procedure end_ranks
 
-  !> This process goes on.
+  !> Return: no other process is to be ended.
   module procedure abort_ranks
   end procedure abort_ranks
 

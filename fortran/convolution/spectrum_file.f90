@@ -86,7 +86,7 @@ module hc_spectrum_file
 
 contains
 
-  !> Return the name of the file of some kernels; a name that two sets share by chance is told by the head.
+  !> Return the name of the file of some kernels; the head of the file tells sets of the same name apart.
   pure function file_name(key, maker) result(name)
     !> Parameters of the kernels
     type(kernel_key_t), intent(in) :: key

@@ -31,7 +31,7 @@ module hc_coupled_system
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
     procedure :: take_image => coupled_image
-    !> Add what the pressure carries to the traction along e, and the stretch by its rest to the displacement along t
+    !> Add the share of the pressure to the traction along e, and the stretch by its rest to the displacement along t
     procedure :: add_slope, add_tilt
   end type coupled_system_t
 

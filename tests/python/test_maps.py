@@ -511,6 +511,8 @@ def test_a_second_summit_outside_of_the_window_is_told(file: Any) -> None:
     missed = r"grid\.extent: load step 1: the bodies also touch outside of the window, near x = "
     with pytest.raises(DeckError, match=missed):
         case(named, load=load).run()
+    with pytest.raises(DeckError, match=missed):
+        case(named, load=load).changed({"accuracy": {"target": 0.02}}).run()
     both = case(named, load=load, spacing=8e-6, extent=["640 um", "280 um"], center=[0.0, 0.0]).run()
     pressure = both.dataset.pressure[-1].values
     assert 0.6 < pressure[:, : pressure.shape[1] // 2].sum() / pressure.sum() < 0.9

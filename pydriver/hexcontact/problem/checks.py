@@ -75,9 +75,9 @@ def checked(
     if {"stress", "fatigue", "body", "output"} <= tables.keys():
         found += _mistakes(tables, _problems_below(tables, steps))
     if "body" in tables:
-        wanted = given.data.get("grid")
-        repeats = isinstance(wanted, Mapping) and wanted.get("boundary") == "periodic"
-        if "grid" in tables or not repeats:  # a window that is to repeat bounds the contact
+        grid = given.data.get("grid")
+        periodic = isinstance(grid, Mapping) and grid.get("boundary") == "periodic"
+        if "grid" in tables or not periodic:  # a periodic window bounds the contact, also with another fault
             found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
         found += _mistakes(tables, _moving_problems(tables)) if "load" in tables else []
         found += _mistakes(tables, _coating_problems(tables, repeating))

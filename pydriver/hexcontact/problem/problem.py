@@ -79,6 +79,7 @@ class Problem:
 
     deck_file: Path | None = None
     _stiffest = 0.0  # decimal logarithm of the stiffness of the interface over that of the bodies
+    _around: tuple[Lattice, Array] | None = None  # heights outside of the last window
     trial = False  # whether it is one of several lattices of a refinement
     judged: dict[bool, list[str]]  # its warnings, without and with an estimate of the contact, once found
 
@@ -290,11 +291,13 @@ class Problem:
     def check_beyond(self, step: Any) -> None:
         """Refuse a load step whose bodies also touch outside of a window that follows from the contact."""
         simple = not self.gap_given and self.surfaces.curvature is not None
-        if simple or self._contact is None or self.moves or self.trial:
+        if simple or self._contact is None or self.moves:
             return
+        if self._around is None or self._around[0] != step.lattice:
+            self._around = step.lattice, window.heights_around(self._gap, step.lattice)
         compliance = sum(body.compliance for body in (self.body_1, self.body_2))
         modulus = min(self.pair.effective_modulus, 1.0 / compliance if compliance else math.inf)
-        if fault := window.missed_contact(self._gap, step.lattice, step, modulus):
+        if fault := window.missed_contact(self._around[1], step, modulus):
             raise DeckError(f"grid.extent: load step {step.number}: {fault}")
 
     def holes_near(self, contact: Estimate) -> int:

@@ -218,13 +218,8 @@ def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     )
 
 
-def missed_contact(gap: PlaneField, lattice: Lattice, step: Any, modulus: float) -> str:
-    """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
-
-    Points of measured surfaces are tested, and those of a grid over twenty times the window. The bodies
-    overlap where the gap is below the approach less the displacement by the pressure, that of point loads on
-    half-spaces (K. L. Johnson, Contact Mechanics, 1985, eq. (3.22a)).
-    """
+def heights_around(gap: PlaneField, lattice: Lattice) -> Array:
+    """Return x, y and the gap (m) in rows, at points of maps and of a grid outside of a window."""
     corners = lattice.outline
     middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0) / 2
     sides = np.linspace(-_REACH, _REACH, _TRIED)
@@ -235,10 +230,19 @@ def missed_contact(gap: PlaneField, lattice: Lattice, step: Any, modulus: float)
     outside = (np.abs(np.stack([x, y], axis=1) - middle) > half).any(axis=1)
     x, y = x[outside], y[outside]
     try:
-        heights = gap.at(x, y)
+        return np.stack([x, y, gap.at(x, y)])
     except (DeckError, ValueError):  # it is known near the window only
-        return ""
-    approach = _OVERLAP * float(step.approach)
+        return np.empty((3, 0))
+
+
+def missed_contact(around: Array, step: Any, modulus: float) -> str:
+    """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
+
+    They overlap where the gap, from `heights_around`, is below the approach less the displacement by the
+    pressure, that of point loads on half-spaces (K. L. Johnson, Contact Mechanics, 1985, eq. (3.22a)).
+    """
+    x, y, heights = around
+    lattice, approach = step.lattice, _OVERLAP * float(step.approach)
     near = heights < approach
     if not near.any():
         return ""

@@ -226,6 +226,10 @@ def test_a_coordinate_that_few_points_have_is_refused(file: Any) -> None:
     lines[1300] = f"{float(x) + 1.3},{rest}"
     found = complaint(of_file(file("a.csv", "\n".join(lines)), holes="fill"))
     assert "line 1301: expected points of a rectangular grid: few have x = -368.7, beside -370" in found
+    for more in (5.0, 2500.0):  # half a step, and beyond the others
+        lines[1300] = f"{float(x) + more},{rest}"
+        found = complaint(of_file(file("a.csv", "\n".join(lines)), holes="fill"))
+        assert f"line 1301: expected points of a rectangular grid: few have x = {float(x) + more:g}" in found
     jitter = np.random.default_rng(1).uniform(0.0, 1e-3, BALL.shape)
     x, y = np.meshgrid(X, Y)
     points = np.stack([x + jitter, y, BALL], axis=-1).reshape(-1, 3)

@@ -52,6 +52,17 @@ def test_heights_have_the_moments_and_waves_that_are_asked_for() -> None:
         assert np.log(means[1] / means[0]) / np.log(5.0) == pytest.approx(3.6, abs=0.6)
 
 
+def test_heights_count_from_the_highest_point_between_those_of_any_lattice() -> None:
+    for seed in range(5):
+        surface = Rough(**{**WAVES, "seed": seed}, rms_height=1e-6).repeating((SIDE, SIDE))
+        at = SIDE * np.arange(256) / 256
+        heights = surface.height(*np.meshgrid(at, at, indexing="ij"))
+        i, j = np.unravel_index(heights.argmin(), heights.shape)
+        fine = SIDE / 256 * np.linspace(-1.0, 1.0, 201)
+        near = surface.height(*np.meshgrid(at[i] + fine, at[j] + fine, indexing="ij"))
+        assert -1e-12 < near.min() < 1e-10 < heights.min()
+
+
 def test_steep_roughness_is_told() -> None:
     assert not any("slope by" in sentence for sentence in pressed(64, 1e8).warnings)
     (found,) = (one for one in pressed(64, 1e8, rms_slope=0.2).warnings if "slope by" in one)

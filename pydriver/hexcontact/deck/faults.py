@@ -21,7 +21,7 @@ class Mistake(NamedTuple):
 
     key: tuple[str | int, ...]  # path of the key; entries of arrays count from 0 here and from 1 in messages
     value: object  # value in the deck, or `MISSING`
-    sentence: str  # expected value
+    sentence: str  # expected value; [[]] stands for the header of the key
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,11 @@ def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
         key = dotted(problem.key)
         value = "" if problem.value is MISSING else shown(source.written(problem))
         lead = f"{source.locate(key)}{key}{value and ' = '}{value}"
-        message = f"{lead}: {problem.sentence}" if lead else problem.sentence
+        sentence = problem.sentence.replace("[[]]", f"[[{key}]]")
+        message = f"{lead}: {sentence}" if lead else sentence
         file, place = source.found(key)
         line, column = place or (None, None)
-        fault = Fault(message, key, value, file, line, column, problem.sentence)
+        fault = Fault(message, key, value, file, line, column, sentence)
         faults[fault] = (files.index(file), *place) if place else (-1, 0, 0)
     ordered = sorted(faults, key=lambda fault: faults[fault])
     return DeckError("\n".join(dict.fromkeys(fault.message for fault in ordered)), ordered)

@@ -31,7 +31,8 @@ _EXPECTED = "heights as text: a matrix, or columns x, y and z with headers"
 _MOST_SENTENCES = 5
 _SAME = 1e-7  # distance of equal coordinates of columns, as a share of their range
 _EVEN = 0.01  # steps of coordinates may differ by this share, since they are rounded
-_FEW = 0.5  # points with a coordinate, and steps beside it, over the median, from which it counts
+_FEW = 0.5  # points with a coordinate over the median, from which it counts
+_STRAY = 0.1  # of the steps between coordinates that count: those beside another one may differ by it
 _SPLIT = 0.1  # smallest over largest step between straight lines
 _FULL = 0.7  # points of a file over those of its grid, some of which may be missing
 _MOST_EMPTY = 4  # points of the rectangular grid of columns for each line of the file
@@ -254,11 +255,15 @@ def _gridded(path: Path, x: Array, y: Array, z: Array, lines: Sequence[int]) -> 
 
 
 def _stray(at: Array, place: Array) -> int | None:
-    """Return a coordinate nearer to the next one than others are, which few points have; None without one."""
-    steps = np.diff(at)
-    few = np.bincount(place) < _FEW * np.median(np.bincount(place))
-    apart = np.minimum(np.append(steps, np.inf), np.insert(steps, 0, np.inf))
-    found = np.flatnonzero(few & (apart < _FEW * np.median(steps))).tolist() if len(at) > 1 else []
+    """Return a coordinate that few points have, nearer to others or further from them than those; or None."""
+    count = np.bincount(place)
+    few = count < _FEW * np.median(count)
+    steps = np.diff(at[~few])
+    if not steps.size:
+        return None
+    apart = np.minimum(np.append(np.diff(at), np.inf), np.insert(np.diff(at), 0, np.inf))
+    regular = (apart > (1.0 - _STRAY) * steps.min()) & (apart < (1.0 + _STRAY) * steps.max())
+    found = np.flatnonzero(few & ~regular).tolist()
     return found[0] if found else None
 
 

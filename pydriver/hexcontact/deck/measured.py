@@ -143,6 +143,7 @@ class Measured(Surface):
     extruded: ClassVar[bool] = False
     _file_key: ClassVar[str] = "file"
     _period: tuple[float, float] | None = PrivateAttr(None)
+    _closing: str = PrivateAttr("")  # how it repeats
     _doubt: str = PrivateAttr("")  # expected value of an extent that may be swapped
     _placing: ClassVar[tuple[str, ...]] = ()  # further keys that go with a file alone
 
@@ -237,7 +238,7 @@ class Measured(Surface):
             raise DeckError("expected heights; no point has one")
         if self.holes == "refuse" and (count := self.holes_found):
             row, col = np.argwhere(np.isnan(z))[-1]
-            u, v = (float(at) + more for at, more in zip((x[row], y[col]), self._origin, strict=True))
+            u, v = (float(at) + more for at, more in zip((x[row], y[col]), self._moved_by, strict=True))
             at = [f"x = {quantity(u, 'm')}", f"y = {quantity(v, 'm')}"]
             where = ", ".join(at[self.extruded :])
             sentence = (
@@ -276,6 +277,11 @@ class Measured(Surface):
         return float(self.offset[0]), float(self.offset[1])
 
     @property
+    def _moved_by(self) -> tuple[float, float]:
+        """Offset (m) along the axes of its points."""
+        return self._origin
+
+    @property
     def _heights(self) -> str:
         """Describe the heights but for the place of the lowest point."""
         z = self.points.z
@@ -283,7 +289,7 @@ class Measured(Surface):
         words = (
             f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}"
         )
-        return words + self._tapered
+        return words + self._tapered + self._closing
 
     def placed(self, name: str) -> Placed:
         """Return the map at its place in the plane; `name` stands for it in messages."""
@@ -322,12 +328,14 @@ class Measured(Surface):
     def _repeated(self, x: Array, y: Array, height: Array) -> tuple[Array, Array, Array]:
         """Return heights over a period and some points beyond it; DeckError if its sides do not fit."""
         assert self._period is not None
+        self._closing = ""
         order = np.argsort(x), np.argsort(y)
         axes, height = [x[order[0]], y[order[1]]], height[np.ix_(*order)]
         for axis, side in enumerate(self._period):
             if axis == 0 and self.extruded:
                 continue
-            axes[axis], height = _closed(axes[axis], height, axis, side, self.taper)
+            axes[axis], height, how = _closed(axes[axis], height, axis, side, self.taper)
+            self._closing += f"; repeats after {quantity(side, 'm')} in {'xy'[axis]}, {how}"
         return axes[0], axes[1], height
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
@@ -475,7 +483,7 @@ class Map(Measured):
             for name, steps in zip("xy", apart_by, strict=True)
             if np.ptp(steps) > _UNEVEN * steps.max()
         ]
-        for name, at, step, origin in zip("xy", (x, y), of_points, self._origin, strict=True):
+        for name, at, step, origin in zip("xy", (x, y), of_points, self._moved_by, strict=True):
             low, high = at.min() + origin, at.max() + origin
             cells = quantity(high - low + step, "m")
             ends.append(
@@ -490,7 +498,7 @@ class Map(Measured):
         ratios = " by ".join(dict.fromkeys(shares))
         of_lattice = f"{ratios} spacings of the lattice"
         yield f"points {steps} apart{''.join(uneven)}, {of_lattice}; x to the right, y to the top"
-        u, v = (a + b for a, b in zip(self._in_period(*self.field.first_touch), self._origin, strict=True))
+        u, v = (a + b for a, b in zip(self._in_period(*self.field.first_touch), self._moved_by, strict=True))
         tilted = " before the tilt" * any(self.tilt)
         yield f"{self._heights}; nearest to the other body{tilted} at {place(u, v)}"
         yield self.field.interpolated
@@ -572,6 +580,11 @@ class Profile(Measured):
         """Angle (rad) of the extrusion from x."""
         return self.angle
 
+    @property
+    def _moved_by(self) -> tuple[float, float]:
+        """Offset (m) across the direction of extrusion alone."""
+        return 0.0, math.cos(self.angle) * self._origin[1] - math.sin(self.angle) * self._origin[0]
+
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""
         a, b = math.cos(self.angle), math.sin(self.angle)
@@ -597,16 +610,18 @@ class Profile(Measured):
 
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the profile, beside the distance of nodes along a direction."""
-        _, y, _, about = self.points
-        step = float(np.median(np.diff(np.sort(y))))
-        yield f"{about}; extruded along {math.degrees(self.angle):.6g} deg from x"
+        (_, y, _, about), (_, moved) = self.points, self._moved_by
+        across, step = "t" if self.angle else "y", float(np.median(np.diff(np.sort(y))))
+        turned = ", t across it" * bool(self.angle)
+        yield f"{about}; extruded along {math.degrees(self.angle):.6g} deg from x{turned}"
         spacings = step / apart(self.angle + math.pi / 2)
         yield (
-            f"{len(y)} points, y from {quantity(y.min(), 'm')} to {quantity(y.max(), 'm')}, "
+            f"{len(y)} points, {across} from {quantity(y.min() + moved, 'm')} to "
+            f"{quantity(y.max() + moved, 'm')}, "
             f"{quantity(step, 'm', 3)} apart, {counted(f'{spacings:.3g}', 'spacing')} of the lattice"
         )
-        lowest = quantity(float(self._in_period(*self.field.first_touch)[1]), "m")
-        yield f"{self._heights}; nearest to the other body at y = {lowest}"
+        lowest = quantity(float(self._in_period(*self.field.first_touch)[1]) + moved, "m")
+        yield f"{self._heights}; nearest to the other body at {across} = {lowest}"
         yield self.field.interpolated
 
 
@@ -639,8 +654,11 @@ def _filled(heights: Array) -> Array:
     return found.reshape(heights.shape)
 
 
-def _closed(at: Array, height: Array, axis: int, side: float, taper: float | None) -> tuple[Array, Array]:
-    """Return heights along an axis that repeats, with points beyond both ends; DeckError if it does not."""
+def _closed(at: Array, height: Array, axis: int, side: float, taper: float | None) -> tuple[Array, Array, str]:
+    """Return heights along an axis that repeats, with points beyond both ends, and how the ends meet.
+
+    DeckError if it does not repeat.
+    """
     name, n = "xy"[axis], len(at)
     step = float(np.ptp(at)) / (n - 1)
     if np.ptp(np.diff(at)) > _EVEN * step:
@@ -672,7 +690,11 @@ def _closed(at: Array, height: Array, axis: int, side: float, taper: float | Non
             f"between neighboring points by {readable(beside)} at most; level it, or give taper, the width "
             "over which the step is closed"
         )
+    how = f"as its {n} points"
     if not whole:
         heights = heights[:-1]
+        how = "its first and last points the same"
+        if largest > _ROUNDED * float(np.nanmax(heights) - np.nanmin(heights)):
+            how += f" (heights differ by up to {quantity(largest, 'm', 2)}; those of the first count)"
     padded = np.pad(heights, [(_BEYOND, _BEYOND), (0, 0)], mode="wrap")
-    return at[0] + step * (np.arange(len(padded)) - _BEYOND), np.moveaxis(padded, 0, axis)
+    return at[0] + step * (np.arange(len(padded)) - _BEYOND), np.moveaxis(padded, 0, axis), how

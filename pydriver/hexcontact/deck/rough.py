@@ -9,7 +9,7 @@ adds waves and changes none.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -28,6 +28,8 @@ from .units import NUMBER, readable
 _POINTS = 8  # of the grid in the shortest wave; a cubic spline between them
 _MOST_POINTS = 2**26
 _OF_LONGEST = 4  # longest waves in the period of a surface of which none is given
+_SUMMITS = 64  # points near which the highest is sought
+_CLOSE = 1e-4  # of the distance of points: the highest is off by its square
 _EVEN = 1e-9  # rounding of a wave of just the shortest or the longest length
 
 
@@ -84,8 +86,7 @@ class Rough(Surface):
                 f"{' by '.join(map(readable, sides))} that repeats; expected at most its larger side"
             )
         other = self.model_copy()
-        for key in ("_heights", "_step"):
-            other.__dict__.pop(key, None)
+        other.__dict__.pop("_spline", None)
         other._sides = self.period or sides
         return other
 
@@ -96,8 +97,8 @@ class Rough(Surface):
         return self._sides or self.period or (side, side)
 
     @cached_property
-    def _heights(self) -> Array:
-        """Depth (m) below the highest point at the points of a grid over the period."""
+    def _spline(self) -> tuple[Array, float]:
+        """Coefficients of the cubic spline of its heights over the period (m), and its highest point."""
         shape = [2 * math.ceil(_POINTS * side / self.shortest / 2) for side in self.sides]
         if math.prod(shape) > _MOST_POINTS:
             raise DeckError(
@@ -129,19 +130,21 @@ class Rough(Surface):
         power *= scale**2
         self._rms = math.sqrt(power.sum()), 2 * math.pi * math.sqrt((k**2 * power).sum())
         heights = (np.fft.ifft2(spectrum) * math.prod(shape)).real
-        return np.asarray(heights.max() - heights)
+        from scipy.ndimage import spline_filter
+
+        spline = np.asarray(spline_filter(heights, mode="grid-wrap"))
+        return spline, _highest(spline, heights)
 
     def _height(self, x: Array, y: Array) -> Array:
-        from scipy.ndimage import map_coordinates
-
+        spline, highest = self._spline
         at = np.broadcast_arrays(x, y)
-        places = [of * n / side for of, n, side in zip(at, self._heights.shape, self.sides, strict=True)]
-        return np.asarray(map_coordinates(self._heights, places, order=3, mode="grid-wrap"))
+        places = [of * n / side for of, n, side in zip(at, spline.shape, self.sides, strict=True)]
+        return np.asarray(highest - _between(spline, places))
 
     @property
     def rms(self) -> tuple[float, float]:
         """Root mean square of its heights (m) and of its slope."""
-        self._heights  # noqa: B018 (computed here, cached)
+        self._spline  # noqa: B018 (computed here, cached)
         return self._rms
 
     @property
@@ -155,3 +158,25 @@ class Rough(Surface):
         yield f"repeats after {self._in_words}; rms height {readable(height)}, rms slope {slope:.3g}"
         shortest = counted(f"{self.shortest / spacing:.3g}", "spacing")
         yield f"shortest wave of {shortest}; the contact area needs 8 or more"
+
+
+def _between(spline: Array, places: Sequence[Array]) -> Array:
+    """Return values of a spline that repeats, at places counted in its points."""
+    from scipy.ndimage import map_coordinates
+
+    return np.asarray(map_coordinates(spline, places, order=3, mode="grid-wrap", prefilter=False))
+
+
+def _highest(spline: Array, heights: Array) -> float:
+    """Return the largest value of a spline, from the highest of its points on ever finer grids about them."""
+    count = min(_SUMMITS, heights.size)
+    top = np.argpartition(heights, -count, axis=None)[-count:]
+    at = np.stack(np.unravel_index(top, heights.shape)).astype(float)
+    highest, apart = -math.inf, 1.0
+    around = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)])).reshape(2, -1)
+    while apart > _CLOSE:
+        at = (at[:, :, None] + apart * around[:, None, :]).reshape(2, -1)
+        found = _between(spline, list(at))
+        highest, at = max(highest, float(found.max())), at[:, found.argsort()[-_SUMMITS:]]
+        apart /= 4.0
+    return highest

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import PrivateAttr
 from pydantic.fields import FieldInfo
+from pydantic_core import SchemaValidator, core_schema
 
 from ..arrays import Array, Mask
 from ..errors import DeckError
@@ -686,6 +687,11 @@ class SurfaceKind(Kind):
 
     expected = 'a table such as { shape = "sphere", radius = "1 mm" }'
 
+    @functools.cached_property
+    def _array(self) -> SchemaValidator:
+        """Validator of several shapes, which numbers their faults."""
+        return SchemaValidator(core_schema.list_schema(core_schema.no_info_plain_validator_function(self.parse)))
+
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""
         return value.written()
@@ -700,7 +706,7 @@ class SurfaceKind(Kind):
         if isinstance(value, Surface):
             return value
         if isinstance(value, list | tuple) and value:
-            parts = tuple(map(self._parse, value))
+            parts = tuple(self._array.validate_python(list(value)))
             return parts[0] if len(parts) == 1 else SurfaceSum(parts=parts)
         if not isinstance(value, Mapping):
             refuse(f"expected {self.expected}")

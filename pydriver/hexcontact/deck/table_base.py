@@ -205,7 +205,7 @@ class Table(BaseModel):
             hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"
             return Mistake(key, MISSING, f"unknown key; {hint}")
         if kind == "list_type":
-            return Mistake(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
+            return Mistake(key, MISSING, "expected an array of tables: write [[]]")
         if kind == "too_short":
             return Mistake(key, MISSING, "expected at least one entry")
         if kind in ("model_type", "model_attributes_type", "dict_type"):

@@ -13,6 +13,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import TriMesh
 from matplotlib.figure import Figure, FigureBase
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as MplPath
 from matplotlib.tri import Triangulation, UniformTriRefiner
 
 from ..analytic.compare import ClosedForms, PartialSlip
@@ -34,6 +36,7 @@ ARROWS, FEWER_ARROWS = 13, 9  # across the contact, about, in a large and in a s
 _WIDTH = 7.2  # inches of a picture with several panels, or of an elongated contact
 _HIGH = 4.5  # inches of a map of an upright contact among others
 _THIN, _LEAST_ASPECT = 1.0 / 15.0, 1.0 / 7.0  # of maps that are stretched across, and their new one
+_OVER = 2.4  # level over fields and lines, under frames, ellipses and arrows
 _ROWS = 5  # maps of a wide contact in one column
 
 
@@ -115,7 +118,12 @@ class Part:
         if self.is_tall:
             axes.locator_params(axis="x", nbins=2)
         if self.cell is not None:
-            axes.plot(*(self.cell * self.factor).T, color=GUIDE, lw=0.7, zorder=0)
+            far = 3.0 * (x_max - x_min + y_max - y_min)
+            around = np.array([(-far, -far), (far, -far), (far, far), (-far, far), (-far, -far)])
+            around += 0.5 * x_min + 0.5 * x_max, 0.5 * y_min + 0.5 * y_max
+            inside = (self.cell * self.factor)[::-1]
+            beyond = MplPath.make_compound_path(MplPath(around, closed=True), MplPath(inside, closed=True))
+            axes.add_patch(PathPatch(beyond, facecolor="white", edgecolor=GUIDE, lw=0.7, zorder=_OVER))
 
     def bar(
         self, canvas: FigureBase, shades: Any, axes: Axes, label: str, below: bool = False, **options: Any
@@ -268,14 +276,16 @@ def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
     tractions vanish at the edge.
     """
     stride = _stride(view.contact)
-    return view.edges(stride).contact_mesh(values[::stride, ::stride], vanishes)
+    return view.edges(stride).contact_mesh(view.every(values, stride), vanishes)
 
 
 def _whole_mesh(view: StepView, values: Array) -> ZoneMesh:
     """Return triangles that fill the contact and all else where a field is not zero."""
     shown = view.contact | (values != 0.0)
     stride = _stride(shown)
-    x, y, values, shown = (field[::stride, ::stride] for field in (view.x, view.y, values, shown))
+    lattice = view.around(stride)
+    x, y = lattice.x[::stride, ::stride], lattice.y[::stride, ::stride]
+    values, shown = view.every(values, stride), view.every(shown, stride)
     corners = triangles(*shown.shape).astype(int)
     inside = shown.ravel()[corners].any(axis=1)
     return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), corners[inside])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from ..analytic.hertz_gap import (
 )
 from ..arrays import Array, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
-from ..core.lattice import linear
+from ..core.lattice import Lattice, linear
 from ..errors import NotInResult
 from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, MOVED_GAP, TRACTIONS, VARIABLES, WORN, spelled
@@ -26,6 +27,7 @@ from .layout import lattice_of, step_of
 from .step import is_kept, nodal
 
 STICK = 1  # value of zone at a sticking node
+_AROUND = 2  # nodes beyond the ends of a window that repeats, on which edges in it depend
 
 
 class HasDataset(Protocol):
@@ -119,12 +121,25 @@ class StepView:
     def edges(self, stride: int = 1) -> ContactEdges:
         """Return the edges of contact and stick area, of every node or of every second, third, ... one.
 
-        Without the gap in the output they are about half-way between the nodes.
+        Without the gap in the output they are about half-way between the nodes. Those of a window that repeats
+        go on beyond its ends; fields for them are made by `every`.
         """
         gap = self.field("gap") if self.has("gap") else np.zeros_like(self.pressure)
-        every = (slice(None, None, stride),) * 2
-        pressure, gap, contact = self.pressure[every], gap[every], self.contact[every]
-        return ContactEdges(pressure, gap, contact, np.isfinite(gap), self.basis * stride, self.start)
+        pressure, gap, contact = (self.every(field, stride) for field in (self.pressure, gap, self.contact))
+        start = self.around(stride).start
+        return ContactEdges(pressure, gap, contact, np.isfinite(gap), self.basis * stride, start)
+
+    def around(self, stride: int = 1) -> Lattice:
+        """Return the window of `every`."""
+        lattice, more = self.lattice, _AROUND * stride * self.lattice.periodic
+        first = {"row_first": lattice.row_first - more, "col_first": lattice.col_first - more}
+        size = {"n_row": lattice.n_row + 2 * more, "n_col": lattice.n_col + 2 * more}
+        return dataclasses.replace(lattice, **first, **size)
+
+    def every(self, field: Array, stride: int = 1) -> Array:
+        """Return a field at every second, third, ... node, also around a window that repeats."""
+        around = _AROUND * stride * self.lattice.periodic
+        return np.pad(field, around, mode="wrap")[::stride, ::stride]
 
     def has(self, *names: str) -> bool:
         """Test whether the output has fields of this step."""
@@ -140,7 +155,12 @@ class StepView:
 
     def stick_mesh(self) -> ZoneMesh:
         """Return the mesh of the stick area up to its edge."""
-        return self.edges().stick_mesh(self.stick & self.contact, self.reserve)
+        return self.edges().stick_mesh(*self._sticking)
+
+    @property
+    def _sticking(self) -> tuple[Mask, Array]:
+        """The nodes that stick, and the reserve of friction there, as `edges` takes them."""
+        return self.every(self.stick & self.contact), self.every(self.reserve)
 
     @functools.cached_property
     def tractions(self) -> TractionField:
@@ -169,12 +189,16 @@ class StepView:
 
     def touches(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) are in contact, to the edge between the nodes."""
-        return np.asarray(self.at(x, y, self.edges().contact_distances()) > 0.0)
+        return self._inside(x, y, self.edges().contact_distances())
 
     def sticks(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) stick, to the edge between the nodes."""
-        distances = self.edges().stick_distances(self.stick & self.contact, self.reserve)
-        return np.asarray(self.at(x, y, distances) > 0.0)
+        return self._inside(x, y, self.edges().stick_distances(*self._sticking))
+
+    def _inside(self, x: Array, y: Array, distances: Array) -> Mask:
+        """Test which points of the plane have a distance from an edge above zero, given at the nodes."""
+        own = slice(_AROUND, -_AROUND) if self.lattice.periodic else slice(None)
+        return np.asarray(self.at(x, y, np.ascontiguousarray(distances[own, own])) > 0.0)
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
         """Return the limits of a picture: x_min, x_max, y_min, y_max.

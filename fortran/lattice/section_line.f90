@@ -66,8 +66,31 @@ contains
     ends = [minval(along, mask=pressure > 0.0_wp), maxval(along, mask=pressure > 0.0_wp)]
     margin = max(margin_part*(ends(2) - ends(1)), least_margin*lattice%spacing())
     ends = ends + [-margin, margin]
+    if (lattice%is_periodic()) call stay_in_period(lattice, through, way, ends)
     line = section_line_t(through + ends(1)*way, through + ends(2)*way, -ends(1))
   end subroutine section_through
+
+  !> Let a line from a point end with the cells of a window.
+  pure subroutine stay_in_period(lattice, through, way, ends)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Point of the line [m] and its direction
+    real(wp), intent(in) :: through(2), way(2)
+    !> Distances of its ends from the point [m]
+    real(wp), intent(inout) :: ends(2)
+    real(wp) :: at(2), rate(2), sides(2), inside(2)
+    integer :: d
+
+    inside = ends
+    at = lattice_position(lattice, through)
+    rate = lattice_position(lattice, through + lattice%spacing()*way) - at
+    do d = 1, 2
+      if (.not. abs(rate(d)) > same) cycle
+      sides = (lattice%first(d) - 0.5_wp + [0, lattice%extent(d)] - at(d))/rate(d)*lattice%spacing()
+      inside = [max(inside(1), minval(sides)), min(inside(2), maxval(sides))]
+    end do
+    if (inside(1) < inside(2)) ends = inside ! a line that does not cross the window stays
+  end subroutine stay_in_period
 
   !> Find the distances from the start at which a line crosses edges of triangles, rising, its ends included [m].
   pure function line_crossings(lattice, start, finish) result(distance)

@@ -370,6 +370,8 @@ def test_rigid_bodies() -> None:
 def test_whole_tables_of_the_wrong_kind() -> None:
     one_load = "\n".join(GOOD.split("[[load]]")[0].splitlines()) + "\n[load]\nnormal_load = 1\n"
     assert "load: expected an array of tables: write [[load]]" in complaint(one_load)
+    coated = GOOD + '\n[body.1.coating]\nthickness = "1 um"\n'
+    assert "body.1.coating: expected an array of tables: write [[body.1.coating]]" in complaint(coated)
     assert "body.1 = 3: expected a table of keys" in complaint("body = { 1 = 3 }")
     empty = complaint("")
     for key in ("body", "grid", "load"):

@@ -21,6 +21,7 @@ from hexcontact import (
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import _columns, hertz_rows
 from hexcontact.plotting.report_data import charts_of
+from hexcontact.plotting.maps import mesh_of
 from hexcontact.plotting.sections import line_of
 from hexcontact.problem.preview import case_rows
 from hexcontact.result.history_words import step_rows
@@ -56,6 +57,28 @@ def test_a_section_of_waves_goes_through_their_crests() -> None:
     """Contacts that repeat have no center: that of the pressure lies between two rows of nodes."""
     line = line_of([StepView(waves(nodes=16, mean_pressure=0.3 * FULL).run(), -1)], 0.0)
     assert (line.start[1], line.start[0] + line.zero) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_a_section_of_complete_contact_is_a_period_long() -> None:
+    views = [StepView(waves(nodes=16, mean_pressure=1.5 * FULL).run(), -1)]
+    assert line_of(views, 0.0).length == pytest.approx(WAVE, rel=1e-12)
+    assert line_of(views, 0.25 * math.pi).length == pytest.approx(math.sqrt(2.0) * WAVE, rel=1e-12)
+
+
+def test_edges_of_a_strip_are_straight_up_to_the_ends_of_its_window() -> None:
+    ridges = {**STEEL, "surface": {"shape": "waviness", "amplitude": 0.5 * HEIGHT, "wavelength": WAVE}}
+    grid = {"extent": [WAVE, 0.25 * WAVE], "nodes_across": 32, "boundary": "periodic"}
+    case = Case(body_1=ridges, body_2=STEEL, mean_pressure=0.1 * FULL, **grid)
+    view = StepView(case.run(), -1)
+    assert line_of([view], 0.0).length < 0.9 * WAVE
+    rows = view.lattice.y[:, 0]
+    for low, high in ((view.lattice.y.min(), 0.0), (0.0, view.lattice.y.max())):
+        x, y = np.meshgrid(np.linspace(-0.5, 0.5, 401) * WAVE, [low, high, rows[3]])
+        inside = view.touches(x, y).sum(axis=1)
+        assert 0 < inside[0] == inside[1] == inside[2] < 401
+    outlines = np.concatenate(mesh_of(view, view.pressure, True).outlines())
+    within = outlines[(rows[0] <= outlines[:, 1]) & (outlines[:, 1] <= rows[-1])]
+    assert len(within) > 8 and np.ptp(abs(within[:, 0])) < 1e-3 * WAVE
 
 
 def test_loads_by_means_are_arguments_of_a_case() -> None:
@@ -702,8 +725,8 @@ def test_pictures_of_a_window_that_repeats() -> None:
     x, y = drawn.si(axes, lines["boundary node"])
     at_sides = (abs(x - lattice.x.min()) < 1e-9) | (abs(y - lattice.y.min()) < 1e-9)
     assert 0 < at_sides.sum() < 8  # where the edges of the four quarters at the corners cross the sides
-    outline = axes.lines[-1] if axes.lines[-1].get_zorder() == 0 else axes.lines[0]
-    corners = np.array(outline.get_data()) * drawn.units(axes.get_xlabel())
+    outline = axes.patches[0].get_path().vertices[-5:]  # a hole in the white beyond the window
+    corners = outline.T * drawn.units(axes.get_xlabel())
     np.testing.assert_allclose(np.ptp(corners, axis=1), WAVE, rtol=1e-6)
     middle = corners.min(axis=1) + 0.5 * WAVE
     nodes = [0.5 * (at.min() + at.max()) for at in (lattice.x, lattice.y)]

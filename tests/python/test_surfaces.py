@@ -264,8 +264,11 @@ def test_several_shapes_of_a_body_add_up(tmp_path: Path) -> None:
         ).body_1.surface
         == one
     )
-    with pytest.raises(DeckError, match="body.1.surface.depth"):
+    with pytest.raises(DeckError, match="body.1.surface.2.depth"):
         case.changed({"body.1.surface": [parts[0], {"shape": "dent", "radius": 1.0}]})
+    wrong = [{"shape": "dent", "radius": 1.0}, {"shape": "sphere", "radius": -1.0}]
+    with pytest.raises(DeckError, match=r"surface\.1\.depth: missing(.|\n)*surface\.2\.radius = -1"):
+        case.changed({"body.1.surface": wrong})
 
 
 def test_a_ball_in_a_groove_is_the_ellipse_of_hertz() -> None:

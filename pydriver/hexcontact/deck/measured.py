@@ -654,7 +654,9 @@ def _filled(heights: Array) -> Array:
     return found.reshape(heights.shape)
 
 
-def _closed(at: Array, height: Array, axis: int, side: float, taper: float | None) -> tuple[Array, Array, str]:
+def _closed(
+    at: Array, height: Array, axis: int, side: float, taper: float | None
+) -> tuple[Array, Array, str]:
     """Return heights along an axis that repeats, with points beyond both ends, and how the ends meet.
 
     DeckError if it does not repeat.

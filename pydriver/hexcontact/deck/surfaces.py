@@ -690,7 +690,9 @@ class SurfaceKind(Kind):
     @functools.cached_property
     def _array(self) -> SchemaValidator:
         """Validator of several shapes, which numbers their faults."""
-        return SchemaValidator(core_schema.list_schema(core_schema.no_info_plain_validator_function(self.parse)))
+        return SchemaValidator(
+            core_schema.list_schema(core_schema.no_info_plain_validator_function(self.parse))
+        )
 
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Protocol, TypeAlias, cast
+from typing import Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from ..text import visible, worded
 from ..variables import BULK_STRESS, LARGEST, MOVED_GAP, TRACTIONS, VARIABLES, WORN, spelled
 from .layout import lattice_of, step_of
 from .step import is_kept, nodal
+
+_Field = TypeVar("_Field", Array, Mask)
 
 STICK = 1  # value of zone at a sticking node
 _AROUND = 2  # nodes beyond the ends of a window that repeats, on which edges in it depend
@@ -121,22 +123,22 @@ class StepView:
     def edges(self, stride: int = 1) -> ContactEdges:
         """Return the edges of contact and stick area, of every node or of every second, third, ... one.
 
-        Without the gap in the output they are about half-way between the nodes. Those of a window that repeats
-        go on beyond its ends; fields for them are made by `every`.
+        Without the gap in the output they are about half-way between the nodes. Those of a window that
+        repeats go on beyond its ends; `every` makes fields for them.
         """
-        gap = self.field("gap") if self.has("gap") else np.zeros_like(self.pressure)
-        pressure, gap, contact = (self.every(field, stride) for field in (self.pressure, gap, self.contact))
+        gap = self.every(self.field("gap") if self.has("gap") else np.zeros_like(self.pressure), stride)
+        pressure, contact = self.every(self.pressure, stride), self.every(self.contact, stride)
         start = self.around(stride).start
         return ContactEdges(pressure, gap, contact, np.isfinite(gap), self.basis * stride, start)
 
     def around(self, stride: int = 1) -> Lattice:
         """Return the window of `every`."""
         lattice, more = self.lattice, _AROUND * stride * self.lattice.periodic
-        first = {"row_first": lattice.row_first - more, "col_first": lattice.col_first - more}
-        size = {"n_row": lattice.n_row + 2 * more, "n_col": lattice.n_col + 2 * more}
-        return dataclasses.replace(lattice, **first, **size)
+        row, col = lattice.row_first - more, lattice.col_first - more
+        n_row, n_col = (n + 2 * more for n in lattice.shape)
+        return dataclasses.replace(lattice, row_first=row, col_first=col, n_row=n_row, n_col=n_col)
 
-    def every(self, field: Array, stride: int = 1) -> Array:
+    def every(self, field: _Field, stride: int = 1) -> _Field:
         """Return a field at every second, third, ... node, also around a window that repeats."""
         around = _AROUND * stride * self.lattice.periodic
         return np.pad(field, around, mode="wrap")[::stride, ::stride]

@@ -36,7 +36,6 @@ _RIGHT = 1e-6  # rounding of a right angle
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
 _REACH = 20.0  # of the window, within which other contacts are looked for
 _TRIED = 161  # points along a side of it
-_LOADS = 24  # point loads along a side in place of a pressure
 _OVERLAP = 0.95  # share of the approach that counts, since displacements are those of the pressure alone
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
@@ -239,27 +238,20 @@ def missed_contact(around: Array, step: Any, modulus: float) -> str:
     """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
 
     They overlap where the gap, from `heights_around`, is below the approach less the displacement by the
-    pressure, that of point loads on half-spaces (K. L. Johnson, Contact Mechanics, 1985, eq. (3.22a)).
+    pressure (fortran/path/beyond_window.f90).
     """
-    x, y, heights = around
-    lattice, approach = step.lattice, _OVERLAP * float(step.approach)
-    near = heights < approach
-    if not near.any():
+    corners = step.lattice.outline
+    limits = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    approach = _OVERLAP * float(step.approach)
+    near = around[:, around[2] < approach].T
+    if not near.size:
         return ""
-    x, y, heights, p = x[near], y[near], heights[near], step.pressure
-    edges = [np.linspace(at.min(), at.max(), _LOADS + 1) for at in (lattice.x, lattice.y)]
-    load, along, across = (
-        np.histogram2d(lattice.x.ravel(), lattice.y.ravel(), bins=edges, weights=(p * times).ravel())[0]
-        for times in (1.0, lattice.x, lattice.y)
-    )
-    loaded = load > 0.0
-    load, along, across = load[loaded], along[loaded] / load[loaded], across[loaded] / load[loaded]
-    far = np.hypot(x[:, None] - along, y[:, None] - across)
-    left = approach - heights - (load * lattice.cell_area / far).sum(axis=1) / (math.pi * modulus)
-    most = int(np.argmax(left))
-    if left[most] <= 0.0:
+    loads = sum(flat.point_loads(lattice, band, limits) for lattice, band in step.bands("pressure"))
+    most = flat.overlap_beyond(near, loads, approach, modulus)
+    if not most:
         return ""
-    there = place(float(x[most]), float(y[most]))
+    x, y, _ = near[most - 1]
+    there = place(float(x), float(y))
     return (
         f"the bodies also touch outside of the window, near {there}; expected lengths that hold all of the "
         "contact, and center in its middle"

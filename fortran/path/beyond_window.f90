@@ -39,16 +39,16 @@ contains
   end subroutine add_point_loads
 
   !> Return the number of the point where the bodies overlap most; 0: they overlap nowhere.
-  pure integer function deepest_overlap(points, loads, approach, modulus)
+  pure integer function deepest_overlap(points, loads, approach, moduli)
     !> Points outside of the window: x, y and the gap before loading (3, n_point) [m]
     real(wp), intent(in) :: points(:, :)
     !> Point loads, see `add_point_loads`
     real(wp), intent(in) :: loads(:, :, :)
     !> Approach of the bodies [m]
     real(wp), intent(in) :: approach
-    !> Modulus E* of the bodies [Pa]
-    real(wp), intent(in) :: modulus
-    real(wp) :: deepest, overlap
+    !> Modulus E* of the bodies near to a load and far from it [Pa], and the distance from which the latter holds [m]
+    real(wp), intent(in) :: moduli(3)
+    real(wp) :: deepest, overlap, distance
     integer :: k, i, j
 
     deepest_overlap = 0
@@ -59,7 +59,9 @@ contains
         if (overlap <= deepest) exit
         do i = 1, size(loads, 2)
           associate (load => loads(1, i, j))
-            if (load > 0.0_wp) overlap = overlap - load/(pi*modulus*norm2(points(:2, k) - loads(2:, i, j)/load))
+            if (.not. load > 0.0_wp) cycle
+            distance = norm2(points(:2, k) - loads(2:, i, j)/load)
+            overlap = overlap - load/(pi*distance*merge(moduli(2), moduli(1), distance > moduli(3)))
           end associate
         end do
       end do

@@ -130,9 +130,9 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
 
     An area is scaled to 0.1 ... 100,000, a volume to 0.01 ... 10,000,000, as by `quantity`.
     """
-    if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
-        return 1.0, unit.replace("1", "")
-    shown, power = _POWERS.get(unit, (unit.replace("m2", "m²"), 1))
+    shown, power = _POWERS.get(unit, (unit.replace("m2", "m²").replace("1", ""), 1))
+    if not shown or not math.isfinite(largest) or largest == 0.0:
+        return 1.0, shown
     size = math.log10(abs(largest) * 1.0000001) + (power - 1)
     exponent = 3 * math.floor(size / (3 * power))
     exponent = min(max(exponent, -12), 9)

@@ -220,6 +220,15 @@ def test_a_file_that_is_no_map_is_refused(file: Any, name: str, content: Any, ke
     assert len(found.splitlines()) == 1
 
 
+def test_a_round_map_of_growing_distances_is_read(file: Any) -> None:
+    at = np.concatenate([-(2.0 ** np.arange(10, 3, -1)), np.arange(-8, 9), 2.0 ** np.arange(4, 11)])
+    x, y = (c.ravel() for c in np.meshgrid(at, at))
+    inside = np.hypot(x, y) <= 1024.0
+    rows = [f"{u:g},{v:g},{-(u**2 + v**2) / 20e3:.9g}" for u, v in zip(x[inside], y[inside], strict=True)]
+    named = of_file(file("round.csv", "\n".join(["x (um),y (um),z (um)", *rows])), holes="open")
+    assert Map(**named).field.gap.shape == (len(at), len(at))
+
+
 def test_a_coordinate_that_few_points_have_is_refused(file: Any) -> None:
     lines = columns_of(BALL).splitlines()
     x, rest = lines[1300].split(",", 1)
@@ -260,15 +269,14 @@ def test_a_large_map_is_refused_before_it_is_read(file: Any, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("keys", "sentence"),
     [
-        ({}, 'units: missing; expected the unit, such as "um": PATH does not say it'),
-        ({"units": "um"}, 'height_units: missing; expected the unit, such as "um": PATH does not say it'),
+        ({}, 'height_units: missing; expected the unit, such as "um": PATH does not say it'),
         (
             {"units": "px"},
             'units = "px": expected a unit of length such as "um"; "px" is a size of print and screens',
         ),
         ({"units": "kg"}, 'units = "kg": expected a unit of length such as "um"; "kg" is a mass'),
         (
-            {"units": "um", "height_units": "um"},
+            {"height_units": "um"},
             "extent: missing; expected extent or spacing: PATH has no coordinates",
         ),
         (
@@ -527,6 +535,43 @@ def test_a_second_summit_outside_of_the_window_is_told(file: Any) -> None:
     assert "no end" in complaint(
         {"shape": "formula", "expression": "sin(x*1e4)*1e-6 + 1e-6"}, nodes_in_radius=10
     )
+
+
+BOWL = "x**2*2 + y**2*2"  # of 0.25 m radius
+MISSED = {  # gaps that also touch outside of a window about 0, 0 under 8 N
+    # beyond an acute corner of the parallelogram of a window, within its smallest rectangle
+    "corner": f"min({BOWL}, ((x + 0.5e-3)**2 + (y - 0.25e-3)**2)*20 + 0.1e-6)",
+    "narrow": f"min({BOWL}, ((x - 0.9e-3)**2 + (y - 0.1e-3)**2)*2e3 + 0.1e-6)",
+    "constant": f"min({BOWL}, ((x - 0.9e-3)**2 + y**2)*20 + 0.1e-6) + 50e-6",
+    "far": f"min({BOWL}, ((x - 20e-3)**2 + y**2)*2 + 0.2e-6)",
+}
+
+
+@pytest.mark.parametrize("expression", MISSED.values(), ids=MISSED)
+def test_bodies_that_also_touch_elsewhere_are_told(expression: str) -> None:
+    formula = {"shape": "formula", "expression": expression}
+    with pytest.raises(DeckError, match="the bodies also touch outside of the window, near x = "):
+        case(formula, load={"normal_load": 8.0}, nodes_in_radius=10).run()
+
+
+def test_a_constant_of_a_formula_raises_no_false_alarm() -> None:
+    formula = {"shape": "formula", "expression": f"{BOWL} + x**4 - 1e-3"}
+    assert case(formula, load={"normal_load": 8.0}, nodes_in_radius=10).run().complete
+
+
+def test_a_narrow_summit_of_a_large_map_is_seen() -> None:
+    """A bowl of 801 x 801 points with one point outside of the window that touches."""
+    from hexcontact.problem.beyond import surroundings
+
+    at = np.linspace(-2e-3, 2e-3, 801)
+    heights = 2.0 * (at[:, None] ** 2 + at**2)
+    heights[613, 207] = 0.02e-6
+    keys = {"upwards": False, "interpolation": "linear"}
+    surface = {"shape": "map", "x": at.tolist(), "y": at.tolist(), "heights": heights.tolist(), **keys}
+    problem = case(surface, load={"normal_load": 2.0}, spacing=8e-6)
+    points = surroundings(problem.plane_gap, problem.lattice).points
+    x, y, gap = points[:, points[2].argmin()]
+    assert (x, y, gap) == pytest.approx((at[613], at[207], 0.02e-6), rel=1e-6)
 
 
 def waves(points: int) -> Any:

@@ -192,11 +192,23 @@ class Placed(NamedTuple):
     turned: str = _TURNED
     extruded: bool = False  # along the first axis
 
-    @property
-    def points(self) -> tuple[Array, Array]:
-        """Points of the plane at which it was measured, of an extruded one at two places far away."""
-        x, y = np.meshgrid(self.map.x, self.map.y)
-        return self.in_plane(x.ravel(), y.ravel())
+    def lowest_points(self, most: int, middle: Array) -> Array:
+        """Return the lowest point of the plane (n, m, 2) in each of at most `most` blocks along an axis.
+
+        Those of an extruded map lie beside a point of the plane.
+        """
+        x, y, gap = self.map.x, self.map.y, self.map.gap
+        if self.extruded:
+            x, gap = self.own(*middle)[0] + self.map.distances[1] * np.arange(-1, 2), gap[[0, 0, 0]]
+        parts = [math.ceil(count / most) for count in gap.shape]
+        beyond = [(0, -count % part) for count, part in zip(gap.shape, parts, strict=True)]
+        blocks = np.pad(np.where(np.isnan(gap), np.inf, gap), beyond, constant_values=np.inf)
+        rows, cols = (count // part for count, part in zip(blocks.shape, parts, strict=True))
+        lowest = blocks.reshape(rows, parts[0], cols, parts[1]).swapaxes(1, 2).reshape(rows, cols, -1)
+        row, col = np.divmod(lowest.argmin(axis=2), parts[1])
+        row = np.minimum(row + parts[0] * np.arange(rows)[:, None], len(x) - 1)
+        col = np.minimum(col + parts[1] * np.arange(cols), len(y) - 1)
+        return np.stack(self.in_plane(x[row], y[col]), axis=-1)
 
     @property
     def distances(self) -> tuple[float, ...]:
@@ -215,11 +227,11 @@ class Placed(NamedTuple):
 
     def own(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return points of the plane in coordinates of the map."""
-        return _turned(x - self.offset[0], y - self.offset[1], -self.angle)
+        return _rotated(x - self.offset[0], y - self.offset[1], -self.angle)
 
     def in_plane(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return points of the map in coordinates of the plane."""
-        x, y = _turned(x, y, self.angle)
+        x, y = _rotated(x, y, self.angle)
         return x + self.offset[0], y + self.offset[1]
 
     # --- contacts that the data do not bound ----------------------------------------------------------------
@@ -272,10 +284,16 @@ class Placed(NamedTuple):
         return place(*(float(at) for at in self.in_plane(np.asarray(x), np.asarray(y))))
 
 
-def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+def _rotated(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
     """Return points that are turned about the origin by an angle (rad)."""
     a, b = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
     return a * x - b * y, b * x + a * y
+
+
+def along_axes(offset: tuple[float, float], angle: float) -> tuple[float, float]:
+    """Return an offset (m) along axes that are turned by an angle (rad)."""
+    x, y = _rotated(np.asarray(offset[0]), np.asarray(offset[1]), -angle)
+    return float(x), float(y)
 
 
 def _beside_steps(along: Array, heights: Array, slopes: Array) -> Mask:

@@ -108,6 +108,14 @@ class Formula:
             raise ValueError("has no finite value here")
         return found
 
+    def of(self, **polynomials: Any) -> Any:
+        """Return the value for polynomials; an error of Python where it is none."""
+
+        def power(base: Any, exponent: Any) -> Any:
+            return math.pow(base, exponent) if isinstance(base, float) else base**exponent
+
+        return self._term(polynomials, {math.pow: power})
+
     def over(self, **arrays: Array) -> Array:
         """Return the values over arrays of its names; NaN or infinite where there are none."""
         with np.errstate(all="ignore"):

@@ -258,11 +258,16 @@ def _stray(at: Array, place: Array) -> int | None:
     """Return a coordinate that few points have, nearer to others or further from them than those; or None."""
     count = np.bincount(place)
     few = count < _FEW * np.median(count)
-    steps = np.diff(at[~few])
+    steps, all_steps = np.diff(at[~few]), np.diff(at)
     if not steps.size:
         return None
-    apart = np.minimum(np.append(np.diff(at), np.inf), np.insert(np.diff(at), 0, np.inf))
-    regular = (apart > (1.0 - _STRAY) * steps.min()) & (apart < (1.0 + _STRAY) * steps.max())
+    apart = np.minimum(np.append(all_steps, np.inf), np.insert(all_steps, 0, np.inf))
+    # steps may grow to an end as they do within
+    growth = max((steps[1:] / steps[:-1]).max(initial=1.0), (steps[:-1] / steps[1:]).max(initial=1.0))
+    within = growth * np.concatenate([all_steps[1:2], np.zeros(len(at) - 2), all_steps[-2:-1]])
+    regular = (apart > (1.0 - _STRAY) * steps.min()) & (
+        apart < (1.0 + _STRAY) * np.maximum(within, steps.max())
+    )
     found = np.flatnonzero(few & ~regular).tolist()
     return found[0] if found else None
 

@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..errors import DeckError
 from ..text import counted, quantity
 from .faults import MISSING
-from .height_map import HeightMap, Placed, place
+from .height_map import HeightMap, Placed, along_axes, place
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
 from .surfaces import Angle, Point, Surface, shape
@@ -205,7 +205,8 @@ class Measured(Surface):
         """Return the file, its values and the unit of its coordinates (m)."""
         assert self.file is not None
         found = read_map(self.file, self.variable, profile)
-        scale = self._scale("units", found.units)
+        # a matrix has the distances of the deck, with their unit
+        scale = 1.0 if found.y is None else self._scale("units", found.units)
         return found, found.values * self._scale("height_units", found.value_units), scale
 
     @property
@@ -239,7 +240,7 @@ class Measured(Surface):
         if self.holes == "refuse" and (count := self.holes_found):
             row, col = np.argwhere(np.isnan(z))[-1]
             u, v = (float(at) + more for at, more in zip((x[row], y[col]), self._moved_by, strict=True))
-            at = [f"x = {quantity(u, 'm')}", f"y = {quantity(v, 'm')}"]
+            at = [f"{name} = {quantity(c, 'm')}" for name, c in zip(self._axes, (u, v), strict=True)]
             where = ", ".join(at[self.extruded :])
             sentence = (
                 f"{counted(count, 'point has', 'points have')} no height, one of them at {where}; expected "
@@ -269,6 +270,11 @@ class Measured(Surface):
         return 0.0
 
     @property
+    def _axes(self) -> str:
+        """Names of the axes of its points."""
+        return "xy"
+
+    @property
     def _name(self) -> str:
         return self.file.name if self.file else ""
 
@@ -279,7 +285,7 @@ class Measured(Surface):
     @property
     def _moved_by(self) -> tuple[float, float]:
         """Offset (m) along the axes of its points."""
-        return self._origin
+        return along_axes(self._origin, self.direction)
 
     @property
     def _heights(self) -> str:
@@ -334,8 +340,8 @@ class Measured(Surface):
         for axis, side in enumerate(self._period):
             if axis == 0 and self.extruded:
                 continue
-            axes[axis], height, how = _closed(axes[axis], height, axis, side, self.taper)
-            self._closing += f"; repeats after {quantity(side, 'm')} in {'xy'[axis]}, {how}"
+            axes[axis], height, how = _closed(axes[axis], height, axis, side, self.taper, self._axes[axis])
+            self._closing += f"; repeats after {quantity(side, 'm')} in {self._axes[axis]}, {how}"
         return axes[0], axes[1], height
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
@@ -441,7 +447,9 @@ class Map(Measured):
             x, y, how = found.x * scale, found.y * scale, "coordinates x and y of the file"
         if self.center is not None:
             x, y = (at - (at.min() + at.max()) / 2 + c for at, c in zip((x, y), self.center, strict=True))
-        units = f"x and y in {found.units or self.units}, heights in {found.value_units or self.height_units}"
+        units = f"heights in {found.value_units or self.height_units}"
+        if of_file := found.units or self.units:
+            units = f"x and y in {of_file}, {units}"
         return Points(x, y, z, f"{self._name}, {units}; {how}")
 
     def _of_matrix(self, rows: Array) -> tuple[Array, Array, Array, str]:
@@ -581,9 +589,8 @@ class Profile(Measured):
         return self.angle
 
     @property
-    def _moved_by(self) -> tuple[float, float]:
-        """Offset (m) across the direction of extrusion alone."""
-        return 0.0, math.cos(self.angle) * self._origin[1] - math.sin(self.angle) * self._origin[0]
+    def _axes(self) -> str:
+        return "st" if self.angle else "xy"
 
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""
@@ -611,7 +618,7 @@ class Profile(Measured):
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the profile, beside the distance of nodes along a direction."""
         (_, y, _, about), (_, moved) = self.points, self._moved_by
-        across, step = "t" if self.angle else "y", float(np.median(np.diff(np.sort(y))))
+        across, step = self._axes[1], float(np.median(np.diff(np.sort(y))))
         turned = ", t across it" * bool(self.angle)
         yield f"{about}; extruded along {math.degrees(self.angle):.6g} deg from x{turned}"
         spacings = step / apart(self.angle + math.pi / 2)
@@ -655,13 +662,13 @@ def _filled(heights: Array) -> Array:
 
 
 def _closed(
-    at: Array, height: Array, axis: int, side: float, taper: float | None
+    at: Array, height: Array, axis: int, side: float, taper: float | None, name: str
 ) -> tuple[Array, Array, str]:
     """Return heights along an axis that repeats, with points beyond both ends, and how the ends meet.
 
     DeckError if it does not repeat.
     """
-    name, n = "xy"[axis], len(at)
+    n = len(at)
     step = float(np.ptp(at)) / (n - 1)
     if np.ptp(np.diff(at)) > _EVEN * step:
         raise DeckError(f"a map that repeats has even distances; those in {name} are not")

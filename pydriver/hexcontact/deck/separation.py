@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from ..errors import DeckError
+from ..text import dotted
 from .height_map import Placed
 from .surfaces import Surface
 
@@ -35,6 +37,20 @@ class Separation:
         """Return the key of the heights of a body in a deck."""
         shape = (self.surface_1 if number == "1" else self.surface_2).shape
         return f"body.{number}.surface" + ".expression" * (shape == "formula")
+
+    @property
+    def keyed(self) -> Iterator[tuple[tuple[str | int, ...], Surface]]:
+        """The shapes of both surfaces with their keys in a deck, those of sums with places from 0."""
+        for number, surface in (("1", self.surface_1), ("2", self.surface_2)):
+            for place, part in enumerate(surface.shapes):
+                yield ("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part
+
+    def without_height(self, x: Array, y: Array) -> tuple[str | int, ...]:
+        """Return the key of a shape that has no height at points where the sum has none."""
+        for key, part in self.keyed:
+            if not (part.height(x, y) > -math.inf).all():
+                return (*key, "expression") if part.shape == "formula" else key
+        return ("body",)
 
     def moved(self, by: ArrayLike) -> Separation:
         """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
@@ -126,13 +142,7 @@ class Separation:
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """The measured maps of both bodies."""
-        bodies = (("body.1.surface", self.surface_1), ("body.2.surface", self.surface_2))
-        return tuple(
-            one.placed(name if surface.shapes == (surface,) else f"{name}.{number}")
-            for name, surface in bodies
-            for number, shape in enumerate(surface.shapes, 1)
-            for one in shape.measured
-        )
+        return tuple(one.placed(dotted(key)) for key, part in self.keyed for one in part.measured)
 
     def _search(self) -> tuple[float, float]:
         """Return the point of the smallest sum of heights, searched from the best one between the centers."""

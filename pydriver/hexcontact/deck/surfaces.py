@@ -77,7 +77,6 @@ else:
         tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
     ]
 
-_SAME_FORM = 1e-10  # rounding errors of a quadratic form, as a share of its largest coefficient
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
 _LAST = 1.0 - 1e-9  # nodes less than a spacing from an end are the last ones
@@ -182,6 +181,11 @@ class Surface(Argument):
     def reach(self) -> float:
         """Distance (m) from the center beyond which nothing can touch; infinite for most shapes."""
         return math.inf
+
+    @property
+    def detail(self) -> float:
+        """Size (m) of details about its center where it may touch; 0: none."""
+        return 0.0
 
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about its data, beside the distance (m) of nodes along a direction (rad)."""
@@ -423,6 +427,11 @@ class Torus(Surface):
     radius: CurvatureRadius = meaning(..., "radius R of the section")
     formula: ClassVar[str] = "h = (r − ring_radius)²/(2R)"
 
+    @property
+    def detail(self) -> float:
+        """Its circle."""
+        return 1.1 * self.ring_radius
+
     def _height(self, x: Array, y: Array) -> Array:
         return (np.hypot(x, y) - self.ring_radius) ** 2 / (2 * self.radius)
 
@@ -465,6 +474,11 @@ class Dent(Surface):
     radius: Radius = meaning(..., "radius R of the dent")
     rim: LengthFromZero = meaning(0.0, "height of the rim, R/2 wide about the dent")
     formula: ClassVar[str] = "h = d (1 − r²/R²)² for r < R; −rim sin² 2π(r/R − 1) for R < r < 1.5 R"
+
+    @property
+    def detail(self) -> float:
+        """Its rim."""
+        return 1.5 * self.radius
 
     def _height(self, x: Array, y: Array) -> Array:
         place = np.hypot(x, y) / self.radius
@@ -599,17 +613,22 @@ class FormulaSurface(Surface):
 
 @functools.lru_cache(64)
 def _quadratic_form(expression: str) -> Array | None:
-    """Return C of a formula that is h = r . C r / 2 at all distances from a nanometer to a kilometer."""
-    radii, angles = 10.0 ** np.arange(-9.0, 4.0)[:, None], 0.1 + np.linspace(0.0, 2.0 * math.pi, 12)
+    """Return C of a formula that is the polynomial h = r . C r / 2; None of others."""
+    from numpy.polynomial import Polynomial
+
+    angles = 0.1 + np.linspace(0.0, 2.0 * math.pi, 12)
     cosines, sines = np.cos(angles), np.sin(angles)
-    x, y = radii * cosines, radii * sines
-    heights = (Formula(expression).over(x=x, y=y) + np.zeros(x.shape)) / radii**2
-    if not np.isfinite(heights).all():
+    along = []  # coefficients of the powers of r in each direction
+    for a, b in zip(cosines, sines, strict=True):
+        try:
+            height: Any = Formula(expression).of(x=Polynomial([0.0, a]), y=Polynomial([0.0, b]))
+            along.append(height.trim().coef)
+        except (ArithmeticError, AttributeError, TypeError, ValueError):  # no polynomial
+            return None
+    if any(len(powers) != 3 or powers[0] or powers[1] for powers in along):
         return None
     forms = np.stack([0.5 * cosines**2, cosines * sines, 0.5 * sines**2], axis=1)
-    found = np.linalg.lstsq(forms, heights[0], rcond=None)[0]
-    if (np.abs(heights - forms @ found) > _SAME_FORM * np.abs(found).max()).any():
-        return None
+    found = np.linalg.lstsq(forms, [powers[2] for powers in along], rcond=None)[0]
     return np.array([[found[0], found[1]], [found[1], found[2]]])
 
 

@@ -108,7 +108,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     axes.set(xlabel="load step", ylabel=f"{symbol} in body {found[0].attrs['body']} ({unit})")
     style.legend_below(axes, ncols=2, fontsize=8)
     deep = f"{worded(depth, 'm')} deep" if depth else "at the surface"
-    style.set_title(canvas, f"{title_of(dataset_of(result))}, {deep}")
+    style.set_title(canvas, ", ".join(filter(None, (title_of(dataset_of(result)), deep))))
     return canvas
 
 

@@ -266,6 +266,7 @@ DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, t
 _VANISH = "dissipation_density", "worn_depth"  # with the pressure at the edge, as tractions do
 _DIVIDED = 30_000, 8_000  # triangles up to which each is cut into four, into sixteen
 _SO_FAR = "accumulated_slip", "dissipation_density", "worn_depth"  # also where the contact was before
+_NOISE = 1e-6  # of the largest pressure, of tractions that count as none
 _WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
 
 
@@ -380,6 +381,8 @@ def draw_field(
     field = _FIELDS[name]
     values = [field.values(view, name) for view in views]
     largest = max(float(np.abs(v).max()) for v in values)
+    if field.unit == "Pa":  # without the colors of rounding
+        largest = max(largest, *(_NOISE * float(view.pressure.max()) for view in views))
     signed = min(float(v.min()) for v in values) < -0.01 * largest
     factor, unit = scaled(largest, field.unit)
     shades: TriMesh | None = None

@@ -101,13 +101,10 @@ def _repeating(
     tables: Mapping[str, Any], gap: FieldSource | None, lattice: Lattice | None
 ) -> tuple[Repeating | None, list[Mistake]]:
     """Return the window that repeats, and faults of it and of the gap over it."""
-    bodies = enumerate((tables["body"].body_1, tables["body"].body_2), 1)
-    for number, surface in ((number, body.surface) for number, body in bodies):
-        parts = surface.shapes if surface else ()
-        for place in (place for place, part in enumerate(parts) if any(part.tilt)):
-            inner = (place,) if len(parts) > 1 else ()
+    for key, part in tables["body"].separation.keyed:
+        if any(part.tilt):
             fault = "expected none in a window that repeats, which a tilted surface does not"
-            return None, [Mistake(("body", str(number), "surface", *inner, "tilt"), parts[place].tilt, fault)]
+            return None, [Mistake((*key, "tilt"), part.tilt, fault)]
     if lattice is None:
         lattice, faults = window.repeating(tables["grid"])
         if faults:
@@ -456,15 +453,12 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
     if (grid := tables.get("grid")) and grid.periodic:
         return
     gap = bodies.separation
-    for number, body, surface in (("1", bodies.body_1, gap.surface_1), ("2", bodies.body_2, gap.surface_2)):
-        if body.surface and any(one.taper for one in body.surface.measured):
-            sentence = 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
-            yield ("body", number, "surface"), sentence
-        for place, part in enumerate(surface.shapes if body.surface else ()):
-            if isinstance(part, Roller) and (fault := part.design_fault):
-                inner = (place,) if len(surface.shapes) > 1 else ()
-                yield ("body", number, "surface", *inner, "design_load"), fault
-                return
+    for key, part in gap.keyed:
+        if any(one.taper for one in part.measured):
+            yield key, 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
+        if isinstance(part, Roller) and (fault := part.design_fault):
+            yield (*key, "design_load"), fault
+            return
     if not gap_given and gap.flat and tables.get("interface"):
         yield from _full_contact_problems(tables, steps)
     elif not gap_given:

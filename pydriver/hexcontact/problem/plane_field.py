@@ -17,10 +17,10 @@ from ..deck.height_map import HeightMap, Placed, in_si, place
 from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficients
 from ..deck.map_file import MOST_POINTS
 from ..deck.separation import Separation
-from ..deck.surfaces import Roller
+from ..deck.surfaces import Roller, Surface
 from ..deck.units import LENGTH, NUMBER, Dimension
 from ..errors import DeckError
-from ..text import listed
+from ..text import dotted, listed
 from ..variables import LARGEST
 
 FieldSource = Callable[[Array, Array], ArrayLike] | Array
@@ -78,7 +78,8 @@ class PlaneField:
 
     `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
     the map, if it is one; `maps`: those of measured surfaces, or itself; `heights`: those (m) of both
-    surfaces, none if only their sum is known; `rollers`: those among its shapes, which the problem sets.
+    surfaces, none if only their sum is known, as are their `shapes`; `rollers`: those of these, which the
+    problem sets.
     """
 
     def __init__(self, source: FieldSource, rule: Rule) -> None:
@@ -88,8 +89,9 @@ class PlaneField:
         self.maps: tuple[Placed, ...] = (Placed(rule.key, self.map),) if self.map else ()
         self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
         self.rollers: list[Roller] = []
+        self.shapes: tuple[Surface, ...] = ()
         if isinstance(source, Separation):
-            self.maps = source.placed
+            self.maps, self.shapes = source.placed, source.shapes
             self.heights = source.surface_1.height, source.surface_2.height
 
     @property
@@ -169,8 +171,7 @@ class PlaneField:
             raise DeckError(f"{self.rule.key}: the map does not cover the window: it has no value at {where}")
         shown, key = "NaN" if np.isnan(value) else f"{value:g}", self.rule.key
         if isinstance(self.source, Separation):
-            one = self.heights[0](x[bad][:1], y[bad][:1])
-            key = self.source.key_of("2" if one >= self.rule.least else "1")
+            key = dotted(self.source.without_height(x[bad][:1], y[bad][:1]))
         raise DeckError(f"{key}: expected {self.rule.expected}; it is {shown} at {where}")
 
     @property

@@ -32,6 +32,7 @@ from ..text import counted, listed
 from ..variables import LOADS
 from . import checks, window
 from .arguments import Body
+from .beyond import Surroundings, missed_contact, surroundings
 from .checks import checked
 from .loads import LoadStep, rolled_out, wearing_cycle
 from .plane_field import GAP, FieldSource, FrictionField, PlaneField
@@ -43,6 +44,7 @@ RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one of
 LEAST_LEVELS = 3  # lattices of a refinement
 _MOST_CHECKED_NODES = 10_000_000  # nodes of a window for which friction is computed before a run
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
+_BESIDE_COATING = 5.0  # thicknesses from a load, within which a soft coating counts
 _NO_ELASTICITY = 1e-9  # share of the compliance of the interface that bodies have in a full contact
 
 
@@ -79,7 +81,7 @@ class Problem:
 
     deck_file: Path | None = None
     _stiffest = 0.0  # decimal logarithm of the stiffness of the interface over that of the bodies
-    _around: tuple[Lattice, Array] | None = None  # heights outside of the last window
+    _around: tuple[Lattice, Surroundings] | None = None  # of the last window
     trial = False  # whether it is one of several lattices of a refinement
     judged: dict[bool, list[str]]  # its warnings, without and with an estimate of the contact, once found
 
@@ -91,7 +93,7 @@ class Problem:
         "load.1.steps": 5}``. Entries of arrays count from 1; None removes a key.
         """
         data, text = toml.read_toml(path)
-        if "parameter" in data and "body" not in data:
+        if not data.keys().isdisjoint(("deck", "parameter")) and "body" not in data:
             raise DeckError(f"{path} is a study and no deck; hexcontact study {path} runs its cases")
         source = Source(str(path), text)
         case = cls._made(assemble(data, text, source, Path(path).parent, overrides))
@@ -294,11 +296,18 @@ class Problem:
         if simple or self._contact is None or self.moves:
             return
         if self._around is None or self._around[0] != step.lattice:
-            self._around = step.lattice, window.heights_around(self._gap, step.lattice)
-        compliance = sum(body.compliance for body in (self.body_1, self.body_2))
-        modulus = min(self.pair.effective_modulus, 1.0 / compliance if compliance else math.inf)
-        if fault := window.missed_contact(self._around[1], step, modulus):
+            self._around = step.lattice, surroundings(self._gap, step.lattice)
+        if fault := missed_contact(self._around[1], step, self._moduli):
             raise DeckError(f"grid.extent: load step {step.number}: {fault}")
+
+    @property
+    def _moduli(self) -> tuple[float, float, float]:
+        """Modulus E* (Pa) near to a load, far from it, and the distance (m) from which the latter holds."""
+        bodies = self.body_1, self.body_2
+        compliance = sum(body.compliance for body in bodies)
+        near, far = self.pair.effective_modulus, 1.0 / compliance if compliance else math.inf
+        thickness = sum(layer.thickness for body in bodies for layer in body.coating)
+        return min(near, far), far, _BESIDE_COATING * thickness
 
     def holes_near(self, contact: Estimate) -> int:
         """Return the number of holes of height maps within the bounds of an estimated contact."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,12 +21,10 @@ from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
 from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import MISSING, Mistake
-from ..deck.height_map import BEYOND_MAP, Placed, place
+from ..deck.height_map import BEYOND_MAP, Placed, along_axes
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
-from ..errors import DeckError
-from .plane_field import PlaneField
 
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
@@ -34,9 +32,6 @@ GapFunction = Callable[[Array, Array], Array]
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 _RIGHT = 1e-6  # rounding of a right angle
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
-_REACH = 20.0  # of the window, within which other contacts are looked for
-_TRIED = 161  # points along a side of it
-_OVERLAP = 0.95  # share of the approach that counts, since displacements are those of the pressure alone
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
 # Decimal logarithms of the stiffness of an interface over that of the bodies.
@@ -217,47 +212,6 @@ def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     )
 
 
-def heights_around(gap: PlaneField, lattice: Lattice) -> Array:
-    """Return x, y and the gap (m) in rows, at points of maps and of a grid outside of a window."""
-    corners = lattice.outline
-    middle, half = (corners.max(axis=0) + corners.min(axis=0)) / 2, np.ptp(corners, axis=0) / 2
-    sides = np.linspace(-_REACH, _REACH, _TRIED)
-    around = np.meshgrid(middle[0] + half[0] * sides, middle[1] + half[1] * sides)
-    measured = (np.stack(one.points) for one in gap.maps)
-    fewer = [points[:, :: points.shape[1] // _TRIED**2 + 1] for points in measured]
-    x, y = np.concatenate([np.reshape(around, (2, -1)), *fewer], axis=1)
-    outside = (np.abs(np.stack([x, y], axis=1) - middle) > half).any(axis=1)
-    x, y = x[outside], y[outside]
-    try:
-        return np.stack([x, y, gap.at(x, y)])
-    except (DeckError, ValueError):  # it is known near the window only
-        return np.empty((3, 0))
-
-
-def missed_contact(around: Array, step: Any, modulus: float) -> str:
-    """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
-
-    They overlap where the gap, from `heights_around`, is below the approach less the displacement by the
-    pressure (fortran/path/beyond_window.f90).
-    """
-    corners = step.lattice.outline
-    limits = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    approach = _OVERLAP * float(step.approach)
-    near = around[:, around[2] < approach].T
-    if not near.size:
-        return ""
-    loads = sum(flat.point_loads(lattice, band, limits) for lattice, band in step.bands("pressure"))
-    most = flat.overlap_beyond(near, loads, approach, modulus)
-    if not most:
-        return ""
-    x, y, _ = near[most - 1]
-    there = place(float(x), float(y))
-    return (
-        f"the bodies also touch outside of the window, near {there}; expected lengths that hold all of the "
-        "contact, and center in its middle"
-    )
-
-
 # --- the interface ------------------------------------------------------------------------------------------
 
 
@@ -421,11 +375,11 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
         beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
         if not beyond:
             continue
-        moved = [0.0, 0.0] if one.angle else one.offset  # to the plane
+        moved, names = along_axes(one.offset, one.angle), "st" if one.angle else "xy"
         theirs, ours = (
             " and ".join(
-                f"{'xy'[i]} from {readable(ends[i].min() + moved[i])} to {readable(ends[i].max() + moved[i])}"
-                for i in beyond
+                f"{names[i]} from {readable(low + moved[i])} to {readable(high + moved[i])}"
+                for i, low, high in ((i, ends[i].min(), ends[i].max()) for i in beyond)
             )
             for ends in (at, own)
         )

@@ -283,7 +283,9 @@ class Store:
     @property
     def kept(self) -> str:
         """Sentence about the finished steps and how to resume; empty without any."""
-        return self.recorded and f"{self.recorded}; to resume: hexcontact resume {shlex.quote(str(self.path))}"
+        return (
+            self.recorded and f"{self.recorded}; to resume: hexcontact resume {shlex.quote(str(self.path))}"
+        )
 
     @property
     def recorded(self) -> str:

@@ -13,27 +13,27 @@ module hc_beyond_window
 contains
 
   !> Add the pressure in rows of a window to its point loads.
-  pure subroutine add_point_loads(lattice, pressure, limits, loads)
+  pure subroutine add_point_loads(lattice, pressure, before, n_row, loads)
     !> Lattice, and rows of the window
     type(lattice_t), intent(in) :: lattice
     !> Pressure there (n_col, n_row) [Pa]
     real(wp), intent(in) :: pressure(:, :)
-    !> Smallest and largest x and y of the window, in columns [m]
-    real(wp), intent(in) :: limits(2, 2)
-    !> Loads [N], and the same times x and y [N m] (3, n_load, n_load), which divide the window evenly
+    !> Rows of the window before them, and all of its rows
+    integer, intent(in) :: before, n_row
+    !> Loads [N], and the same times x and y [N m] (3, n_across, n_up), which divide the window evenly
     real(wp), intent(inout) :: loads(:, :, :)
     real(wp) :: x(size(pressure, 1)), y(size(pressure, 1)), load
-    integer :: cell(2), row, col, n_load
+    integer :: row, col, i, j
 
-    n_load = size(loads, 2)
     do row = 1, size(pressure, 2)
       if (.not. any(pressure(:, row) > 0.0_wp)) cycle
       call lattice%row_coordinates(row, x, y)
+      j = (before + row - 1)*size(loads, 3)/n_row + 1
       do col = 1, size(x)
         if (.not. pressure(col, row) > 0.0_wp) cycle
         load = pressure(col, row)*lattice%cell_area()
-        cell = min(max(int(n_load*([x(col), y(col)] - limits(:, 1))/(limits(:, 2) - limits(:, 1))) + 1, 1), n_load)
-        loads(:, cell(1), cell(2)) = loads(:, cell(1), cell(2)) + load*[1.0_wp, x(col), y(col)]
+        i = (col - 1)*size(loads, 2)/size(x) + 1
+        loads(:, i, j) = loads(:, i, j) + load*[1.0_wp, x(col), y(col)]
       end do
     end do
   end subroutine add_point_loads

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -38,12 +37,14 @@ class Separation:
         shape = (self.surface_1 if number == "1" else self.surface_2).shape
         return f"body.{number}.surface" + ".expression" * (shape == "formula")
 
-    @property
-    def keyed(self) -> Iterator[tuple[tuple[str | int, ...], Surface]]:
+    @cached_property
+    def keyed(self) -> list[tuple[tuple[str | int, ...], Surface]]:
         """The shapes of both surfaces with their keys in a deck, those of sums with places from 0."""
+        found: list[tuple[tuple[str | int, ...], Surface]] = []
         for number, surface in (("1", self.surface_1), ("2", self.surface_2)):
             for place, part in enumerate(surface.shapes):
-                yield ("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part
+                found.append((("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part))
+        return found
 
     def without_height(self, x: Array, y: Array) -> tuple[str | int, ...]:
         """Return the key of a shape that has no height at points where the sum has none."""
@@ -65,6 +66,11 @@ class Separation:
     def moves(self) -> bool:
         """Whether shapes are bound to rolling bodies."""
         return bool(self.surface_1.moving or self.surface_2.moving)
+
+    @property
+    def convex(self) -> bool:
+        """Whether the bodies touch in one place, however far they are pressed."""
+        return self.curvature is not None or all(part.convex for part in self.shapes)
 
     @property
     def flat(self) -> bool:
@@ -142,7 +148,11 @@ class Separation:
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """The measured maps of both bodies."""
-        return tuple(one.placed(dotted(key)) for key, part in self.keyed for one in part.measured)
+        found: list[Placed] = []
+        for key, part in self.keyed:
+            for one in part.measured:
+                found.append(one.placed(dotted(key)))
+        return tuple(found)
 
     def _search(self) -> tuple[float, float]:
         """Return the point of the smallest sum of heights, searched from the best one between the centers."""

@@ -80,6 +80,7 @@ else:
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
 _LAST = 1.0 - 1e-9  # nodes less than a spacing from an end are the last ones
+_ROUNDED = 1e-12  # of curvatures, over the largest
 _WHOLE = 1e-6  # rounding of the number of waves in a period
 
 
@@ -176,6 +177,13 @@ class Surface(Argument):
     def curvature(self) -> Array | None:
         """Curvature tensor (2, 2) in 1/m if the height is h = r . C r / 2 everywhere, else None."""
         return None
+
+    @property
+    def convex(self) -> bool:
+        """Whether it surely curves away from the other body everywhere; two such ones touch in one place."""
+        if self.curvature is None:
+            return self.one_spot and not (self.as_given or self.measured)
+        return bool(np.linalg.eigvalsh(self.curvature).min() >= -_ROUNDED * np.abs(self.curvature).max())
 
     @property
     def reach(self) -> float:
@@ -351,6 +359,11 @@ class Power(Surface):
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
     coefficient: Coefficient = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
+
+    @property
+    def convex(self) -> bool:
+        """Whether it has no cusp."""
+        return self.exponent >= 1.0
 
     def _height(self, x: Array, y: Array) -> Array:
         return self.coefficient * np.hypot(x, y) ** self.exponent
@@ -618,17 +631,18 @@ def _quadratic_form(expression: str) -> Array | None:
 
     angles = 0.1 + np.linspace(0.0, 2.0 * math.pi, 12)
     cosines, sines = np.cos(angles), np.sin(angles)
-    along = []  # coefficients of the powers of r in each direction
+    along = []  # coefficients of r²
     for a, b in zip(cosines, sines, strict=True):
         try:
-            height: Any = Formula(expression).of(x=Polynomial([0.0, a]), y=Polynomial([0.0, b]))
-            along.append(height.trim().coef)
-        except (ArithmeticError, AttributeError, TypeError, ValueError):  # no polynomial
+            height = Formula(expression).of(x=Polynomial([0.0, a]), y=Polynomial([0.0, b]))
+            powers = (height + Polynomial([0.0])).coef
+        except (ArithmeticError, TypeError, ValueError):  # no polynomial
             return None
-    if any(len(powers) != 3 or powers[0] or powers[1] for powers in along):
-        return None
+        if len(powers) > 3 or powers[:2].any():
+            return None
+        along.append(powers[2:].sum())
     forms = np.stack([0.5 * cosines**2, cosines * sines, 0.5 * sines**2], axis=1)
-    found = np.linalg.lstsq(forms, [powers[2] for powers in along], rcond=None)[0]
+    found = np.linalg.lstsq(forms, along, rcond=None)[0]
     return np.array([[found[0], found[1]], [found[1], found[2]]])
 
 

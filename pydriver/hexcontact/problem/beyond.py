@@ -18,7 +18,8 @@ _TRIED = 121  # points along a side of a grid
 _GRIDS = 7  # about a window, each twice as wide as the one before
 _LOWEST = 200  # points about which lower ones are looked for
 _HALVINGS = 3  # of their distances
-_OVERLAP = 0.95  # share of the penetration that counts, since displacements are those of the pressure alone
+_LOADS = 24  # along a side of a window, in place of the pressure
+_OVERLAP = 0.99  # share of the penetration that counts, since displacements are those of the pressure alone
 
 
 class Surroundings(NamedTuple):
@@ -85,13 +86,21 @@ def missed_contact(around: Surroundings, step: Any, moduli: tuple[float, float, 
     They overlap where the gap is below the approach less the displacement by the pressure
     (fortran/path/beyond_window.f90).
     """
-    corners = step.lattice.outline
-    limits = np.stack([corners.min(axis=0), corners.max(axis=0)])
     approach = around.lowest + _OVERLAP * (float(step.approach) - around.lowest)
     near = around.points[:, around.points[2] < approach].T
     if not near.size:
         return ""
-    loads = sum(flat.point_loads(lattice, band, limits) for lattice, band in step.bands("pressure"))
+    window = step.lattice
+    # loads are about as far apart across and along a slender window
+    slender = math.sqrt(window.n_col / (window.n_row * window.cell_ratio))
+    counts = [
+        max(min(round(_LOADS * ratio), n), 1)
+        for ratio, n in ((slender, window.n_col), (1.0 / slender, window.n_row))
+    ]
+    loads = sum(
+        flat.point_loads(rows, band, rows.row_first - window.row_first, window.n_row, *counts)
+        for rows, band in step.bands("pressure")
+    )
     most = flat.overlap_beyond(near, loads, approach, moduli)
     if not most:
         return ""

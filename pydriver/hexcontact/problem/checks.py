@@ -11,6 +11,7 @@ from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
 from ..deck.keys import Deck, Grid, Load, Segment, Solver
+from ..deck.measured import Measured
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
 from ..deck.series import MEANS, MOST_STEPS
@@ -454,7 +455,7 @@ def _body_problems(tables: Mapping[str, Any], steps: tuple[LoadStep, ...], gap_g
         return
     gap = bodies.separation
     for key, part in gap.keyed:
-        if any(one.taper for one in part.measured):
+        if isinstance(part, Measured) and part.taper:
             yield key, 'expected no taper but in a window that repeats, grid.boundary = "periodic"'
         if isinstance(part, Roller) and (fault := part.design_fault):
             yield (*key, "design_load"), fault

@@ -292,7 +292,7 @@ class Problem:
 
     def check_beyond(self, step: Any) -> None:
         """Refuse a load step whose bodies also touch outside of a window that follows from the contact."""
-        simple = not self.gap_given and self.surfaces.curvature is not None
+        simple = not self.gap_given and self.surfaces.convex
         if simple or self._contact is None or self.moves:
             return
         if self._around is None or self._around[0] != step.lattice:

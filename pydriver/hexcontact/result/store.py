@@ -268,10 +268,8 @@ class Store:
         """Close the store; the journal has the reason of an error, the error names the finished steps."""
         known = isinstance(error, HexcontactError | KeyboardInterrupt)
         self.close((str(error) or "interrupted") if known else "")
-        # a deck that does not hold is no other one after a resume
-        note = self.recorded if isinstance(error, DeckError) else self.kept
-        if isinstance(error, HexcontactError) and note:
-            error.add_note(note)
+        if isinstance(error, HexcontactError) and self.kept:
+            error.add_note(self.kept)
 
     @property
     def has_all_steps(self) -> bool:
@@ -282,14 +280,7 @@ class Store:
 
     @property
     def kept(self) -> str:
-        """Sentence about the finished steps and how to resume; empty without any."""
-        return (
-            self.recorded and f"{self.recorded}; to resume: hexcontact resume {shlex.quote(str(self.path))}"
-        )
-
-    @property
-    def recorded(self) -> str:
-        """Sentence about the finished steps, their number and place; empty without any."""
+        """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
         planned, count = self.metadata.planned_steps, len(self.heads)
         finished = records.TrialFolder(self.folder).kept
@@ -297,7 +288,11 @@ class Store:
             finished = f"{count} of {counted(planned, 'load step is', 'load steps are')} finished"
         elif self.heads:
             finished = f"{counted(count, 'load step is', 'load steps are')} finished"
-        return finished and f"{finished} and recorded in {where}"
+        if not finished:
+            return ""
+        return (
+            f"{finished} and recorded in {where}; to resume: hexcontact resume {shlex.quote(str(self.path))}"
+        )
 
     @contextlib.contextmanager
     def writing(self, what: str, missing: bool = False) -> Iterator[None]:

@@ -292,6 +292,7 @@ contains
       end if
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       if (step%determined()) deallocate (now%p, now%q)
+      call give_back(3*n)
       if (ahead) then
         if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
         call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
@@ -321,6 +322,7 @@ contains
       call step%nodes%pack_all(step%x, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
+      call give_back(3*n)
       call step%nodes%unpack_all(3*n, unknown, fixed, kept, step%x)
       now%outcome = iteration%outcome
       now%rounding = iteration%rounding

@@ -318,7 +318,6 @@ contains
       ! the next sweep begins with a product; stiff springs that rest under the pressure would feel the rounding
       iteration%single = .not. allocated(system%tilt)
       ! the traction across of nodes on a bound that does not grow with the pressure is no unknown
-      call give_back(3*n)
       call step%nodes%pack_all(step%x, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
@@ -378,7 +377,6 @@ contains
       if (size(c%multiplier) > n_shear) now%motion(normal) = c%multiplier(n_shear + 1)
       ! fields go as soon as they are copied: a window is too large for two of each
       c = constraints_t()
-      call give_back(3*n)
       now%p = x(:n)
       call system%add_slope(now%p, x(2*n + 1:))
       call system%add_tilt(1.0_wp, now%p, ax(n + 1:2*n))

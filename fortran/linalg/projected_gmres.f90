@@ -198,7 +198,6 @@ contains
       integer, intent(in) :: k
       integer :: stat
 
-      call give_back(size(ax))
       associate (double => merge(0, nodes%n_active, iteration%single), single => merge(nodes%n_active, 0, iteration%single))
         allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k)%beyond(others%n_active), &
                   basis(k + 1)%rounded(single), basis(k + 1)%v(double), stat=stat)
@@ -252,6 +251,7 @@ contains
       real(wp), allocatable :: r(:)
       integer :: stat
 
+      call give_back(size(ax))
       allocate (r(nodes%n_active), stat=stat)
       call agree(stat)
       if (allocated(error)) return

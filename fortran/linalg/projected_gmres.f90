@@ -251,7 +251,8 @@ contains
       real(wp), allocatable :: r(:)
       integer :: stat
 
-      call give_back(size(ax))
+      ! after a restart the same memory serves again
+      if (iteration%made == 0) call give_back(size(ax))
       allocate (r(nodes%n_active), stat=stat)
       call agree(stat)
       if (allocated(error)) return

@@ -292,6 +292,7 @@ contains
       end if
       iteration%weight(2:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       if (step%determined()) deallocate (now%p, now%q)
+      call give_back(3*n)
       if (ahead) then
         if (allocated(system%compliance)) step%ax(:n) = step%ax(:n) + system%compliance*step%x(:n)
         call now%shear%add_springs(step%x(n + 1:), step%ax(n + 1:))
@@ -317,10 +318,10 @@ contains
       ! the next sweep begins with a product; stiff springs that rest under the pressure would feel the rounding
       iteration%single = .not. allocated(system%tilt)
       ! the traction across of nodes on a bound that does not grow with the pressure is no unknown
-      call give_back(3*n)
       call step%nodes%pack_all(step%x, unknown, fixed, kept)
       call projected_gmres(system, step%nodes, step%constraints, rhs, unknown, step%ax, iteration, error)
       if (allocated(error)) return
+      call give_back(3*n)
       call step%nodes%unpack_all(3*n, unknown, fixed, kept, step%x)
       now%outcome = iteration%outcome
       now%rounding = iteration%rounding
@@ -376,7 +377,6 @@ contains
       if (size(c%multiplier) > n_shear) now%motion(normal) = c%multiplier(n_shear + 1)
       ! fields go as soon as they are copied: a window is too large for two of each
       c = constraints_t()
-      call give_back(3*n)
       now%p = x(:n)
       call system%add_slope(now%p, x(2*n + 1:))
       call system%add_tilt(1.0_wp, now%p, ax(n + 1:2*n))

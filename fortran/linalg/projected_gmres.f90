@@ -61,10 +61,10 @@ contains
 
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(iteration%most_directions + 1)
-    !> Residual without its weights, and the one that becomes the next; in its memory also a direction and its product
-    real(wp), allocatable :: r(:), w(:)
+    !> Residual that becomes the next; in its memory also a direction and its product
+    real(wp), allocatable :: w(:)
     type(active_set_t) :: others
-    !> A product over all nodes, and memory for it where the system has none
+    !> A product over all nodes, and memory for it where the system has none; between products it serves for vectors
     real(wp), pointer, contiguous :: image(:)
     real(wp), allocatable, target :: own(:)
     !> Places of the last active nodes of the parts
@@ -107,6 +107,7 @@ contains
     !> Compute the weighted residual of the start, the first direction.
     subroutine begin()
       type(active_set_t) :: of_part
+      real(wp), allocatable :: r(:)
       real(wp) :: unit(size(along))
       integer :: i, part
 
@@ -145,23 +146,19 @@ contains
 
       directions = 0
       began = length
-      call take_memory(1)
-      if (allocated(error)) return
       w = w/length
       call keep(1)
       g = 0.0_wp
       g(1) = began
       h = 0.0_wp
       do k = 1, most
-        if (.not. allocated(basis(k)%beyond)) call take_memory(k)
-        if (allocated(error)) return
         call find_direction(k)
         if (allocated(error)) return
         call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
         call nodes%pack(image, w)
         call others%pack(image, basis(k)%beyond)
-        call constraints%add_columns(space, -share(:, k), w, r)
+        call constraints%add_columns(space, -share(:, k), w, image(:size(w)))
         call weigh(iteration%weight, w)
         do i = 1, k
           if (iteration%single) then
@@ -195,28 +192,30 @@ contains
       if (iteration%residual <= iteration%tolerance) iteration%outcome = solution_accurate
     end subroutine search
 
-    !> Take the memory of a direction, of the residuals before and after it, and of a product, on all ranks or on none.
+    !> Take the memory of a direction, of the residual after it, and of a product, on all ranks or on none.
     subroutine take_memory(k)
       !> Its number
       integer, intent(in) :: k
-      integer :: i, stat
+      integer :: stat
 
-      stat = 0
       associate (double => merge(0, nodes%n_active, iteration%single), single => merge(nodes%n_active, 0, iteration%single))
-        if (.not. allocated(basis(k)%beyond)) then
-          call give_back(size(ax))
-          allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k)%beyond(others%n_active), stat=stat)
-        end if
-        do i = k, k + 1
-          if (stat == 0 .and. .not. allocated(basis(i)%v)) allocate (basis(i)%rounded(single), basis(i)%v(double), stat=stat)
-        end do
+        allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k)%beyond(others%n_active), &
+                  basis(k + 1)%rounded(single), basis(k + 1)%v(double), stat=stat)
       end associate
       if (stat == 0) call system%take_image(size(ax), own, image, stat)
+      call agree(stat)
+    end subroutine take_memory
+
+    !> Raise an error where a rank has not enough memory.
+    subroutine agree(stat)
+      !> Not zero: there is not enough memory
+      integer, intent(in) :: stat
+
       if (stat /= 0) then
         call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
       end if
       call space%agree(error)
-    end subroutine take_memory
+    end subroutine agree
 
     !> Store a residual.
     subroutine keep(i)
@@ -248,7 +247,15 @@ contains
     subroutine find_direction(k)
       !> Its number
       integer, intent(in) :: k
+      !> Its residual without the weights, freed before the direction takes its memory
+      real(wp), allocatable :: r(:)
+      integer :: stat
 
+      ! after a restart the same memory serves again
+      if (iteration%made == 0) call give_back(size(ax))
+      allocate (r(nodes%n_active), stat=stat)
+      call agree(stat)
+      if (allocated(error)) return
       if (iteration%single) then
         r = basis(k)%rounded
       else
@@ -257,13 +264,16 @@ contains
       call weigh(1.0_wp/iteration%weight, r)
       call system%precondition_packed(nodes, size(ax), r, w, error)
       if (allocated(error)) return
+      deallocate (r)
+      call take_memory(k)
+      if (allocated(error)) return
       if (iteration%single) then
         basis(k)%rounded_mr = real(w, sp)
         w = basis(k)%rounded_mr
       else
         basis(k)%mr = w
       end if
-      share(:, k) = -matmul(inverse, constraints%resultants(space, w, r))
+      share(:, k) = -matmul(inverse, constraints%resultants(space, w, image(:size(w))))
       call constraints%add_mb(space, share(:, k), w)
     end subroutine find_direction
 
@@ -272,7 +282,6 @@ contains
       real(wp) :: largest
       integer :: i
 
-      if (allocated(own)) deallocate (own)
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do
@@ -290,7 +299,8 @@ contains
         call add_residual(-left(i), i)
       end do
       call weigh(1.0_wp/iteration%weight, w)
-      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w, r)
+      call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w, image(:size(w)))
+      if (allocated(own)) deallocate (own)
       call nodes%add(1.0_wp, w, ax)
       w = 0.0_wp
       call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), w)
@@ -314,6 +324,7 @@ contains
         call add_residual(left(i), i)
       end do
       length = sqrt(space%dot(w, w))
+      basis = direction_t()
     end subroutine take_step
 
     !> Multiply by one factor for each part.

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import DECK, ENVIRONMENT, PATIENCE, inside, wait_for
 
+from hexcontact import Case
 from hexcontact.core import flat
 from hexcontact.result.journal import journal_of
 
@@ -86,6 +87,45 @@ def test_copies_are_refused(
     assert refused.returncode == 2
     assert f"{launcher} started 3 processes; expected one" in " ".join(refused.stderr.split())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.toml"]
+
+
+@pytest.mark.parametrize(
+    "words", [("check", "sphere.toml"), ("study", "study.toml", "--plan"), ("--version",)]
+)
+def test_other_commands_run_once(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    (tmp_path / "study.toml").write_text(
+        'deck = "sphere.toml"\n[[parameter]]\nkey = "friction.coefficient"\nvalues = [0.1, 0.2]\n'
+    )
+    alone = inside(tmp_path, *words)
+    assert alone.returncode == 0 and alone.stdout
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    for rank, printed in (("0", alone.stdout), ("1", "")):
+        monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
+        copy = inside(tmp_path, *words)
+        assert (copy.returncode, copy.stdout) == (0, printed)
+
+
+def test_python_solves_alone_in_each_process_into_files_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    case = Case.from_toml(tmp_path / "sphere.toml")
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    assert len(case.run(tmp_path / "own.nc")) == 2
+    code = "import hexcontact; hexcontact.Case.from_toml('sphere.toml').run('own.nc', overwrite=True)"
+    with case.start(tmp_path / "own.nc", overwrite=True):
+        copy = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env=ENVIRONMENT | {"OMPI_COMM_WORLD_SIZE": "2"},
+            text=True,
+            capture_output=True,
+        )
+    assert "mpirun started 2 processes, and each solves alone: name an output for each" in copy.stderr
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS"])

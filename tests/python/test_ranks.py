@@ -379,6 +379,20 @@ PlaneField.over = failing
 
 
 @with_mpi
+def test_a_folder_of_kernels_that_others_may_write_is_named_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels").chmod(0o777)
+    (tmp_path / "sphere.toml").write_text(SHEARED)
+    monkeypatch.setitem(ENVIRONMENT, "HEXCONTACT_KERNEL_FOLDER", str(tmp_path / "kernels"))
+    process = launched(tmp_path, 2, "run", "sphere.toml")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert err.count("other users may write to it") == 1
+
+
+@with_mpi
 def test_a_step_that_does_not_converge_ends_as_in_one_process(tmp_path: Path) -> None:
     (tmp_path / "sphere.toml").write_text(PRESSED)
     (tmp_path / "sitecustomize.py").write_text(FEW)

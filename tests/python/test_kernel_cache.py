@@ -353,9 +353,7 @@ def test_file_of_another_user_is_not_believed(change: Change, fault: str, _: str
     kernel_cache.configure(folder_shared=False)
     with pytest.warns(KernelFolderWarning) as said:
         assert_array_equal(normal(), before)
-    assert [str(w.message) for w in said] == [
-        f"{victim} {fault}: the kernels are computed again"
-    ]
+    assert [str(w.message) for w in said] == [f"{victim} {fault}: the kernels are computed again"]
     start = kernel_cache.statistics()
     assert_array_equal(quietly(), before)
     assert since(start).made == 0

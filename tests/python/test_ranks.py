@@ -340,15 +340,29 @@ def test_a_run_whose_process_is_killed_resumes_with_another_number(
 
 
 @with_mpi
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
-def test_a_signal_ends_all_and_says_how_to_resume(number: signal.Signals, tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 400"))
+@pytest.mark.parametrize(
+    ("number", "to", "deck"),
+    [
+        (signal.SIGTERM, (0, 1), PRESSED),  # as a batch system sends it
+        (signal.SIGUSR1, (0, 1), PRESSED),
+        (signal.SIGTERM, (1,), PRESSED),
+        (signal.SIGTERM, (1,), DECK),  # a window that is not shared
+    ],
+)
+def test_a_signal_ends_all_and_says_how_to_resume(
+    number: signal.Signals, to: tuple[int, ...], deck: str, tmp_path: Path
+) -> None:
+    (tmp_path / "sphere.toml").write_text(deck.replace("steps = 2", "steps = 4000"))
     process = launched(tmp_path, 2, "run", "sphere.toml", "--quiet")
     journal = journal_of(tmp_path / "sphere.nc")
     wait_for(lambda: journal.is_dir() and len(list(journal.iterdir())) > 3)
     started = wait_for(lambda: ranks_of(process.pid, 2))
-    for pid in started:  # as a batch system sends it
-        os.kill(pid, number)
+    for pid in started:
+        words = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+        if any(
+            b"%s=%d" % (name, rank) in words for name in (b"OMPI_COMM_WORLD_RANK", b"PMI_RANK") for rank in to
+        ):
+            os.kill(pid, number)
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + number
     assert "hexcontact resume" in err

@@ -196,7 +196,9 @@ def _open_folder() -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o777 if _settings.shared else 0o755)
             state = folder.stat()
-            fault = _FOREIGN if state.st_uid not in (0, os.geteuid()) else _OPEN if state.st_mode & 0o022 else ""
+            fault = (
+                _FOREIGN if state.st_uid not in (0, os.geteuid()) else _OPEN if state.st_mode & 0o022 else ""
+            )
             if fault and not _settings.shared:
                 raise PermissionError(errno.EPERM, fault, str(folder))
             room = max(0, _settings.folder_size - _pruned(folder, _settings.folder_size))

@@ -33,6 +33,7 @@ _PATIENCE = 5.0  # seconds in which a launcher ends all processes
 _WORD = np.dtype(np.int32).itemsize
 
 rank, count, on_node = 0, 1, 1  # this rank; ranks, and those on this machine
+signaled = 0  # a signal that this rank has received, not the first one
 held: dict[int, Any] = {}  # the part of this rank of each object that all ranks share
 _numbers = itertools.count()
 _forgotten: list[int] = []  # objects that the first rank has freed
@@ -149,6 +150,23 @@ def least(value: float) -> float:
     return float(flat.least_of_ranks(value))
 
 
+def obey_signals() -> None:
+    """Raise a signal that another rank has received on the first one, which ends all."""
+    if count > 1 and (number := -int(order(_noted))):
+        signal.raise_signal(number)
+
+
+def _noted() -> float:
+    """Return a signal that a rank has noted, with the sign changed."""
+    return least(-signaled)
+
+
+def _note(number: int, _: Any) -> None:
+    """Keep a signal until the first rank asks for it, after its load step."""
+    global signaled
+    signaled = number
+
+
 def rows(lattice: Lattice, of: int | None = None) -> Lattice:
     """Return the window of the rows of a rank, by default this one."""
     first, after = map(int, flat.rows_of_rank(rank if of is None else of, lattice.n_row))
@@ -172,7 +190,7 @@ def _serve_to_the_end() -> None:
 def _serve() -> None:
     """Follow the orders of the first rank; it reports failures, which are those of all ranks."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
-        signal.signal(number, signal.SIG_IGN)  # the first rank keeps its last step, and ends all
+        signal.signal(number, _note)
     while True:
         procedure, arguments, freed, answers = pickle.loads(
             flat.receive_words(0, flat.wait_for_words()).tobytes()

@@ -75,6 +75,7 @@ def steps(
         case.check_contact(step.number, partial(step.bands, "zone"))
         case.check_beyond(step)
         yield step
+        ranks.obey_signals()
         done = step.number
         del step
     listener.said("finished", steps=done, seconds=time.perf_counter() - started)

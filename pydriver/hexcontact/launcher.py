@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from typing import NoReturn
 
 from .errors import DeckError
 
@@ -41,6 +40,6 @@ def refuse_copies(reason: str, advice: str) -> None:
     if number > 1:
         leave_to_first(DeckError.exit_code)
         raise DeckError(
-            f"{launcher} started {number} processes; expected one, since {reason}. Start it without {launcher}, "
-            f"{advice}"
+            f"{launcher} started {number} processes; expected one, since {reason}. "
+            f"Start it without {launcher}, {advice}"
         )

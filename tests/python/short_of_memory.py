@@ -1,6 +1,7 @@
-"""Work with ever more address space: short_of_memory.py normal|friction|direct|wear|measures|paths. Prints how each ended.
+"""Work with ever more address space, and print how each try ended.
 
-Each try is a process of its own, so that none finds memory that another one has left behind.
+The argument is normal, friction, direct, wear, measures or paths. Each try is a process of its own, so that
+none finds memory that another one has left behind.
 """
 
 import os

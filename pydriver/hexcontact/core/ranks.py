@@ -152,7 +152,7 @@ def least(value: float) -> float:
 
 def obey_signals() -> None:
     """Raise a signal that another rank has received on the first one, which ends all."""
-    if count > 1 and (number := -int(order(_noted))):
+    if number := -int(order(_noted)):
         signal.raise_signal(number)
 
 

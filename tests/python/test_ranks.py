@@ -99,13 +99,11 @@ def test_other_commands_run_once(
     (tmp_path / "study.toml").write_text(
         'deck = "sphere.toml"\n[[parameter]]\nkey = "friction.coefficient"\nvalues = [0.1, 0.2]\n'
     )
-    alone = inside(tmp_path, *words)
-    assert alone.returncode == 0 and alone.stdout
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
-    for rank, printed in (("0", alone.stdout), ("1", "")):
+    for rank, prints in (("0", True), ("1", False)):
         monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
         copy = inside(tmp_path, *words)
-        assert (copy.returncode, copy.stdout) == (0, printed)
+        assert (copy.returncode, bool(copy.stdout)) == (0, prints)
 
 
 def test_python_solves_alone_in_each_process_into_files_of_its_own(

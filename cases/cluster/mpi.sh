@@ -1,7 +1,7 @@
 #!/bin/bash
 # One run in the memory of several nodes:  sbatch mpi.sh fretting.toml
 # Needs a build with -Dmpi=enabled, and an MPI that Slurm's srun starts (srun --mpi=list): pmix for Open MPI, for MPICH
-# SLURM_MPI_TYPE=pmi2 sbatch mpi.sh fretting.toml. Signals and requeue: run.sh.
+# SLURM_MPI_TYPE=pmi2 sbatch mpi.sh fretting.toml. Signals and requeue: run.sh; with MPICH the job ends with 137 instead.
 #SBATCH --nodes=4 --ntasks-per-node=2 --cpus-per-task=4 --mem=32G
 #SBATCH --time=24:00:00 --signal=USR1@60
 #SBATCH --requeue --open-mode=append --output=%x-%j.log

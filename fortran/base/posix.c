@@ -52,7 +52,7 @@ size_t hexcontact_stack_size(void)
    Returns NULL with a status of spectrum_file.f90 if it cannot be had. */
 FILE *hexcontact_open(const char *path, int shared, int64_t *size, int *status)
 {
-  enum { absent = 1, unreadable = 2, foreign = 3 };
+  enum { absent = 1, unreadable = 2, foreign = 3, open_to_others = 4 };
   struct stat state;
   FILE *stream = NULL;
   /* a FIFO must not block */
@@ -64,8 +64,10 @@ FILE *hexcontact_open(const char *path, int shared, int64_t *size, int *status)
     return NULL;
   }
   if (fstat(file, &state) == 0 && S_ISREG(state.st_mode)) {
-    if (!shared && ((state.st_uid != geteuid() && state.st_uid != 0) || (state.st_mode & (S_IWGRP | S_IWOTH))))
+    if (!shared && state.st_uid != geteuid() && state.st_uid != 0)
       *status = foreign;
+    else if (!shared && (state.st_mode & (S_IWGRP | S_IWOTH)))
+      *status = open_to_others;
     else
       stream = fdopen(file, "rb");
   }

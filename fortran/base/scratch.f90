@@ -11,6 +11,7 @@ module hc_scratch
   !> As much memory as the largest of its users needs, with a count of them; the last one frees it.
   type :: scratch_t
     private
+    !> One number more than wanted, so that a part without any, at the end, has an address, too
     real(wp), allocatable :: values(:)
     !> Numbers that there should be
     integer(int64) :: wanted = 0
@@ -48,10 +49,10 @@ contains
 
     stat = 0
     if (allocated(self%values)) then
-      if (size(self%values, kind=int64) >= self%wanted) return
+      if (size(self%values, kind=int64) > self%wanted) return
       deallocate (self%values)
     end if
-    allocate (self%values(self%wanted), stat=stat)
+    allocate (self%values(0:self%wanted), stat=stat)
     if (stat == 0) self%values = 0.0_wp
   end subroutine take
 
@@ -69,7 +70,7 @@ contains
     integer(int64), intent(in), optional :: after
 
     if (present(after)) then
-      place = c_loc(self%values(after + 1))
+      place = c_loc(self%values(after))
     else
       place = c_loc(self%values)
     end if

@@ -22,7 +22,7 @@ module hc_spectrum_file
   !> Words of the fixed part of a head, and of a whole head: bytes of a value, shape and hash follow.
   integer, parameter :: n_known = 4 + maker_length/8 + key_length, n_head = n_known + 5
   !> Status of `open_file`.
-  integer(c_int), parameter :: absent = 1, foreign = 3
+  integer(c_int), parameter :: absent = 1, foreign = 3, open_to_others = 4
 
   ! of posix.c, xxh64.c and stdio.h
   interface
@@ -135,7 +135,9 @@ contains
     stream = open_file(path//c_null_char, merge(1_c_int, 0_c_int, shared), bytes, status)
     if (.not. c_associated(stream)) then
       if (status == foreign) then
-        complaint = path//' may have been written by another user'
+        complaint = path//' belongs to another user'
+      else if (status == open_to_others) then
+        complaint = path//' can be written by other users (chmod go-w)'
       else if (status /= absent) then
         complaint = path//' cannot be read'
       end if

@@ -25,6 +25,8 @@ another name.
 Python has the axes of Fortran in reverse order; `*` stands for points of any shape. An array that is taken
 and given changes in place; a record that is given under the name of an object is read from it. A procedure
 with an `error` ends with a status, which becomes an exception. `gil = true` holds the interpreter's lock.
+Arrays that the compiler makes cannot fail; so a procedure on a window that enters no object, which has asked
+for memory, asks for that of some `fields` first.
 """
 
 import re
@@ -43,6 +45,7 @@ NUMBER = {
     "int": ("nint({})", "real({}, c_double)", "int"),
     "flag": ("{} > 0.5_c_double", "merge(1.0_c_double, 0.0_c_double, {})", "bool"),
 }
+FIELDS = 12  # of a window that a procedure takes at most, unless its row says so
 ARGUMENT = re.compile(r"(?:(\w+) )?(\w+)(?:\((.*?)\))?(?: \[(.*)\])?(?: = (.*))?", re.DOTALL)
 Argument = namedtuple("Argument", "kind name shape unit default")
 
@@ -105,7 +108,24 @@ class Procedure:
         counts = [kinds[a.kind]["counts"].format(a.name) for a in self.objects if "counts" in kinds[a.kind]]
         self.counts = counts[-1] if counts else ""
         self.guarded = any(re.search(r"\berror\b", kinds[argument.kind]["set"]) for argument in self.objects)
-        self.fails = self.guarded or bool(re.search(r"\berror\b", row["calls"]))
+        self.fails = self.guarded or bool(re.search(r"\berror\b", row["calls"])) or bool(self.asked())
+
+    def asked(self) -> list[str]:
+        """Return the statements that ask for memory."""
+        parts = [part for argument in self.takes for part in self.flat(argument)]
+        names = {*re.findall(r"(\w+)=", self.counts), *(axis for part in parts for axis in part.shape)}
+        entered = any("after" in self.kinds[argument.kind] for argument in self.objects)
+        if "n_col" not in names or entered or not (fields := self.row.get("fields", FIELDS)):
+            return []
+        rows, agree = "n_row", []
+        if "n_own" in names:
+            shared = any(argument.name == "shared" for argument in self.takes)
+            rows, agree = "max(n_own, n_row)", ["shared /= 0" if shared else "n_own < n_row"]
+        return [
+            f"call require_memory({fields}*8_c_int64_t*n_col*{rows}, error)",
+            *(f"if ({some}) call ranks%agree(error)" for some in agree),
+            *("if (allocated(error)) then", "  call report(error, code, message)", "  return", "end if"),
+        ]
 
     def flat(self, argument: Argument, given: bool = False) -> list[Argument]:
         """Return what stands for an argument in the flat procedure."""
@@ -143,7 +163,7 @@ class Procedure:
 
     def statements(self, gives: list[Argument]) -> list[str]:
         """Return the body: objects from their arguments, calls, records to numbers, status."""
-        lines = [f"{part.name} = 0" for part in gives if self.fails]
+        lines = [f"{part.name} = 0" for part in gives if self.fails] + self.asked()
         records = (argument for argument in self.gives if argument.kind in self.kinds)
         solved = "if (.not. allocated(error)) " * self.fails
         after = [listed(solved + self.kinds[given.kind]["found"].format(given.name)) for given in records]

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from ._version import __version__
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
+from .launcher import copies
 
 _T = TypeVar("_T")
 
@@ -273,6 +274,10 @@ class Lock:
             advice = f"if that run is over, delete {path}"
             if holder.get("process") == os.getpid() and held:
                 advice = "it belongs to this program, which may close the session or wait for the run"
+            elif held and (started := copies())[0] > 1:
+                advice = "{1} started {0} processes, and each solves alone: name an output for each".format(
+                    *started
+                )
             raise DeckError(
                 f"{output} is being written by another run, process {holder.get('process', '?')} "
                 f"on {holder.get('host', '?')}{since}; {advice}"

@@ -13,11 +13,10 @@ import xarray
 from batch.slurm_node import Absent, SlurmNode
 from commands import ENVIRONMENT, wait_for
 
-from hexcontact.core import flat
-
-CASES = Path(__file__).parents[2] / "cases"
+ROOT = Path(__file__).parents[2]
+CASES = ROOT / "cases"
+MPIS = {"openmpi": "pmix", "mpich": "pmi2"}  # with what srun starts them
 FINE, COARSE = "nodes_in_radius = 40", "nodes_in_radius = 8"
-USELESS = "a build without MPI (build option -Dmpi=enabled)"
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +39,14 @@ def folder(tmp_path: Path) -> Path:
     assert FINE in deck
     (tmp_path / "cattaneo_mindlin.toml").write_text(deck.replace(FINE, COARSE))
     return tmp_path / "cluster"
+
+
+def with_mpi(slurm: SlurmNode, mpi: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let jobs use a build with MPI."""
+    if not (site := ROOT / "build" / f"{mpi}-site").is_dir():
+        pytest.skip(f"no build with {mpi}, which make mpi-check-{mpi} makes")
+    monkeypatch.setitem(slurm.environment, "PYTHONPATH", str(site))
+    monkeypatch.setitem(slurm.environment, "SLURM_MPI_TYPE", MPIS[mpi])
 
 
 def directly(folder: Path, *words: str) -> None:
@@ -87,11 +94,14 @@ def test_a_requeued_run_resumes_to_the_bit(slurm: SlurmNode, folder: Path, scrip
     assert same(folder / "cattaneo_mindlin.nc", folder / "whole.nc")
 
 
-@pytest.mark.parametrize("script", ["run.sh", "mpi.sh"])
-def test_the_signal_comes_before_the_time_limit(slurm: SlurmNode, folder: Path, script: str) -> None:
-    ranks = 1 + (script == "mpi.sh")
-    if ranks > 1 and "MPI: yes" not in flat.BUILT:
-        pytest.skip(USELESS)
+@pytest.mark.parametrize("mpi", ["", "openmpi"])  # srun gives 137, not 138, where MPICH ends all ranks
+def test_the_signal_comes_before_the_time_limit(
+    slurm: SlurmNode, folder: Path, mpi: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script, ranks = "run.sh", 1
+    if mpi:
+        script, ranks = "mpi.sh", 2
+        with_mpi(slurm, mpi, monkeypatch)
     deck = folder.parent / "cattaneo_mindlin.toml"
     deck.write_text(deck.read_text().replace("steps = 27", "steps = 90000"))  # more than a minute's
     limit = ["--time=1", "--signal=USR1@58"]
@@ -161,9 +171,9 @@ def test_workers_of_dask_make_up_the_study(slurm: SlurmNode, folder: Path) -> No
     assert same(folder / "study.nc", folder / "local.nc"), log
 
 
-def test_ranks_share_a_run(slurm: SlurmNode, folder: Path) -> None:
-    if "MPI: yes" not in flat.BUILT:
-        pytest.skip(USELESS)
+@pytest.mark.parametrize("mpi", MPIS)
+def test_ranks_share_a_run(slurm: SlurmNode, folder: Path, mpi: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_mpi(slurm, mpi, monkeypatch)
     deck = folder.parent / "cattaneo_mindlin.toml"
     job = slurm.submit(*requested(), "--nodes=1", "--ntasks-per-node=2", "mpi.sh", deck, cwd=folder)
     slurm.wait(jobs=job)

@@ -1,6 +1,8 @@
 !> Fields and packed ones: whatever the number of threads, the same bits.
 module test_vectors
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
+  use, intrinsic :: iso_c_binding, only: c_intptr_t
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp, lk, zk
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
@@ -11,6 +13,7 @@ module test_vectors
   use hc_contact_residuals, only: normal_residual
   use hc_contact_state, only: separated, stick, slip
   use hc_active_set, only: active_set_t, new_active_set, find_span
+  use hc_scratch, only: scratch_t
   use testing, only: test_t, new_test, check, check_true, largest
   !$ use omp_lib, only: omp_get_max_threads
   implicit none
@@ -38,7 +41,8 @@ contains
       new_test('frames', test_frames), &
       new_test('not_finite', test_not_finite), &
       new_test('springs', test_springs), &
-      new_test('elimination', test_elimination) &
+      new_test('elimination', test_elimination), &
+      new_test('scratch', test_scratch) &
     ]
   end subroutine collect_vectors
 
@@ -435,5 +439,26 @@ contains
     if (allocated(error)) return
     call check(error, largest(qy - 400.0_wp*[1.0_wp, 0.5_wp, 0.25_wp, 0.0_wp]), 0.0_wp, 1.0e-12_wp, 'along y')
   end subroutine test_springs
+
+  !> A part of no numbers at the end of shared memory has an address; bounds are checked by `make debug-check`.
+  subroutine test_scratch(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(scratch_t) :: scratch
+    integer(int64), parameter :: bytes = 24
+    integer :: stat
+
+    call scratch%reserve(bytes, stat)
+    call check_true(error, stat == 0 .and. address(bytes/8) - address(0_int64) == bytes, 'addresses')
+
+  contains
+
+    !> Return the address from a number on.
+    integer(c_intptr_t) function address(after)
+      integer(int64), intent(in) :: after
+
+      address = transfer(scratch%place(after), address)
+    end function address
+
+  end subroutine test_scratch
 
 end module test_vectors

@@ -1,6 +1,7 @@
-"""Solve with ever more address space: short_of_memory.py normal|friction|direct|wear. Prints how each ended.
+"""Work with ever more address space, and print how each try ended.
 
-Each try is a process of its own, so that none finds memory that another one has left behind.
+The argument is normal, friction, direct, wear, measures or paths. Each try is a process of its own, so that
+none finds memory that another one has left behind.
 """
 
 import os
@@ -9,7 +10,7 @@ import sys
 
 import numpy as np
 
-from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError
+from hexcontact import ContactState, FrictionalContact, Lattice, NormalContact, ResourceError
 from hexcontact.core import flat, kernel_cache
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.steps import ACCEPTED, PENDING, CyclesOfWear, WearSettings
@@ -20,7 +21,7 @@ MB = 1_000_000
 
 
 KIND = sys.argv[1]
-half = 10 if KIND == "direct" else 40
+half = {"direct": 10, "measures": 300, "paths": 200}.get(KIND, 40)
 # before memory is short: numpy itself ends a process that has less than half a megabyte left
 lattice = Lattice(SPACING, -half, -half, 2 * half, 2 * half)
 gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
@@ -28,6 +29,14 @@ gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
 
 def attempt(kind: str) -> None:
     """Set a problem up and solve it twice."""
+    if kind == "measures":
+        flat.boundary(TOUCHING)
+        flat.count_cut_triangles(TOUCHING)
+        flat.section_of_pressure(lattice, gap, 0.0, False, (0.0, 0.0))
+        return
+    if kind == "paths":
+        wear_path(STATE).reached(PROBLEM)
+        return
     approach = (0.7 * half * SPACING) ** 2 / (200 * SPACING)
     if kind == "normal":
         contact = NormalContact(lattice, PAIR, gap)
@@ -41,14 +50,18 @@ def attempt(kind: str) -> None:
         state = problem.advance(state, ("displacement",) * 4, (depth * approach, shift * approach, 0.0, 0.0))
         assert state.converged
     if kind == "wear":
-        numbers = dict.fromkeys(WearSettings._fields, 0) | {"coefficient": 1e-14, "cycles": 200, "jump": 100}
-        numbers |= {"tolerance": 1.0, "cycle_tolerance": 1e-4, "most_unworn": 1, "residual": 1e-4}
-        shifts = (0.1, -0.1, 0.1)
-        targets = [[approach, share * approach, 0.0, 0.0, 0.0, 0.0, 0.0] for share in shifts]
-        steps = [([2, 2, 2, 2], values, [0.0] * 4, 1) for values in targets]
-        cycles = CyclesOfWear(WearSettings(**numbers), PAIR, steps, state)
+        cycles = wear_path(state, approach)
         while (now := problem.called(flat.advance_wear, cycles)).cycles < 200:
             assert now.verdict in (ACCEPTED, PENDING)
+
+
+def wear_path(state: ContactState, approach: float = 1e-6) -> CyclesOfWear:
+    """Return a path through cycles of wear from a state."""
+    numbers = dict.fromkeys(WearSettings._fields, 0) | {"coefficient": 1e-14, "cycles": 200, "jump": 100}
+    numbers |= {"tolerance": 1.0, "cycle_tolerance": 1e-4, "most_unworn": 1, "residual": 1e-4}
+    targets = [[approach, share * approach, 0.0, 0.0, 0.0, 0.0, 0.0] for share in (0.1, -0.1, 0.1)]
+    steps = [([2, 2, 2, 2], values, [0.0] * 4, 1) for values in targets]
+    return CyclesOfWear(WearSettings(**numbers), PAIR, steps, state)
 
 
 def limited(kind: str, spare: int) -> int:
@@ -72,7 +85,12 @@ def limited(kind: str, spare: int) -> int:
 
 kernel_cache.configure(memory=0)
 np.linalg.norm(np.ones(3))
-step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB, "wear": 2 * MB}[KIND]
+if KIND == "measures":
+    TOUCHING = np.asarray(gap < np.median(gap), np.int32)
+if KIND == "paths":
+    PROBLEM = FrictionalContact(lattice, PAIR, gap, friction_coefficient=0.5)
+    STATE = PROBLEM.virgin()
+step = {"normal": MB // 2, "direct": 10 * MB}.get(KIND, 2 * MB)
 codes: list[int] = []
 while codes[-2:] != [0, 0] and len(codes) < 60:
     codes.append(limited(KIND, MB + step * len(codes)))

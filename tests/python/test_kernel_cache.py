@@ -326,15 +326,22 @@ while os.path.exists(running):
 
 Change = Callable[[Path], object]
 root_alone = pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
-CHANGES = [
-    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o020), id="group may write"),
-    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o002), id="all may write"),
-    pytest.param(lambda path: os.chown(path, 54321, -1), id="another owner", marks=root_alone),
+OPEN = "can be written by other users (chmod go-w)", "other users may write to it (chmod go-w, or"
+CHANGES = [  # with the faults of a file and of a folder
+    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o020), *OPEN, id="group may write"),
+    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o002), *OPEN, id="all may write"),
+    pytest.param(
+        lambda path: os.chown(path, 54321, -1),
+        "belongs to another user",
+        "it belongs to another user",
+        id="another owner",
+        marks=root_alone,
+    ),
 ]
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_file_of_another_user_is_not_believed(change: Change, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("change", "fault", "_"), CHANGES)
+def test_file_of_another_user_is_not_believed(change: Change, fault: str, _: str, tmp_path: Path) -> None:
     kernel_cache.configure(memory=0, folder=tmp_path)
     before = quietly()
     victim = max(tmp_path.iterdir(), key=lambda path: path.stat().st_size)
@@ -346,23 +353,21 @@ def test_file_of_another_user_is_not_believed(change: Change, tmp_path: Path) ->
     kernel_cache.configure(folder_shared=False)
     with pytest.warns(KernelFolderWarning) as said:
         assert_array_equal(normal(), before)
-    assert [str(w.message) for w in said] == [
-        f"{victim} may have been written by another user: the kernels are computed again"
-    ]
+    assert [str(w.message) for w in said] == [f"{victim} {fault}: the kernels are computed again"]
     start = kernel_cache.statistics()
     assert_array_equal(quietly(), before)
     assert since(start).made == 0
 
 
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(("change", "_", "fault"), CHANGES)
 def test_folder_of_another_user_is_not_used_unless_it_is_shared(
-    change: Change, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    change: Change, _: str, fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kernel_cache.configure(memory=0, folder=tmp_path)
     quietly()
     files = set(tmp_path.iterdir())
     change(tmp_path)
-    with pytest.warns(KernelFolderWarning, match="no kernels are kept in .*: other users may write to it"):
+    with pytest.warns(KernelFolderWarning, match=f"no kernels are kept in .*: {re.escape(fault)}"):
         kernel_cache.configure(folder=tmp_path)
     start = kernel_cache.statistics()
     quietly(window(40, 41))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import DECK, ENVIRONMENT, PATIENCE, inside, wait_for
 
+from hexcontact import Case
 from hexcontact.core import flat
 from hexcontact.result.journal import journal_of
 
@@ -86,6 +87,43 @@ def test_copies_are_refused(
     assert refused.returncode == 2
     assert f"{launcher} started 3 processes; expected one" in " ".join(refused.stderr.split())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.toml"]
+
+
+@pytest.mark.parametrize(
+    "words", [("check", "sphere.toml"), ("study", "study.toml", "--plan"), ("--version",)]
+)
+def test_other_commands_run_once(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    (tmp_path / "study.toml").write_text(
+        'deck = "sphere.toml"\n[[parameter]]\nkey = "friction.coefficient"\nvalues = [0.1, 0.2]\n'
+    )
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    for rank, prints in (("0", True), ("1", False)):
+        monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
+        copy = inside(tmp_path, *words)
+        assert (copy.returncode, bool(copy.stdout)) == (0, prints)
+
+
+def test_python_solves_alone_in_each_process_into_files_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    case = Case.from_toml(tmp_path / "sphere.toml")
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    assert len(case.run(tmp_path / "own.nc")) == 2
+    code = "import hexcontact; hexcontact.Case.from_toml('sphere.toml').run('own.nc', overwrite=True)"
+    with case.start(tmp_path / "own.nc", overwrite=True):
+        copy = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env=ENVIRONMENT | {"OMPI_COMM_WORLD_SIZE": "2"},
+            text=True,
+            capture_output=True,
+        )
+    assert "mpirun started 2 processes, and each solves alone: name an output for each" in copy.stderr
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS"])
@@ -300,15 +338,29 @@ def test_a_run_whose_process_is_killed_resumes_with_another_number(
 
 
 @with_mpi
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
-def test_a_signal_ends_all_and_says_how_to_resume(number: signal.Signals, tmp_path: Path) -> None:
-    (tmp_path / "sphere.toml").write_text(PRESSED.replace("steps = 2", "steps = 400"))
+@pytest.mark.parametrize(
+    ("number", "to", "deck"),
+    [
+        (signal.SIGTERM, (0, 1), PRESSED),  # as a batch system sends it
+        (signal.SIGUSR1, (0, 1), PRESSED),
+        (signal.SIGTERM, (1,), PRESSED),
+        (signal.SIGTERM, (1,), DECK),  # a window that is not shared
+    ],
+)
+def test_a_signal_ends_all_and_says_how_to_resume(
+    number: signal.Signals, to: tuple[int, ...], deck: str, tmp_path: Path
+) -> None:
+    (tmp_path / "sphere.toml").write_text(deck.replace("steps = 2", "steps = 4000"))
     process = launched(tmp_path, 2, "run", "sphere.toml", "--quiet")
     journal = journal_of(tmp_path / "sphere.nc")
     wait_for(lambda: journal.is_dir() and len(list(journal.iterdir())) > 3)
     started = wait_for(lambda: ranks_of(process.pid, 2))
-    for pid in started:  # as a batch system sends it
-        os.kill(pid, number)
+    for pid in started:
+        words = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+        if any(
+            b"%s=%d" % (name, rank) in words for name in (b"OMPI_COMM_WORLD_RANK", b"PMI_RANK") for rank in to
+        ):
+            os.kill(pid, number)
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + number
     assert "hexcontact resume" in err
@@ -336,6 +388,20 @@ def failing(self, lattice):
     return over(self, lattice)
 PlaneField.over = failing
 """
+
+
+@with_mpi
+def test_a_folder_of_kernels_that_others_may_write_is_named_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels").chmod(0o777)
+    (tmp_path / "sphere.toml").write_text(SHEARED)
+    monkeypatch.setitem(ENVIRONMENT, "HEXCONTACT_KERNEL_FOLDER", str(tmp_path / "kernels"))
+    process = launched(tmp_path, 2, "run", "sphere.toml")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, out + err
+    assert err.count("other users may write to it") == 1
 
 
 @with_mpi

@@ -67,7 +67,7 @@ print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith
 """
 
 
-@pytest.mark.parametrize("kind", ["normal", "friction", "direct", "wear"])
+@pytest.mark.parametrize("kind", ["normal", "friction", "direct", "wear", "measures", "paths"])
 def test_solvers_ask_for_memory_before_they_take_it(kind: str) -> None:
     script = Path(__file__).with_name("short_of_memory.py")
     done = subprocess.run([sys.executable, script, kind], env=ENV, capture_output=True, text=True)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
 import typer
 from typer.core import TyperGroup
 
+from .. import launcher
 from .._version import __version__
 from ..errors import (
     LACKING,
@@ -397,18 +398,27 @@ def seen_from_here(message: str) -> str:
 # --- the command line ---------------------------------------------------------------------------------
 
 
+_SEVERAL = (
+    "run",
+    "resume",
+    "study",
+)  # commands that a launcher may start as several processes, or that say no
+
+
 class _Commands(TyperGroup):
     """The sub-commands; with ``--json`` wrong options and arguments give an object, too."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
         """Run the command that the arguments name."""
         given = sys.argv[1:] if args is None else list(args)
+        name = next((word for word in given if word in self.commands), "")
+        if name not in _SEVERAL:
+            launcher.leave_to_first()
         try:
             return super().main(args, *more, **options)
         except SystemExit as ending:
             usage = getattr(ending.__context__, "format_message", None)  # printed by typer before
             if "--json" in given and usage is not None:
-                name = next((word for word in given if word in self.commands), "")
                 write_json(name, Report(usage(), DeckError.exit_code).content())
             raise
 

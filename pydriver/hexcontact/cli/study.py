@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from .. import launcher
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import counted, text_table
@@ -56,7 +57,6 @@ def study(
     log_level: frame.Level = None,
 ) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
-    from ..core import ranks
     from ..deck.toml import read_toml
     from ..study.study import Study, study_reporter
     from .solving import Messages
@@ -65,8 +65,10 @@ def study(
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
-    if case is None and not plan:
-        ranks.refuse_copies("study")
+    if plan:
+        launcher.leave_to_first()
+    elif case is None:
+        launcher.refuse_copies("study does not use MPI", "and set OMP_NUM_THREADS to use more cores")
     messages = Messages("study", quiet, as_json, log_file, log_level)
     if "creep_table" in read_toml(file, "a study")[0]:
         options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import DeckError, KernelFolderWarning, warn
-from . import flat
+from . import flat, ranks
 
 MEMORY, FOLDER, FOLDER_SIZE, SHARED = (
     f"HEXCONTACT_KERNEL_{word}" for word in ("MEMORY", "FOLDER", "FOLDER_SIZE", "FOLDER_SHARED")
@@ -44,7 +44,8 @@ _UNITS = {"": 1, "B": 1} | {
 _FILE = r"[a-z-]+-\d+x\d+-[0-9A-F]{16}\.kernels(\.[0-9a-f]+-\d+\.part)?"
 _DAY = 86400.0
 _LOGGER = logging.getLogger("hexcontact")
-_NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of them are trusted)"
+_FOREIGN = f"it belongs to another user ({SHARED}=yes if that one is trusted)"
+_OPEN = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of them are trusted)"
 
 
 class Statistics(NamedTuple):
@@ -168,6 +169,9 @@ def warn_of_faults() -> None:
 
 
 def _warn(message: str) -> None:
+    """Warn on the first rank alone: the others have the same folder."""
+    if ranks.rank:
+        return
     _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
     warn(message, KernelFolderWarning)
 
@@ -192,8 +196,11 @@ def _open_folder() -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o777 if _settings.shared else 0o755)
             state = folder.stat()
-            if not _settings.shared and (state.st_uid not in (0, os.geteuid()) or state.st_mode & 0o022):
-                raise PermissionError(errno.EPERM, _NOT_OURS, str(folder))
+            fault = (
+                _FOREIGN if state.st_uid not in (0, os.geteuid()) else _OPEN if state.st_mode & 0o022 else ""
+            )
+            if fault and not _settings.shared:
+                raise PermissionError(errno.EPERM, fault, str(folder))
             room = max(0, _settings.folder_size - _pruned(folder, _settings.folder_size))
         except OSError as error:
             _settings.folder = folder = None

@@ -22,53 +22,21 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import launcher
 from ..arrays import Array
-from ..errors import DeckError, HexcontactError, ResourceError
+from ..errors import HexcontactError, ResourceError
 from . import flat
 from .calls import status_of
 from .lattice import Lattice
 
-# Variables with the number of processes and that of this one, by launcher: Open MPI, MPICH and its relatives,
-# `srun`. Slurm sets SLURM_NTASKS in scripts of a single process, too, SLURM_STEP_NUM_TASKS for processes of
-# `srun` alone.
-_COUNTS = {
-    "OMPI_COMM_WORLD_SIZE": ("OMPI_COMM_WORLD_RANK", "mpirun"),
-    "PMI_SIZE": ("PMI_RANK", "mpirun"),
-    "SLURM_STEP_NUM_TASKS": ("SLURM_PROCID", "srun"),
-}
 _PATIENCE = 5.0  # seconds in which a launcher ends all processes
 _WORD = np.dtype(np.int32).itemsize
 
 rank, count, on_node = 0, 1, 1  # this rank; ranks, and those on this machine
+signaled = 0  # a signal that this rank has received, not the first one
 held: dict[int, Any] = {}  # the part of this rank of each object that all ranks share
 _numbers = itertools.count()
 _forgotten: list[int] = []  # objects that the first rank has freed
-
-
-def _launched() -> tuple[int, str]:
-    """Return how many processes a launcher started, and its name."""
-    for name, (_, launcher) in _COUNTS.items():
-        found = os.environ.get(name, "")
-        if found.isdecimal() and int(found) > 1:
-            return int(found), launcher
-    return 1, ""
-
-
-def refuse_copies(command: str) -> None:
-    """Refuse to run a command as one of several copies: each of them would write the same file."""
-    launched, launcher = _launched()
-    if launched > 1:
-        _refuse(
-            f"{launcher} started {launched} processes; expected one, since {command} does not use MPI. Start "
-            f"it without {launcher}, and set OMP_NUM_THREADS to use more cores"
-        )
-
-
-def _refuse(sentence: str) -> NoReturn:
-    """Raise an error on the first process of a launcher; end the others, so that it is printed once."""
-    if any(os.environ.get(number, "0") != "0" for number, _ in _COUNTS.values()):
-        raise SystemExit(DeckError.exit_code)
-    raise DeckError(sentence)
 
 
 def leave(code: int) -> NoReturn:
@@ -83,16 +51,16 @@ def leave(code: int) -> NoReturn:
 def together() -> Iterator[bool]:
     """Join the processes of a launcher: True on the first, the others serve it until its block ends."""
     global rank, count, on_node
-    launched, launcher = _launched()
+    launched, name = launcher.copies()
     if launched == 1:
         yield True
         return
     rank, count, on_node = flat.begin_ranks()
     if count != launched:
-        _refuse(
-            f"{launcher} started {launched} processes; expected one, since this build of hexcontact has no "
-            f"MPI, or another than {launcher}. Start it without {launcher}, or install it with -Dmpi=enabled"
+        launcher.refuse_copies(
+            f"this build of hexcontact has no MPI, or another than {name}", "or install it with -Dmpi=enabled"
         )
+    launcher.joined = True
     try:
         if rank:
             _serve_to_the_end()
@@ -100,7 +68,7 @@ def together() -> Iterator[bool]:
     finally:
         if not rank:
             others(_end)
-        rank, count, on_node = 0, 1, 1
+        launcher.joined, rank, count, on_node = False, 0, 1, 1
         flat.finish_ranks()
 
 
@@ -182,6 +150,23 @@ def least(value: float) -> float:
     return float(flat.least_of_ranks(value))
 
 
+def obey_signals() -> None:
+    """Raise a signal that another rank has received on the first one, which ends all."""
+    if number := -int(order(_noted)):
+        signal.raise_signal(number)
+
+
+def _noted() -> float:
+    """Return a signal that a rank has noted, with the sign changed."""
+    return least(-signaled)
+
+
+def _note(number: int, _: Any) -> None:
+    """Keep a signal until the first rank asks for it, after its load step."""
+    global signaled
+    signaled = number
+
+
 def rows(lattice: Lattice, of: int | None = None) -> Lattice:
     """Return the window of the rows of a rank, by default this one."""
     first, after = map(int, flat.rows_of_rank(rank if of is None else of, lattice.n_row))
@@ -205,7 +190,7 @@ def _serve_to_the_end() -> None:
 def _serve() -> None:
     """Follow the orders of the first rank; it reports failures, which are those of all ranks."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
-        signal.signal(number, signal.SIG_IGN)  # the first rank keeps its last step, and ends all
+        signal.signal(number, _note)
     while True:
         procedure, arguments, freed, answers = pickle.loads(
             flat.receive_words(0, flat.wait_for_words()).tobytes()

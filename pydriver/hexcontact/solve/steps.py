@@ -75,6 +75,8 @@ def steps(
         case.check_contact(step.number, partial(step.bands, "zone"))
         case.check_beyond(step)
         yield step
+        if ranks.count > 1:
+            ranks.obey_signals()
         done = step.number
         del step
     listener.said("finished", steps=done, seconds=time.perf_counter() - started)

@@ -87,12 +87,10 @@ contains
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
     iteration%rounding = 0.0_wp
-    rounded_off = 0.0_wp
     iteration%outcome = solution_broke_off
     call constraints%invert(space, inverse, iteration%independent)
     if (.not. iteration%independent) return
     call begin()
-    if (length <= 0.0_wp) iteration%outcome = solution_accurate
     if (.not. length > 0.0_wp) return
     iteration%outcome = iterations_used_up
     do while (iteration%outcome == iterations_used_up .and. iteration%made < iteration%most .and. length > 0.0_wp)
@@ -111,6 +109,7 @@ contains
       real(wp) :: unit(size(along))
       integer :: i, part
 
+      rounded_off = 0.0_wp
       others = nodes%complement(size(ax))
       allocate (r(nodes%n_active))
       part = size(ax)/size(iteration%weight)
@@ -135,6 +134,7 @@ contains
       length = sqrt(space%dot(w, w))
       iteration%residual = length
       iteration%drift = epsilon(1.0_wp)*length
+      if (length <= 0.0_wp) iteration%outcome = solution_accurate
     end subroutine begin
 
     !> Find directions, and the combination of them that reduces the residual most.

@@ -14,7 +14,7 @@ contains
 
   !> Add the pressure in rows of a window to its point loads.
   pure subroutine add_point_loads(lattice, pressure, before, n_row, loads)
-    !> Lattice, and rows of the window
+    !> Lattice of these rows
     type(lattice_t), intent(in) :: lattice
     !> Pressure there (n_col, n_row) [Pa]
     real(wp), intent(in) :: pressure(:, :)
@@ -39,15 +39,17 @@ contains
   end subroutine add_point_loads
 
   !> Return the number of the point where the bodies overlap most; 0: they overlap nowhere.
-  pure integer function deepest_overlap(points, loads, approach, moduli)
+  pure integer function deepest_overlap(points, loads, approach, moduli, reach)
     !> Points outside of the window: x, y and the gap before loading (3, n_point) [m]
     real(wp), intent(in) :: points(:, :)
     !> Point loads, see `add_point_loads`
     real(wp), intent(in) :: loads(:, :, :)
     !> Approach of the bodies [m]
     real(wp), intent(in) :: approach
-    !> Modulus E* of the bodies near to a load and far from it [Pa], and the distance from which the latter holds [m]
-    real(wp), intent(in) :: moduli(3)
+    !> Modulus E* of the bodies near to a load and far from it [Pa]
+    real(wp), intent(in) :: moduli(2)
+    !> Distance from which the latter holds [m]
+    real(wp), intent(in) :: reach
     real(wp) :: deepest, overlap, distance
     integer :: k, i, j
 
@@ -61,7 +63,7 @@ contains
           associate (load => loads(1, i, j))
             if (.not. load > 0.0_wp) cycle
             distance = norm2(points(:2, k) - loads(2:, i, j)/load)
-            overlap = overlap - load/(pi*distance*merge(moduli(2), moduli(1), distance > moduli(3)))
+            overlap = overlap - load/(pi*distance*merge(moduli(2), moduli(1), distance > reach))
           end associate
         end do
       end do

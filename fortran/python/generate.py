@@ -25,8 +25,8 @@ another name.
 Python has the axes of Fortran in reverse order; `*` stands for points of any shape. An array that is taken
 and given changes in place; a record that is given under the name of an object is read from it. A procedure
 with an `error` ends with a status, which becomes an exception. `gil = true` holds the interpreter's lock.
-Arrays that the compiler makes cannot fail; so a procedure on a window that enters no object, which has asked
-for memory, asks for that of some `fields` first.
+Arrays that the compiler makes cannot fail; a procedure on a window, or on rows of one, asks for the memory of
+some `fields` first where its row says how many it takes at most.
 """
 
 import re
@@ -45,7 +45,6 @@ NUMBER = {
     "int": ("nint({})", "real({}, c_double)", "int"),
     "flag": ("{} > 0.5_c_double", "merge(1.0_c_double, 0.0_c_double, {})", "bool"),
 }
-FIELDS = 12  # of a window that a procedure takes at most, unless its row says so
 ARGUMENT = re.compile(r"(?:(\w+) )?(\w+)(?:\((.*?)\))?(?: \[(.*)\])?(?: = (.*))?", re.DOTALL)
 Argument = namedtuple("Argument", "kind name shape unit default")
 
@@ -112,15 +111,14 @@ class Procedure:
 
     def asked(self) -> list[str]:
         """Return the statements that ask for memory."""
+        if not (fields := self.row.get("fields")):
+            return []
         parts = [part for argument in self.takes for part in self.flat(argument)]
         names = {*re.findall(r"(\w+)=", self.counts), *(axis for part in parts for axis in part.shape)}
-        entered = any("after" in self.kinds[argument.kind] for argument in self.objects)
-        if "n_col" not in names or entered or not (fields := self.row.get("fields", FIELDS)):
-            return []
         rows, agree = "n_row", []
         if "n_own" in names:
             shared = any(argument.name == "shared" for argument in self.takes)
-            rows, agree = "max(n_own, n_row)", ["shared /= 0" if shared else "n_own < n_row"]
+            rows, agree = "n_own*ranks%on_node", ["shared /= 0" if shared else "n_own < n_row"]
         return [
             f"call require_memory({fields}*8_c_int64_t*n_col*{rows}, error)",
             *(f"if ({some}) call ranks%agree(error)" for some in agree),

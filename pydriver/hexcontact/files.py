@@ -274,9 +274,10 @@ class Lock:
             advice = f"if that run is over, delete {path}"
             if holder.get("process") == os.getpid() and held:
                 advice = "it belongs to this program, which may close the session or wait for the run"
-            elif held and (started := copies())[0] > 1:
-                advice = "{1} started {0} processes, and each solves alone: name an output for each".format(
-                    *started
+            elif held and (started := copies()).total > 1:
+                advice += (
+                    f"; {started.launcher} started {started.total} processes, and each solves alone: name an "
+                    "output for each"
                 )
             raise DeckError(
                 f"{output} is being written by another run, process {holder.get('process', '?')} "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import NamedTuple
 
 from .errors import DeckError
 
@@ -18,25 +19,32 @@ _COUNTS = {
 joined = False  # whether the processes work together
 
 
-def copies() -> tuple[int, str]:
-    """Return how many processes a launcher started, of which each works alone, and its name."""
-    for name, (_, launcher) in _COUNTS.items():
+class Copies(NamedTuple):
+    """Processes of a launcher that work alone: 1 without one, or where they work together."""
+
+    total: int
+    launcher: str = ""
+    number: str = "0"  # of this one
+
+
+def copies() -> Copies:
+    """Return the processes of the launcher that started this one."""
+    for name, (number, launcher) in _COUNTS.items():
         found = os.environ.get(name, "")
         if found.isdecimal() and int(found) > 1 and not joined:
-            return int(found), launcher
-    return 1, ""
+            return Copies(int(found), launcher, os.environ.get(number, "0"))
+    return Copies(1)
 
 
 def leave_to_first(exit_code: int = 0) -> None:
     """End the other processes of a launcher, so that only the first one works and prints."""
-    numbers = (os.environ.get(number, "0") for number, _ in _COUNTS.values())
-    if copies()[0] > 1 and any(number != "0" for number in numbers):
+    if copies().number != "0":
         raise SystemExit(exit_code)
 
 
 def refuse_copies(reason: str, advice: str) -> None:
     """Refuse to be one of several processes."""
-    number, launcher = copies()
+    number, launcher, _ = copies()
     if number > 1:
         leave_to_first(DeckError.exit_code)
         raise DeckError(

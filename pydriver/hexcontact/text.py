@@ -130,7 +130,7 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
 
     An area is scaled to 0.1 ... 100,000, a volume to 0.01 ... 10,000,000, as by `quantity`.
     """
-    shown, power = _POWERS.get(unit, (unit.replace("m2", "m²").replace("1", ""), 1))
+    shown, power = _POWERS.get(unit, ("" if unit == "1" else unit.replace("m2", "m²"), 1))
     if not shown or not math.isfinite(largest) or largest == 0.0:
         return 1.0, shown
     size = math.log10(abs(largest) * 1.0000001) + (power - 1)

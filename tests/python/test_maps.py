@@ -229,6 +229,12 @@ def test_a_round_map_of_growing_distances_is_read(file: Any) -> None:
     assert Map(**named).field.gap.shape == (len(at), len(at))
 
 
+def test_two_lines_of_points_are_a_map(file: Any) -> None:
+    rows = [f"{x},{y},0" for x in range(41) for y in (0.0, 5.0)]
+    named = of_file(file("lines.csv", "\n".join(["x (um),y (um),z (um)", *rows])))
+    assert Map(**named).field.gap.shape == (41, 2)
+
+
 def test_a_coordinate_that_few_points_have_is_refused(file: Any) -> None:
     lines = columns_of(BALL).splitlines()
     x, rest = lines[1300].split(",", 1)

@@ -398,11 +398,8 @@ def seen_from_here(message: str) -> str:
 # --- the command line ---------------------------------------------------------------------------------
 
 
-_SEVERAL = (
-    "run",
-    "resume",
-    "study",
-)  # commands that a launcher may start as several processes, or that say no
+# commands that a launcher may start as several processes, or that refuse them
+_FOR_PROCESSES = "run", "resume", "study"
 
 
 class _Commands(TyperGroup):
@@ -412,8 +409,11 @@ class _Commands(TyperGroup):
         """Run the command that the arguments name."""
         given = sys.argv[1:] if args is None else list(args)
         name = next((word for word in given if word in self.commands), "")
-        if name not in _SEVERAL:
+        if name not in _FOR_PROCESSES:
             launcher.leave_to_first()
+            if (started := launcher.copies()).total > 1:
+                about = f"{started.launcher} started {started.total} processes; only the first one works"
+                print(f"hexcontact: {about}", file=sys.stderr)
         try:
             return super().main(args, *more, **options)
         except SystemExit as ending:

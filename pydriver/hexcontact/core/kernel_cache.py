@@ -169,8 +169,8 @@ def warn_of_faults() -> None:
 
 
 def _warn(message: str) -> None:
-    """Warn on the first rank alone: the others have the same folder."""
-    if ranks.rank:
+    """Warn once on a machine, whose ranks have the same folder."""
+    if ranks.rank and ranks.on_node == ranks.count:
         return
     _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
     warn(message, KernelFolderWarning)

@@ -51,7 +51,7 @@ def leave(code: int) -> NoReturn:
 def together() -> Iterator[bool]:
     """Join the processes of a launcher: True on the first, the others serve it until its block ends."""
     global rank, count, on_node
-    launched, name = launcher.copies()
+    launched, name, _ = launcher.copies()
     if launched == 1:
         yield True
         return

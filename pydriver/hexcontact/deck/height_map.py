@@ -193,9 +193,9 @@ class Placed(NamedTuple):
     extruded: bool = False  # along the first axis
 
     def lowest_points(self, most: int, middle: Array) -> Array:
-        """Return the lowest point of the plane (n, m, 2) in each of at most `most` blocks along an axis.
+        """Return the lowest point of each of at most `most` blocks along an axis, in the plane (n, m, 2).
 
-        Those of an extruded map lie beside a point of the plane.
+        Those of an extruded map lie beside `middle`.
         """
         x, y, gap = self.map.x, self.map.y, self.map.gap
         if self.extruded:
@@ -209,6 +209,11 @@ class Placed(NamedTuple):
         row = np.minimum(row + parts[0] * np.arange(rows)[:, None], len(x) - 1)
         col = np.minimum(col + parts[1] * np.arange(cols), len(y) - 1)
         return np.stack(self.in_plane(x[row], y[col]), axis=-1)
+
+    @property
+    def names(self) -> str:
+        """Names of its own axes."""
+        return axis_names(self.angle)
 
     @property
     def distances(self) -> tuple[float, ...]:
@@ -288,6 +293,11 @@ def _rotated(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
     """Return points that are turned about the origin by an angle (rad)."""
     a, b = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
     return a * x - b * y, b * x + a * y
+
+
+def axis_names(angle: float) -> str:
+    """Return the names of axes that are turned by an angle (rad)."""
+    return "st" if angle else "xy"
 
 
 def along_axes(offset: tuple[float, float], angle: float) -> tuple[float, float]:

@@ -35,6 +35,7 @@ _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
     ast.USub: operator.neg,
 }
+_HIGHEST = 20  # degree of a polynomial
 _CONSTANTS = {"pi": math.pi}
 _MOST = {"min": math.inf, "max": math.inf, "log": 2}  # arguments; the others take one
 _OVER_ARRAYS: dict[Callable[..., float], Callable[..., Any]] = {
@@ -112,7 +113,11 @@ class Formula:
         """Return the value for polynomials; an error of Python where it is none."""
 
         def power(base: Any, exponent: Any) -> Any:
-            return math.pow(base, exponent) if isinstance(base, float) else base**exponent
+            if isinstance(base, float):
+                return math.pow(base, exponent)
+            if not exponent * base.degree() <= _HIGHEST:
+                raise ValueError
+            return base**exponent
 
         return self._term(polynomials, {math.pow: power})
 

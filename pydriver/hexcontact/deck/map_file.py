@@ -262,12 +262,13 @@ def _stray(at: Array, place: Array) -> int | None:
     if not steps.size:
         return None
     apart = np.minimum(np.append(all_steps, np.inf), np.insert(all_steps, 0, np.inf))
-    # steps may grow to an end as they do within
+    # steps may grow and shrink to an end as they do within
     growth = max((steps[1:] / steps[:-1]).max(initial=1.0), (steps[:-1] / steps[1:]).max(initial=1.0))
-    within = growth * np.concatenate([all_steps[1:2], np.zeros(len(at) - 2), all_steps[-2:-1]])
-    regular = (apart > (1.0 - _STRAY) * steps.min()) & (
-        apart < (1.0 + _STRAY) * np.maximum(within, steps.max())
-    )
+    number, last = np.arange(len(at)), len(all_steps) - 1
+    lower = all_steps[np.minimum(number + 1, last)]
+    inward = np.where(number < len(at) // 2, lower, all_steps[np.maximum(number - 2, 0)])
+    least, most = np.minimum(inward / growth, steps.min()), np.maximum(inward * growth, steps.max())
+    regular = (apart > (1.0 - _STRAY) * least) & (apart < (1.0 + _STRAY) * most)
     found = np.flatnonzero(few & ~regular).tolist()
     return found[0] if found else None
 

@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..errors import DeckError
 from ..text import counted, quantity
 from .faults import MISSING
-from .height_map import HeightMap, Placed, along_axes, place
+from .height_map import HeightMap, Placed, along_axes, axis_names, place
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
 from .surfaces import Angle, Point, Surface, shape
@@ -272,7 +272,7 @@ class Measured(Surface):
     @property
     def _axes(self) -> str:
         """Names of the axes of its points."""
-        return "xy"
+        return axis_names(self.direction)
 
     @property
     def _name(self) -> str:
@@ -372,7 +372,9 @@ class Measured(Surface):
         if self.level is False:
             return "not levelled"
         along, across = (round(slope, 9) + 0.0 for slope in (along, across))  # without noise, and without -0
-        slopes = f" and slopes of {along:.3g} along x, {across:.3g} along y" * (self.level == "plane")
+        names = self._axes
+        slopes = f" and slopes of {along:.3g} along {names[0]}, {across:.3g} along {names[1]}"
+        slopes *= self.level == "plane"
         return f"levelled: mean of {quantity(mean, 'm', 3)}{slopes} subtracted"
 
     @property
@@ -587,10 +589,6 @@ class Profile(Measured):
     def direction(self) -> float:
         """Angle (rad) of the extrusion from x."""
         return self.angle
-
-    @property
-    def _axes(self) -> str:
-        return "st" if self.angle else "xy"
 
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""

@@ -638,7 +638,7 @@ def _quadratic_form(expression: str) -> Array | None:
             powers = (height + Polynomial([0.0])).coef
         except (ArithmeticError, TypeError, ValueError):  # no polynomial
             return None
-        if len(powers) > 3 or powers[:2].any():
+        if len(powers) > 3 or powers[:2].any() or not np.isfinite(powers).all():
             return None
         along.append(powers[2:].sum())
     forms = np.stack([0.5 * cosines**2, cosines * sines, 0.5 * sines**2], axis=1)

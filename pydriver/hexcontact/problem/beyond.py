@@ -18,6 +18,7 @@ _TRIED = 121  # points along a side of a grid
 _GRIDS = 7  # about a window, each twice as wide as the one before
 _LOWEST = 200  # points about which lower ones are looked for
 _HALVINGS = 3  # of their distances
+_ROUNDED = 1e-9  # of places, in spacings
 _LOADS = 24  # along a side of a window, in place of the pressure
 _OVERLAP = 0.99  # share of the penetration that counts, since displacements are those of the pressure alone
 
@@ -51,21 +52,21 @@ def surroundings(gap: PlaneField, lattice: Lattice) -> Surroundings:
         cell = (grid[-1, 0] - grid[0, 0]) / (len(grid) - 1), (grid[0, -1] - grid[0, 0]) / (grid.shape[1] - 1)
         cells.append(np.broadcast_to(np.stack(cell), (valleys[-1].shape[1], 2, 2)))
     low = np.concatenate(valleys, axis=1)
-    chosen = np.argsort(low[2])[:_LOWEST]
-    found.append(_lower(gap, low[:, chosen], np.concatenate(cells)[chosen]))
+    if low.size:
+        chosen = np.argsort(low[2])[:_LOWEST]
+        found.append(_lower(gap, low[:, chosen], np.concatenate(cells)[chosen]))
     points = np.concatenate(found, axis=1)
     along = np.stack(lattice.pattern.coordinates(*points[:2]), axis=1) / lattice.spacing
-    inside = ((along >= first) & (along <= first + size - 1)).all(axis=1)
+    inside = ((along > first - _ROUNDED) & (along < first + size - 1 + _ROUNDED)).all(axis=1)
     return Surroundings(points[:, ~inside], float(points[2, inside].min(initial=math.inf)))
 
 
 def _is_valley(gap: Array) -> Mask:
-    """Return which inner points of a grid no neighbor is lower than; of equal ones one is chosen."""
+    """Return which inner points of a grid no neighbor is lower than; of equal ones along a row, the first."""
     rows, cols = (count - 2 for count in gap.shape)
     inner = gap[1:-1, 1:-1]
     around = [gap[i : i + rows, j : j + cols] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
-    lower = inner < np.minimum.reduce(around[:4])
-    return np.isfinite(inner) & lower & (inner <= np.minimum.reduce(around[4:]))
+    return np.isfinite(inner) & (inner <= np.minimum.reduce(around)) & (inner < around[3])
 
 
 def _lower(gap: PlaneField, points: Array, cells: Array) -> Array:
@@ -80,15 +81,16 @@ def _lower(gap: PlaneField, points: Array, cells: Array) -> Array:
     return points
 
 
-def missed_contact(around: Surroundings, step: Any, moduli: tuple[float, float, float]) -> str:
+def missed_contact(around: Surroundings, step: Any, moduli: tuple[float, float], reach: float) -> str:
     """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
 
-    They overlap where the gap is below the approach less the displacement by the pressure
+    Within the reach (m) of a load the first of the moduli E* (Pa) holds, beyond it the second. The bodies
+    overlap where the gap is below the approach less the displacement by the pressure
     (fortran/path/beyond_window.f90).
     """
     approach = around.lowest + _OVERLAP * (float(step.approach) - around.lowest)
     near = around.points[:, around.points[2] < approach].T
-    if not near.size:
+    if not near.size or around.lowest == math.inf:
         return ""
     window = step.lattice
     # loads are about as far apart across and along a slender window
@@ -101,7 +103,7 @@ def missed_contact(around: Surroundings, step: Any, moduli: tuple[float, float, 
         flat.point_loads(rows, band, rows.row_first - window.row_first, window.n_row, *counts)
         for rows, band in step.bands("pressure")
     )
-    most = flat.overlap_beyond(near, loads, approach, moduli)
+    most = flat.overlap_beyond(near, loads, approach, moduli, reach)
     if not most:
         return ""
     x, y, _ = near[most - 1]

@@ -297,17 +297,17 @@ class Problem:
             return
         if self._around is None or self._around[0] != step.lattice:
             self._around = step.lattice, surroundings(self._gap, step.lattice)
-        if fault := missed_contact(self._around[1], step, self._moduli):
+        if fault := missed_contact(self._around[1], step, *self._moduli):
             raise DeckError(f"grid.extent: load step {step.number}: {fault}")
 
     @property
-    def _moduli(self) -> tuple[float, float, float]:
-        """Modulus E* (Pa) near to a load, far from it, and the distance (m) from which the latter holds."""
+    def _moduli(self) -> tuple[tuple[float, float], float]:
+        """Moduli E* (Pa) near to a load and far from it, and the distance (m) from which the latter holds."""
         bodies = self.body_1, self.body_2
         compliance = sum(body.compliance for body in bodies)
         near, far = self.pair.effective_modulus, 1.0 / compliance if compliance else math.inf
         thickness = sum(layer.thickness for body in bodies for layer in body.coating)
-        return min(near, far), far, _BESIDE_COATING * thickness
+        return (min(near, far), far), _BESIDE_COATING * thickness
 
     def holes_near(self, contact: Estimate) -> int:
         """Return the number of holes of height maps within the bounds of an estimated contact."""

@@ -11,7 +11,7 @@ module hc_scratch
   !> As much memory as the largest of its users needs, with a count of them; the last one frees it.
   type :: scratch_t
     private
-    !> One number more than wanted, so that a part without any, at the end, has an address, too
+    !> Starts at 0: an empty part at the end needs an address, too
     real(wp), allocatable :: values(:)
     !> Numbers that there should be
     integer(int64) :: wanted = 0

@@ -15,7 +15,7 @@ from ..errors import DeckError
 from .plane_field import PlaneField
 
 _TRIED = 121  # points along a side of a grid
-_GRIDS = 7  # about a window, each twice as wide as the one before
+_GRIDS = 7  # about a window; their widths double
 _LOWEST = 200  # points about which lower ones are looked for
 _HALVINGS = 3  # of their distances
 _ROUNDED = 1e-9  # of places, in spacings

@@ -145,7 +145,7 @@ module hc_options
     integer :: max_parts = 3
     !> Nodes in contact up to which a step that failed is handed to LAPACK, and sides of the part of the window for that
     integer :: few_nodes = 16, largest_direct_side = 64
-    !> Share of the nodes of the window below which a part pays for separate operators
+    !> Share of the time of an application over the window up to which a part pays for separate operators
     real(wp) :: largest_part = 0.6_wp
     !> Margin of a part about the contact, in nodes: at least, and as a fraction 1/n of the width; the contact may grow in a
     !> step

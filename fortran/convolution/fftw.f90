@@ -7,7 +7,7 @@ module hc_fftw
 
   public :: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan
   public :: fftw_forward, fftw_estimate
-  public :: good_size
+  public :: good_size, plane_time
 
   !> Flags of fftw3.h
   integer(c_int), parameter :: fftw_forward = -1, fftw_estimate = 64
@@ -52,8 +52,7 @@ contains
     good_size = length
     least = huge(1.0_wp)
     do
-      ! both sides of the window count
-      cost = time_per_point(length)*real(length, wp)**2
+      cost = plane_time([length, length])
       if (cost > 0.0_wp .and. cost < least) then
         least = cost
         good_size = length
@@ -62,6 +61,12 @@ contains
       length = length + 4
     end do
   end function good_size
+
+  !> Estimate the time of a transform along both directions, in that of a point of powers of two; zero as below.
+  pure real(wp) function plane_time(length)
+    integer, intent(in) :: length(2)
+    plane_time = product(real(length, wp))*sum(time_per_point(length))/2.0_wp
+  end function plane_time
 
   !> Estimate the time per point of FFTW's estimated plans over that of powers of two (measured with AVX2
   !> in both precisions); zero for lengths with larger prime factors, which are not to be taken.

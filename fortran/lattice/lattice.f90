@@ -71,7 +71,7 @@ module hc_lattice
     !> Sum and largest value over each node and its neighbors; nodes within some steps of a zone
     procedure :: ring_sum, ring_max, dilated
     !> The part of the window around some nodes: its columns and rows, whether it pays, its lattice
-    procedure :: enclose, enclose_lines, is_worth_parting, subwindow
+    procedure :: enclose, enclose_lines, subwindow
   end type lattice_t
 
 contains
@@ -438,15 +438,6 @@ contains
       high(d) = min((high(d) + margin + step - 1)/step*step, self%extent(d))
     end do
   end subroutine enclose_lines
-
-  !> Return whether the part is so much smaller than the window that separate operators pay; no part repeats with the window.
-  pure logical function is_worth_parting(self, low, high, options)
-    class(lattice_t), intent(in) :: self
-    !> First and last column and row of the part
-    integer, intent(in) :: low(2), high(2)
-    type(multilevel_options_t), intent(in) :: options
-    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size() .and. .not. self%is_periodic()
-  end function is_worth_parting
 
   !> Return lattice and window of a part.
   pure function subwindow(self, low, high) result(part)

@@ -12,11 +12,11 @@ module hc_flexibility
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, most_threads
   use hc_elastic_medium, only: elastic_medium_t
-  use hc_fftw, only: good_size
+  use hc_fftw, only: good_size, plane_time
   implicit none
   private
 
-  public :: flexibility_t, check_operator, transform_length, padded_length, normal, along_x, along_y
+  public :: flexibility_t, check_operator, transform_length, padded_length, application_time, normal, along_x, along_y
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
@@ -104,6 +104,12 @@ contains
       if (periodic) length = extent
     end if
   end function padded_length
+
+  !> Estimate the time of an application, in that of a transform of a point.
+  pure real(wp) function application_time(lattice)
+    type(lattice_t), intent(in) :: lattice
+    application_time = plane_time(transform_length(lattice))
+  end function application_time
 
   !> Replace tractions by the displacements along the same components that they cause together; by default with a copy.
   subroutine replace(self, components, values, error)

@@ -37,7 +37,7 @@ from collections import namedtuple
 from pathlib import Path
 from typing import Any
 
-DECLARED = {"real": "real(c_double)", "int": "integer(c_int)", "flag": "integer(c_int)"}
+DECLARED = {"real": "real(c_double)", "int": "integer(c_int)", "flag": "integer(c_int8_t)"}
 DECLARED |= {"long": "integer(c_int64_t)", "single": "real(c_float)", "text": "character(len=*)"}
 # A number of a record: from the array, into it, and its Python type.
 NUMBER = {
@@ -216,7 +216,7 @@ def main(source: str, fortran: str, python: str, built: str = "") -> None:
     kinds = table["kinds"] | {name: kind_of(name, record) for name, record in table["records"].items()}
     kinds |= {name: object_of(name, where) for name, where in table["objects"].items()}
     rows = [Procedure(name, row, kinds) for name, row in table["procedures"].items()]
-    text = ["module hc_flat\n  use iso_c_binding, only: c_double, c_float, c_int, c_int64_t"]
+    text = ["module hc_flat\n  use iso_c_binding, only: c_double, c_float, c_int, c_int8_t, c_int64_t"]
     text += [listed(f"  use {module}, only: {names}") for module, names in table["use"].items()]
     text += [
         "  implicit none\n  private",

@@ -94,8 +94,8 @@ module hc_options
     !> step of conjugate gradients. Residual from which on sets change too much for it
     real(wp) :: length_ahead = 0.6_wp, residual_ahead = 0.1_wp
     !> Iterations of conjugate gradients and of GMRES, far more than the preconditioner needs; directions that GMRES stores, as many
-    !> as it mostly takes
-    integer :: max_iterations = 400, max_coupled_iterations = 40, max_directions = 7
+    !> as it mostly takes, and up to how many with their products off the contact
+    integer :: max_iterations = 400, max_coupled_iterations = 40, max_directions = 7, max_products = 5
     !> Contact areas per staggered sweep where the shear traction does not move the pressure: until the area stands
     integer :: max_areas_uncoupled = 60
     !> Residual R_n of a compliant interface at which the area of a first pressure stands

@@ -315,6 +315,7 @@ contains
                                 options%final_accuracy*now%tolerance)*real(system%space%number(step%nodes%n_active), wp)**0.25_wp
       iteration%most = options%max_coupled_iterations
       iteration%most_directions = options%max_directions
+      iteration%most_products = options%max_products
       ! the next sweep begins with a product; stiff springs that rest under the pressure would feel the rounding
       iteration%single = .not. allocated(system%tilt)
       ! the traction across of nodes on a bound that does not grow with the pressure is no unknown

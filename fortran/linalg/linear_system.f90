@@ -83,8 +83,9 @@ module hc_linear_system
     real(wp) :: tolerance = 0.0_wp, residual = huge(1.0_wp)
     !> Iterations allowed, and made
     integer :: most = 0, made = 0
-    !> GMRES: stored directions, after which it restarts with the present residual
-    integer :: most_directions = 0
+    !> GMRES: stored directions, after which it restarts with the present residual; up to how many with their products off the
+    !> active nodes
+    integer :: most_directions = 0, most_products = huge(0)
     !> GMRES: directions are stored in single precision; the product has an error of as much of the residual at the start
     logical :: single = .false.
     !> GMRES: weights of the residuals, one for each part of the vectors; the parts are equally long

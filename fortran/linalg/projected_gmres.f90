@@ -6,7 +6,8 @@
 !>     z <- M r - M B (C^T M B)^-1 C^T M r.
 !>
 !> Of the products A z only the part off the active nodes is stored: with the weights W, the matrix H of Arnoldi's method and
-!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s. V and M r may be stored in single precision, while
+!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s. Where there are many directions, that of their sum
+!> is computed instead: it takes less time than they take memory. V and M r may be stored in single precision, while
 !> the arithmetic is in double; M r is rounded before its product then.
 !>
 !> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869; J. I. Aliaga, H. Anzt et al., Int. J. High Perform.
@@ -33,7 +34,7 @@ module hc_projected_gmres
     real(wp), allocatable :: v(:), mr(:)
     !> The same in single precision
     real(sp), allocatable :: rounded(:), rounded_mr(:)
-    !> The product A z on the other nodes
+    !> The product A z on the other nodes; of the first direction also that of the sum
     real(sp), allocatable :: beyond(:)
   end type direction_t
 
@@ -80,6 +81,8 @@ contains
     !> Norms of the columns, with the weights of the residual
     real(wp) :: along(size(constraints%multiplier))
     integer :: directions
+    !> More directions than products may be stored of
+    logical :: many
     type(field_space_t) :: space
 
     space = nodes%space
@@ -97,6 +100,7 @@ contains
       call search(min(iteration%most_directions, iteration%most - iteration%made))
       if (allocated(error)) return
       call take_step()
+      if (allocated(error)) return
       iteration%made = iteration%made + directions
     end do
 
@@ -145,6 +149,7 @@ contains
       integer :: i, k
 
       directions = 0
+      many = .false.
       began = length
       w = w/length
       call keep(1)
@@ -157,7 +162,7 @@ contains
         call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
         call nodes%pack(image, w)
-        call others%pack(image, basis(k)%beyond)
+        if (.not. many) call others%pack(image, basis(k)%beyond)
         call constraints%add_columns(space, -share(:, k), w, image(:size(w)))
         call weigh(iteration%weight, w)
         do i = 1, k
@@ -199,9 +204,9 @@ contains
       integer :: stat
 
       associate (double => merge(0, nodes%n_active, iteration%single), single => merge(nodes%n_active, 0, iteration%single))
-        allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k)%beyond(others%n_active), &
-                  basis(k + 1)%rounded(single), basis(k + 1)%v(double), stat=stat)
+        allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k + 1)%rounded(single), basis(k + 1)%v(double), stat=stat)
       end associate
+      if (stat == 0 .and. .not. many) allocate (basis(k)%beyond(others%n_active), stat=stat)
       if (stat == 0) call system%take_image(size(ax), own, image, stat)
       call agree(stat)
     end subroutine take_memory
@@ -249,8 +254,12 @@ contains
       integer, intent(in) :: k
       !> Its residual without the weights, freed before the direction takes its memory
       real(wp), allocatable :: r(:)
-      integer :: stat
+      integer :: i, stat
 
+      many = k > iteration%most_products
+      do i = 2, merge(k - 1, 0, many)
+        if (allocated(basis(i)%beyond)) deallocate (basis(i)%beyond)
+      end do
       ! after a restart the same memory serves again
       if (iteration%made == 0) call give_back(size(ax))
       allocate (r(nodes%n_active), stat=stat)
@@ -279,7 +288,7 @@ contains
 
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
-      real(wp) :: largest
+      real(wp) :: factor, largest
       integer :: i
 
       do i = directions, 1, -1
@@ -300,21 +309,29 @@ contains
       end do
       call weigh(1.0_wp/iteration%weight, w)
       call constraints%add_columns(space, matmul(share(:, :directions), y(:directions)), w, image(:size(w)))
-      if (allocated(own)) deallocate (own)
       call nodes%add(1.0_wp, w, ax)
       w = 0.0_wp
       call constraints%add_mb(space, matmul(share(:, :directions), y(:directions)), w)
-      call space%add(w, x)
       do i = 1, directions
         if (iteration%single) then
-          x = x + y(i)*basis(i)%rounded_mr
+          w = w + y(i)*basis(i)%rounded_mr
         else
-          x = x + y(i)*basis(i)%mr
+          w = w + y(i)*basis(i)%mr
         end if
-        call others%add(y(i), basis(i)%beyond, ax)
-        largest = space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
-        iteration%rounding = iteration%rounding + abs(y(i))*(0.5_wp*epsilon(1.0_sp)*largest &
-                                                             + arnoldi(i + 1, i)*rounded_off(i + 1)/minval(iteration%weight))
+        iteration%rounding = iteration%rounding + abs(y(i))*arnoldi(i + 1, i)*rounded_off(i + 1)/minval(iteration%weight)
+      end do
+      call space%add(w, x)
+      if (many) then
+        call system%product_packed(nodes, w, image, error)
+        if (allocated(error)) return
+        call others%pack(image, basis(1)%beyond)
+      end if
+      if (allocated(own)) deallocate (own)
+      do i = 1, merge(1, directions, many)
+        factor = merge(1.0_wp, y(i), many)
+        call others%add(factor, basis(i)%beyond, ax)
+        largest = abs(factor)*space%largest(real(max(maxval(abs(basis(i)%beyond)), 0.0_sp), wp))
+        iteration%rounding = iteration%rounding + 0.5_wp*epsilon(1.0_sp)*largest
       end do
       constraints%multiplier = constraints%multiplier + matmul(share(:, :directions), y(:directions))
       if (iteration%outcome /= iterations_used_up) return

@@ -329,9 +329,7 @@ def test_keys_that_the_file_answers_are_refused_if_they_differ(file: Any) -> Non
     two = {"x": [0.0, 1.0], "y": [0.0, 1.0], "heights": [[0.0, 1.0], [1.0, 2.0]]}
     assert 'units = "um": expected nothing beside points' in complaint(of_file("", units="um", **two))
     holed = {**two, "heights": [[0.0, 1.0], [np.nan, 2.0]]}
-    assert "holes: 1 point has no height, at x = 1.000 m, y = 0 m" in complaint(
-        of_file("", **holed)
-    )
+    assert "holes: 1 point has no height, at x = 1.000 m, y = 0 m" in complaint(of_file("", **holed))
     for key in two:
         wrong = {**two, key: [[np.inf, 0.0], [1.0, 0.0]] if key == "heights" else [np.nan, 0.0]}
         assert "heights: expected finite numbers, and NaN in holes" in complaint(of_file("", **wrong))

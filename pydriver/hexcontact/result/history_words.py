@@ -45,6 +45,7 @@ _NOTICED = 1e-6  # share of the normal load or approach from which tangential on
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 _ELLIPTIC = 0.005  # share by which the area of a contact may differ from that of the ellipse with its moments
+_BEYOND_CIRCLE = 1.1  # extent of a contact over the diameter of a circle from which it is another figure
 _WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
 _UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
@@ -141,11 +142,19 @@ def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]
 
 
 def _moments(history: History, extent: Extent | None) -> str:
-    """Name the ellipse of equal moments if the contact is not elliptic, and the extent of the contact."""
+    """Name the ellipse or circle if the contact is another figure, and the extent of the contact."""
     axes, area = half_axes(history), fitted("contact_area", history)
-    if axes is None or repeats(history) or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+    if repeats(history):
         return ""
-    words = " of the ellipse with the same moments"
+    if axes is None:
+        across = 2.0 * fitted("contact_radius", history)
+        if extent is None or max(extent) < _BEYOND_CIRCLE * across:
+            return ""
+        words = " of the circle of the same area"
+    elif abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+        return ""
+    else:
+        words = " of the ellipse with the same moments"
     if extent is None:
         return words
     along, across = (quantity(length, "m", 3) for length in extent)

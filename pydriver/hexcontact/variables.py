@@ -268,8 +268,8 @@ VARIABLES: dict[str, Variable] = {
         title="Max pressure", least=0.0, most=math.inf, summary=1, **_ALWAYS,
     ),
     "max_traction": _stick(
-        "Pa", "largest shear traction of a node",
-        title="Max traction", least=0.0, summary=2, rough=True, slip_zone=True, **_FRICTION,
+        "Pa", "largest shear traction of a node; infinite like the pressure",
+        title="Max traction", least=0.0, most=math.inf, summary=2, rough=True, slip_zone=True, **_FRICTION,
     ),
     "dissipated_energy": _scalar(
         "J", "energy dissipated by friction so far",

@@ -307,6 +307,9 @@ def test_the_pressure_at_a_sharp_end_is_no_number(name: str) -> None:
     assert ("unbounded" in repr(result.compare())) == (name in ("roller", "chamfer"))
     layer = case.changed({"interface": {"coefficient": 1e13}}) if unbounded else case
     assert math.isfinite(float(layer.run().max_pressure[-1]))
+    shear = [{"normal_load": 10.0}, {"tangential_load_x": 1.0}]
+    sheared = case.changed({"load": shear, "friction": {"coefficient": 0.3}}).run()
+    assert [math.isinf(float(value)) for value in sheared.max_traction] == [False, unbounded]
 
 
 def test_pictures_of_a_sharp_ended_roller_name_no_end_pressure() -> None:

@@ -220,7 +220,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "mean_gap": _work(
         "m", "mean of the gap over the window, which repeats",
-        title="Mean gap", summary=8, before=NAN, **_FROM_0,
+        title="Mean gap", summary=8, before=NAN, scale=_APPROACH, **_FROM_0,
     ),
     "bulk_body": _work(
         "1", "body that carries the bulk stress", dtype="i4", flags={1: "body_1", 2: "body_2"}

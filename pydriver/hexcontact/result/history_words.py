@@ -87,14 +87,23 @@ def worth_showing(histories: Iterable[History]) -> list[str]:
 
 def load_or_motion(name: str, history: History) -> str:
     """Write one of `LOADS_AND_MOTIONS`; noise is written as zero."""
-    value = float(history[name])
-    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].unit)
+    return quantity(_above_noise(float(history[name]), name, history), VARIABLES[name].unit)
+
+
+def _above_noise(value: float, name: str, history: History) -> float:
+    """Return a value of a step, 0 for noise."""
+    return 0.0 if abs(value) < _NOISE * _scale(name, history) else value
 
 
 def fitted(name: str, history: History) -> float:
     """Return an area or radius to the edge between the nodes; without a fit, that of the nodes."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
+
+
+def _measured(name: str, history: History) -> str:
+    """Write a measure of a step; noise is written as zero."""
+    return quantity(_above_noise(fitted(name, history), name, history), VARIABLES[name].units)
 
 
 def contact_size(history: History) -> tuple[str, str]:
@@ -254,7 +263,7 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
     rows += [
         (name_of_size, size + _moments(history, extent))
         if name == "contact_radius"
-        else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
+        else (spelled(name), _measured(name, history) + error_of(name, history))
         for name in summary
         if name in history
         and not (name == "dissipated_energy" and rolls(history) and not history[name])

@@ -53,6 +53,18 @@ def test_waves_between_their_limits(share: float, mean_gap: float) -> None:
     assert float(by_gap["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-6)
 
 
+@pytest.mark.parametrize("angle", ["0 deg", "90 deg"])
+def test_error_bar_of_the_area_contains_straight_edges(angle: str) -> None:
+    """Both edges of a strip lie on columns, or rows, and err alike: the area of Westergaard is in the bar."""
+    ridges = {"shape": "waviness", "amplitude": 0.2e-6, "wavelength": WAVE, "angle": angle}
+    for share in (0.14, 0.28, 0.41, 0.55, 0.83):
+        body, load = {**STEEL, "surface": ridges}, share * math.pi * E_STAR * 0.2e-6 / WAVE
+        pressed = waves(body_1=body, mean_pressure=load).run().dataset.isel(step=-1)
+        area, bar = (float(pressed[name]) / WAVE**2 for name in ("contact_area", "contact_area_error"))
+        assert bar == pytest.approx(1 / 64)
+        assert area == pytest.approx(2 / math.pi * math.asin(math.sqrt(share)), abs=bar)
+
+
 def test_a_section_of_waves_goes_through_their_crests() -> None:
     """Contacts that repeat have no center: that of the pressure lies between two rows of nodes."""
     line = line_of([StepView(waves(nodes=16, mean_pressure=0.3 * FULL).run(), -1)], 0.0)

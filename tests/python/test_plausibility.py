@@ -161,6 +161,20 @@ def test_a_ring_is_no_disc_in_check_warning_and_summary() -> None:
     assert "µm of the circle of the same area; the contact extends over 1.0" in shown
 
 
+def test_a_sharp_tip_is_told() -> None:
+    for surface, sharp in (
+        ({"shape": "cone", "slope": 0.01}, True),
+        ({"shape": "power", "exponent": 1, "coefficient": 0.01}, True),
+        ({"shape": "power", "exponent": 1.5, "coefficient": "1 m^-0.5"}, False),
+    ):
+        found = plausibility.notes(case(body__1__surface=surface))
+        assert ("the pressure is unbounded at a sharp tip" in found.get("tips", "")) == sharp
+    stiff = {"coefficient": "1e14 Pa/m"}
+    assert "tips" not in plausibility.notes(
+        case(body__1__surface={"shape": "cone", "slope": 0.01}, interface=stiff)
+    )
+
+
 SOCKET = {"shape": "formula", "expression": "-(x**2 + y**2)/(2*10.05e-3)"}
 GROOVE = {"shape": "formula", "expression": "-x**2/(2*4.89e-3) + y**2/(2*18.2375e-3)"}
 

@@ -23,6 +23,7 @@ from ..core.measures import (
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
+from ..deck.surfaces import Cone, Power
 from ..text import counted, listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -367,8 +368,8 @@ def row(case: Problem) -> str:
 
 
 def notes(case: Problem) -> dict[str, str]:
-    """Return notes by their subjects: limits that are not judged, rounded distances, equal seeds."""
-    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    """Return notes by their subjects: limits that are not judged, rounded distances, tips, equal seeds."""
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case), "tips": sharp_tips(case)}
     if case.surfaces.curvature is None:
         found["seeds"] = equal_seeds(case)
     return {about: note for about, note in found.items() if note}
@@ -403,6 +404,14 @@ def rounded_distances(case: Problem) -> str:
                 f"{counted(len(rolled), 'spacing')} of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
+
+
+def sharp_tips(case: Problem) -> str:
+    """Return a note on tips at which the pressure is unbounded; empty without one, or with an interface."""
+    shapes = () if case.gap_given or case.deck.interface else case.shapes
+    if not any(isinstance(one, Cone) or (isinstance(one, Power) and one.exponent <= 1) for one in shapes):
+        return ""
+    return "the pressure is unbounded at a sharp tip: there its largest value grows as the spacing shrinks"
 
 
 def equal_seeds(case: Problem) -> str:

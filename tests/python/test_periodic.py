@@ -20,6 +20,7 @@ from hexcontact import (
 )
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import _columns, hertz_rows
+from hexcontact.plotting.below import table
 from hexcontact.plotting.maps import mesh_of
 from hexcontact.plotting.report_data import charts_of
 from hexcontact.plotting.sections import line_of
@@ -287,6 +288,32 @@ def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
     assert charts["Mean gap"]["unit"] == "nm"
     assert gaps[1] * 1e-9 == pytest.approx(float(read.mean_gap[0]), rel=1e-4)
     assert Case.from_text(read.deck).lattice == case.lattice
+
+
+def test_a_component_that_is_rounding_is_drawn_as_zero() -> None:
+    """Below waves along x the stresses xy and yz are 0, but for the residual of the tractions."""
+    along, depth = np.meshgrid(np.linspace(-0.5e-3, 0.5e-3, 9), np.linspace(0.0, 0.5e-3, 5))
+    place = {"x": (("across", "along"), along), "y": (("across", "along"), 0 * along)}
+    place |= {"depth": (("across", "along"), depth), "step": [1]}
+    sizes = {"stress_zz": 1e8, "stress_xy": 0.5, "stress_xz": 2e3}
+    said = "component of the stress, positive in tension"
+    fields = {
+        name: (
+            ("step", "across", "along"),
+            size * np.cos(9e3 * along)[None],
+            {"units": "Pa", "long_name": said},
+        )
+        for name, size in sizes.items()
+    }
+    found = xarray.Dataset(fields, coords=place, attrs={"title": "waves: below", "body": 1})
+    figure = table(found)
+    assert [bool(one.lines) for one in figure.axes if one.get_title()] == [True, False, True]
+    bars = [one for one in figure.axes if not one.get_title()]
+    assert bars[1].get_xlabel().endswith("(Pa)")
+    figure.draw_without_rendering()
+    for bar in bars:
+        label = bar.xaxis.label.get_window_extent()
+        assert label.x0 >= 0.0 and label.x1 <= figure.bbox.x1
 
 
 def test_stress_below_a_wave() -> None:

@@ -384,6 +384,12 @@ def test_a_contact_without_end_blames_the_surface(parts: list[Surface], number: 
         Case(**bodies, spacing=1e-5, normal_load=10.0)
 
 
+def test_waves_without_end_name_the_window_that_repeats() -> None:
+    body = {**STEEL, "surface": {"shape": "waviness", "amplitude": 1e-7, "wavelength": 1e-4}}
+    with pytest.raises(DeckError, match=r'or a window that repeats, grid.boundary = "periodic"'):
+        Case(body_1=body, body_2=STEEL, spacing=3e-6, normal_load=10.0)
+
+
 def test_a_profile_by_moduli_needs_them() -> None:
     with pytest.raises(DeckError, match="design_load: its profile follows from the moduli of the bodies"):
         Roller(radius=1.0, length=2.0, profile="logarithmic", design_load=1.0).height(0.0, 0.0)

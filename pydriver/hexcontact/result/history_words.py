@@ -156,8 +156,8 @@ def _moments(history: History, extent: Extent | None) -> str:
     if repeats(history):
         return ""
     if axes is None:
-        across = 2.0 * fitted("contact_radius", history)
-        if extent is None or max(extent) < _BEYOND_CIRCLE * across:
+        diameter = 2.0 * fitted("contact_radius", history)
+        if extent is None or max(extent) < _BEYOND_CIRCLE * diameter:
             return ""
         words = " of the circle of the same area"
     elif abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:

@@ -307,7 +307,7 @@ contains
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
         found%contact = cells_of(lattice, space%count(logical(contact, lk)))
-        found%contact%area_error = 0.2_wp*lattice%cell_area()*edge_nodes(contact, lattice%extent(2), space)
+        found%contact%area_error = lattice%cell_area()*cells_in_doubt(contact, lattice%extent(2), space)
         found%mean_gap = space%sum(state%gap)/lattice%size()
         return
       end if
@@ -385,8 +385,11 @@ contains
     rises = rises .and. .not. beyond > 0.0_wp .and. last_share > 0.0_wp .and. last > 0.0_wp
   end function rises_before
 
-  !> Count the nodes of a zone that have a neighbor along a row or column beyond it, in a window that repeats.
-  integer function edge_nodes(zone, n_row, space) result(n)
+  !> Return how many cells the area of a zone may be wrong by, in a window that repeats.
+  !>
+  !> A fifth of the nodes that have a neighbor along a row or column beyond it; half of those of an edge along a whole row or
+  !> column, which err alike.
+  real(wp) function cells_in_doubt(zone, n_row, space) result(cells)
     !> Nodes of the zone (n_col, own rows)
     logical, intent(in), contiguous :: zone(:, :)
     !> Rows of the window
@@ -394,22 +397,28 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     logical(lk) :: around(size(zone, 1), 0:size(zone, 2) + 1)
-    integer :: own(2), row, counts(1)
+    ! nodes at the edge, those of straight edges along rows, and nodes by column
+    integer :: own(2), row, counts(2 + size(zone, 1))
 
     own = space%own_rows(n_row)
     around(:, 1:size(zone, 2)) = zone
     call space%fetch(n_row, logical(zone, lk), modulo(own(1) - 2, n_row) + 1, around(:, 0:0))
     call space%fetch(n_row, logical(zone, lk), modulo(own(2), n_row) + 1, around(:, size(zone, 2) + 1:))
-    counts = 0
+    counts(:2) = 0
+    counts(3:) = count(zone, dim=2)
     do row = 1, size(zone, 2)
-      associate (here => around(:, row))
-        counts = counts + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. around(:, row - 1) &
-                                                  .and. around(:, row + 1)))
+      associate (here => around(:, row), below => around(:, row - 1), above => around(:, row + 1))
+        counts(1) = counts(1) + count(here .and. .not. (cshift(here, 1) .and. cshift(here, -1) .and. below .and. above))
+        if (all(here)) counts(2) = counts(2) + size(here)*count([.not. any(below), .not. any(above)])
       end associate
     end do
     call space%ranks%add_counts(counts)
-    n = counts(1)
-  end function edge_nodes
+    associate (columns => counts(3:))
+      counts(2) = counts(2) + n_row*(count(columns == n_row .and. cshift(columns, 1) == 0) &
+                                     + count(columns == n_row .and. cshift(columns, -1) == 0))
+    end associate
+    cells = 0.2_wp*counts(1) + 0.3_wp*counts(2)
+  end function cells_in_doubt
 
   !> Measure the cells of a zone alone; its edge stays unknown.
   pure type(zone_measures_t) function cells_of(lattice, n_node) result(found)

@@ -220,7 +220,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "mean_gap": _work(
         "m", "mean of the gap over the window, which repeats",
-        title="Mean gap", summary=8, before=NAN, **_FROM_0,
+        title="Mean gap", summary=8, before=NAN, scale=_APPROACH, **_FROM_0,
     ),
     "bulk_body": _work(
         "1", "body that carries the bulk stress", dtype="i4", flags={1: "body_1", 2: "body_2"}
@@ -268,8 +268,8 @@ VARIABLES: dict[str, Variable] = {
         title="Max pressure", least=0.0, most=math.inf, summary=1, **_ALWAYS,
     ),
     "max_traction": _stick(
-        "Pa", "largest shear traction of a node",
-        title="Max traction", least=0.0, summary=2, rough=True, slip_zone=True, **_FRICTION,
+        "Pa", "largest shear traction of a node; infinite like the pressure",
+        title="Max traction", least=0.0, most=math.inf, summary=2, rough=True, slip_zone=True, **_FRICTION,
     ),
     "dissipated_energy": _scalar(
         "J", "energy dissipated by friction so far",

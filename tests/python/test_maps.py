@@ -329,9 +329,7 @@ def test_keys_that_the_file_answers_are_refused_if_they_differ(file: Any) -> Non
     two = {"x": [0.0, 1.0], "y": [0.0, 1.0], "heights": [[0.0, 1.0], [1.0, 2.0]]}
     assert 'units = "um": expected nothing beside points' in complaint(of_file("", units="um", **two))
     holed = {**two, "heights": [[0.0, 1.0], [np.nan, 2.0]]}
-    assert "holes: 1 point has no height, one of them at x = 1.000 m, y = 0 m" in complaint(
-        of_file("", **holed)
-    )
+    assert "holes: 1 point has no height, at x = 1.000 m, y = 0 m" in complaint(of_file("", **holed))
     for key in two:
         wrong = {**two, key: [[np.inf, 0.0], [1.0, 0.0]] if key == "heights" else [np.nan, 0.0]}
         assert "heights: expected finite numbers, and NaN in holes" in complaint(of_file("", **wrong))
@@ -620,6 +618,27 @@ def test_a_tapered_map_is_told_and_drawn_as_it_is_solved(file: Any) -> None:
     np.testing.assert_allclose(cross, [x[lowest], y[lowest]], atol=tapered.lattice.spacing)
 
 
+def test_a_picture_shows_surfaces_that_repeat_over_the_window(file: Any) -> None:
+    """Points of the files lie on one side of the middle of the window, and half of them outside."""
+    at = 10.0 * np.arange(WAVE)
+    x, y = np.meshgrid(at, at)
+    points = "\n".join(f"{u},{v},{h:.9g}" for u, v, h in zip(x.flat, y.flat, waves(WAVE).flat, strict=True))
+    grid = of_file(file("grid.csv", "x [um], y [um], z [um]\n" + points), offset=["0.9 mm", "0 mm"])
+    lines = "\n".join(f"{v},{np.cos(2 * np.pi * v / 640):.9g}" for v in at)
+    profile = {"shape": "profile", "upwards": True, "file": file("p.csv", "y [um], z [um]\n" + lines)}
+    made = case(grid, {"mean_pressure": "100 MPa"}, other=profile, **CELL)
+    map_axes, line_axes = surface(made).axes[:2]
+    assert np.ma.count_masked(map_axes.collections[0].get_array()) == 0
+    ends = np.ptp(made.lattice.outline, axis=0) * 1e6
+    assert map_axes.collections[0].get_coordinates()[-1, -1, 0] == pytest.approx(ends[0] / 2, rel=0.03)
+    touch = map_axes.lines[-1].get_xydata()[0]
+    assert np.all(np.abs(touch) < ends / 2)
+    across, height = line_axes.lines[0].get_data()
+    dashed = [line.get_xdata()[0] for line in line_axes.lines[1:]]
+    assert (across[0], across[-1]) == pytest.approx(sorted(dashed))
+    np.testing.assert_allclose(height, np.cos(2 * np.pi * across / 640) - 1, atol=1e-3)
+
+
 def test_a_map_that_does_not_repeat_is_refused_levelled_or_tapered(file: Any) -> None:
     keys = {"units": "um", "height_units": "um", "spacing": ["10 um", "10 um"]}
     load = {"mean_pressure": "100 MPa"}
@@ -669,6 +688,9 @@ def test_a_profile_is_the_same_all_along(file: Any) -> None:
     assert "angle of 0 or 90 deg" in complaint({**profile, "angle": "30 deg"}, load=load, **CELL)
     assert "a profile and a flat touch along a line, so the contact has no end" in complaint(profile)
     assert "extruded along 0 deg from x" in " ".join(row[1] for row in case_rows(case(profile, load, **CELL)))
+    gone = Profile(upwards=True, y=np.delete(at, slice(20, 26)) * 1e-6, heights=np.zeros(WAVE - 6))
+    lines_about = [line for one in (turned, gone) for line in one.rows(lambda _: 5e-6) if "points, y" in line]
+    assert lines_about[-1].endswith("10.0 µm apart; 10.0 µm to 70.0 µm in y, 2 spacings of the lattice")
     assert "expected two columns, y and z, not 3; or headers" in complaint(
         {**profile, "file": file("q.csv", "1,2,3\n4,5,6"), "units": "um", "height_units": "um"}
     )

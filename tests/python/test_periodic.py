@@ -20,6 +20,7 @@ from hexcontact import (
 )
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import _columns, hertz_rows
+from hexcontact.plotting.below import table
 from hexcontact.plotting.maps import mesh_of
 from hexcontact.plotting.report_data import charts_of
 from hexcontact.plotting.sections import line_of
@@ -53,6 +54,18 @@ def test_waves_between_their_limits(share: float, mean_gap: float) -> None:
     assert float(by_gap["mean_pressure"]) == pytest.approx(share * FULL, rel=1e-6)
 
 
+@pytest.mark.parametrize("angle", ["0 deg", "90 deg"])
+def test_error_bar_of_the_area_contains_straight_edges(angle: str) -> None:
+    """Both edges of a strip lie on columns, or rows, and err alike: the area of Westergaard is in the bar."""
+    ridges = {"shape": "waviness", "amplitude": 0.2e-6, "wavelength": WAVE, "angle": angle}
+    for share in (0.14, 0.28, 0.41, 0.55, 0.83):
+        body, load = {**STEEL, "surface": ridges}, share * math.pi * E_STAR * 0.2e-6 / WAVE
+        pressed = waves(body_1=body, mean_pressure=load).run().dataset.isel(step=-1)
+        area, bar = (float(pressed[name]) / WAVE**2 for name in ("contact_area", "contact_area_error"))
+        assert bar == pytest.approx(1 / 64)
+        assert area == pytest.approx(2 / math.pi * math.asin(math.sqrt(share)), abs=bar)
+
+
 def test_a_section_of_waves_goes_through_their_crests() -> None:
     """Contacts that repeat have no center: that of the pressure lies between two rows of nodes."""
     line = line_of([StepView(waves(nodes=16, mean_pressure=0.3 * FULL).run(), -1)], 0.0)
@@ -60,7 +73,10 @@ def test_a_section_of_waves_goes_through_their_crests() -> None:
 
 
 def test_a_section_of_complete_contact_is_a_period_long() -> None:
-    views = [StepView(waves(nodes=16, mean_pressure=1.5 * FULL).run(), -1)]
+    pressed = waves(nodes=16, mean_pressure=1.5 * FULL).run()
+    views = [StepView(pressed, -1)]
+    rounding = pressed.step(-1).assign(mean_gap=-4.9e-23)
+    assert dict(step_rows(rounding))["mean gap"] == "0 m"
     assert line_of(views, 0.0).length == pytest.approx(WAVE, rel=1e-12)
     assert line_of(views, 0.25 * math.pi).length == pytest.approx(math.sqrt(2.0) * WAVE, rel=1e-12)
 
@@ -272,6 +288,32 @@ def test_unlike_bodies_with_friction(tmp_path: Path) -> None:
     assert charts["Mean gap"]["unit"] == "nm"
     assert gaps[1] * 1e-9 == pytest.approx(float(read.mean_gap[0]), rel=1e-4)
     assert Case.from_text(read.deck).lattice == case.lattice
+
+
+def test_a_component_that_is_rounding_is_drawn_as_zero() -> None:
+    """Below waves along x the stresses xy and yz are 0, but for the residual of the tractions."""
+    along, depth = np.meshgrid(np.linspace(-0.5e-3, 0.5e-3, 9), np.linspace(0.0, 0.5e-3, 5))
+    place = {"x": (("across", "along"), along), "y": (("across", "along"), 0 * along)}
+    place |= {"depth": (("across", "along"), depth), "step": [1]}
+    sizes = {"stress_zz": 1e8, "stress_xy": 0.5, "stress_xz": 2e3}
+    said = "component of the stress, positive in tension"
+    fields = {
+        name: (
+            ("step", "across", "along"),
+            size * np.cos(9e3 * along)[None],
+            {"units": "Pa", "long_name": said},
+        )
+        for name, size in sizes.items()
+    }
+    found = xarray.Dataset(fields, coords=place, attrs={"title": "waves: below", "body": 1})
+    figure = table(found)
+    assert [bool(one.lines) for one in figure.axes if one.get_title()] == [True, False, True]
+    bars = [one for one in figure.axes if not one.get_title()]
+    assert bars[1].get_xlabel().endswith("(Pa)")
+    figure.draw_without_rendering()
+    for bar in bars:
+        label = bar.xaxis.label.get_window_extent()
+        assert label.x0 >= 0.0 and label.x1 <= figure.bbox.x1
 
 
 def test_stress_below_a_wave() -> None:

@@ -143,6 +143,38 @@ def test_the_size_of_an_elongated_contact_is_two_half_axes() -> None:
     assert plausibility.row(case()).startswith("radius about 234 µm, 20 spacings;")
 
 
+def test_a_ring_is_no_disc_in_check_warning_and_summary() -> None:
+    ring = {"shape": "torus", "ring_radius": "0.5 mm", "radius": "2 mm"}
+    tables = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    made = Case(body_1={**tables, "surface": ring}, body_2=tables, spacing=20e-6, normal_load=20.0)
+    words = plausibility.row(made)
+    size = (
+        r"radius about 1[5-9]\d µm of the circle of the same area, about (\d\.\d) spacings in the half-width "
+    )
+    found = re.match(size + r"of its parts; extent about 1\.0\d mm in x", words)
+    assert found and float(found[1]) < 2.5  # 0.6, were the estimate fine enough; 35 in the ellipse
+    assert any(
+        "spacings in the half-width of the parts of the contact may" in s for s in plausibility.warnings(made)
+    )
+    with pytest.warns(PlausibilityWarning):
+        shown = made.run()._repr_html_()
+    assert "µm of the circle of the same area; the contact extends over 1.0" in shown
+
+
+def test_a_sharp_tip_is_told() -> None:
+    for surface, sharp in (
+        ({"shape": "cone", "slope": 0.01}, True),
+        ({"shape": "power", "exponent": 1, "coefficient": 0.01}, True),
+        ({"shape": "power", "exponent": 1.5, "coefficient": "1 m^-0.5"}, False),
+    ):
+        found = plausibility.notes(case(body__1__surface=surface))
+        assert ("the pressure is unbounded at a sharp tip" in found.get("tips", "")) == sharp
+    stiff = {"coefficient": "1e14 Pa/m"}
+    assert "tips" not in plausibility.notes(
+        case(body__1__surface={"shape": "cone", "slope": 0.01}, interface=stiff)
+    )
+
+
 SOCKET = {"shape": "formula", "expression": "-(x**2 + y**2)/(2*10.05e-3)"}
 GROOVE = {"shape": "formula", "expression": "-x**2/(2*4.89e-3) + y**2/(2*18.2375e-3)"}
 

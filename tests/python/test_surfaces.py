@@ -307,6 +307,9 @@ def test_the_pressure_at_a_sharp_end_is_no_number(name: str) -> None:
     assert ("unbounded" in repr(result.compare())) == (name in ("roller", "chamfer"))
     layer = case.changed({"interface": {"coefficient": 1e13}}) if unbounded else case
     assert math.isfinite(float(layer.run().max_pressure[-1]))
+    shear = [{"normal_load": 10.0}, {"tangential_load_x": 1.0}]
+    sheared = case.changed({"load": shear, "friction": {"coefficient": 0.3}}).run()
+    assert [math.isinf(float(value)) for value in sheared.max_traction] == [False, unbounded]
 
 
 def test_pictures_of_a_sharp_ended_roller_name_no_end_pressure() -> None:
@@ -379,6 +382,12 @@ def test_a_contact_without_end_blames_the_surface(parts: list[Surface], number: 
         DeckError, match=rf"^body\.{number}\.surface: the contact has no end; expected a shape"
     ):
         Case(**bodies, spacing=1e-5, normal_load=10.0)
+
+
+def test_waves_without_end_name_the_window_that_repeats() -> None:
+    body = {**STEEL, "surface": {"shape": "waviness", "amplitude": 1e-7, "wavelength": 1e-4}}
+    with pytest.raises(DeckError, match=r'or a window that repeats, grid.boundary = "periodic"'):
+        Case(body_1=body, body_2=STEEL, spacing=3e-6, normal_load=10.0)
 
 
 def test_a_profile_by_moduli_needs_them() -> None:

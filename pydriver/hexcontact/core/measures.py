@@ -43,6 +43,14 @@ def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
     return (major, minor) if minor < ROUND * major else None
 
 
+def unbounded(share: Array, state: Any, *n_row: int) -> list[str]:
+    """Return the names of largest values of a state that rise to an end of the surface."""
+    fields = {"max_pressure": state.pressure}
+    if hasattr(state, "traction_x"):
+        fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
+    return [name for name, field in fields.items() if is_unbounded(share, field, *n_row)]
+
+
 def limits_of_error(
     spacings: Array, values: Array, rough: Mask | None = None, unresolved: Mask | None = None
 ) -> Array:

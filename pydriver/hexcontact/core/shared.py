@@ -20,7 +20,7 @@ from . import ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
 from .friction import FrictionalContact
 from .lattice import Lattice
-from .measures import is_unbounded, measures
+from .measures import measures, unbounded
 from .steps import AHEAD
 
 Rows = Callable[[int, tuple[int, int]], Array]
@@ -113,10 +113,10 @@ class _Part(Contact):
     def _create(self, *arguments: Any) -> None:
         self._arguments = arguments
 
-    def measured(self, state: NormalSolution) -> tuple[dict[str, float], bool]:
-        """Return the measures of a state, and whether its pressure rises to an end of the surface."""
+    def measured(self, state: NormalSolution) -> tuple[dict[str, float], list[str]]:
+        """Return the measures of a state, and the names of those that rise to an end of the surface."""
         share = self.share(self._mask, self.own)
-        return measures(self, state), bool(is_unbounded(share, state.pressure, self.lattice.n_row))
+        return measures(self, state), unbounded(share, state, self.lattice.n_row)
 
     def grown(self, state: NormalSolution) -> Lattice:
         """Return a window that grows with the contact of a state."""

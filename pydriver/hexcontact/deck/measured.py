@@ -243,7 +243,8 @@ class Measured(Surface):
             at = [f"{name} = {quantity(c, 'm')}" for name, c in zip(self._axes, (u, v), strict=True)]
             where = ", ".join(at[self.extruded :])
             sentence = (
-                f"{counted(count, 'point has', 'points have')} no height, one of them at {where}; expected "
+                f"{counted(count, 'point has', 'points have')} no height, "
+                f"{'one of them ' * (count > 1)}at {where}; expected "
             )
             refuse_key("holes", MISSING, f'{sentence}"fill", or "open" if nothing can touch there')
         mean, along, across = self.plane
@@ -387,8 +388,10 @@ class Measured(Surface):
     @property
     def holes_in_words(self) -> str:
         """Describe the holes."""
-        done = {"fill": "filled with the means of their neighbors", "open": "open: nothing touches there"}
-        return f"{counted(count, 'hole')} {done[self.holes]}" if (count := self.holes_found) else "no holes"
+        count = self.holes_found
+        neighbors = "mean of its" if count == 1 else "means of their"
+        done = {"fill": f"filled with the {neighbors} neighbors", "open": "open: nothing touches there"}
+        return f"{counted(count, 'hole')} {done[self.holes]}" if count else "no holes"
 
     def notes(self, name: str) -> Iterator[str]:
         """Yield notes on the surface under its name: filled holes, an extent that may be swapped."""
@@ -486,13 +489,9 @@ class Map(Measured):
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the map, beside the distance of nodes along a direction."""
         (x, y, _, about), ends = self.points, []
-        apart_by = [np.diff(np.sort(at)) for at in (x, y)]
-        of_points = [float(np.median(steps)) for steps in apart_by]
-        uneven = [
-            f"; {quantity(steps.min(), 'm', 3)} to {quantity(steps.max(), 'm', 3)} in {name}"
-            for name, steps in zip("xy", apart_by, strict=True)
-            if np.ptp(steps) > _UNEVEN * steps.max()
-        ]
+        of_points, uneven = zip(
+            *(_steps(at, name) for name, at in zip("xy", (x, y), strict=True)), strict=True
+        )
         for name, at, step, origin in zip("xy", (x, y), of_points, self._moved_by, strict=True):
             low, high = at.min() + origin, at.max() + origin
             cells = quantity(high - low + step, "m")
@@ -616,14 +615,15 @@ class Profile(Measured):
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the profile, beside the distance of nodes along a direction."""
         (_, y, _, about), (_, moved) = self.points, self._moved_by
-        across, step = self._axes[1], float(np.median(np.diff(np.sort(y))))
+        across = self._axes[1]
+        step, uneven = _steps(y, across)
         turned = ", t across it" * bool(self.angle)
         yield f"{about}; extruded along {math.degrees(self.angle):.6g} deg from x{turned}"
         spacings = step / apart(self.angle + math.pi / 2)
         yield (
             f"{len(y)} points, {across} from {quantity(y.min() + moved, 'm')} to "
             f"{quantity(y.max() + moved, 'm')}, "
-            f"{quantity(step, 'm', 3)} apart, {counted(f'{spacings:.3g}', 'spacing')} of the lattice"
+            f"{quantity(step, 'm', 3)} apart{uneven}, {counted(f'{spacings:.3g}', 'spacing')} of the lattice"
         )
         lowest = quantity(float(self._in_period(*self.field.first_touch)[1]) + moved, "m")
         yield f"{self._heights}; nearest to the other body at {across} = {lowest}"
@@ -631,6 +631,14 @@ class Profile(Measured):
 
 
 # --- heights ------------------------------------------------------------------------------------------------
+
+
+def _steps(at: Array, name: str) -> tuple[float, str]:
+    """Return the median distance (m) of points along an axis, and the range of uneven ones in words."""
+    steps = np.diff(np.sort(at))
+    least, most = steps.min(), steps.max()
+    words = f"; {quantity(least, 'm', 3)} to {quantity(most, 'm', 3)} in {name}"
+    return float(np.median(steps)), words if most - least > _UNEVEN * most else ""
 
 
 def _centered(at: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -31,6 +32,8 @@ from .zones import draw_zone_bars
 _DEPTH = 0.6  # of the section, in its widths
 _POINTS = 121  # along the line; 60 below each other
 LEVELS = 12
+_LABEL = 40  # letters in a line below a map
+_NOISE = 1e-6  # of the largest stress: below, a component is 0
 
 
 @figure("stress", "von Mises stress below the contact, in a section")
@@ -383,12 +386,20 @@ def table(table: Dataset) -> Figure:
     if {"distance", "point"} & table.sizes.keys():
         return draw_tables([(name, table)], title)
     fields = [_worst(field) for field in table.data_vars.values() if field.attrs["units"] != "rad"]
+    largest = {field.name: float(abs(field).max()) for field in fields}
+    for k, field in enumerate(fields):  # rounding of a component that is 0 is no picture
+        alike = (largest[other.name] for other in fields if other.attrs["units"] == field.attrs["units"])
+        if field.attrs["units"] == "Pa" and largest[field.name] < _NOISE * max(alike):
+            fields[k] = field.copy(data=np.zeros(field.shape))
     places = [_places(field) for field in fields]
     height = max(float(np.ptp(along) / np.ptp(across)) for across, along, _ in places)
     columns = min(_COLUMNS, len(fields))
     canvas, panels = style.new_panels(len(fields), columns, 3.6 + 0.2 / columns, 2.9 * height + 1.5, 0.4)
     for axes, field, (across, along, words) in zip(panels, fields, places, strict=True):
-        _color(axes, across, along, field)()
+        lines = field.assign_attrs(long_name=textwrap.fill(field.attrs["long_name"], _LABEL))
+        mark = _color(axes, across, along, lines, None if field.any() else (0.0, 1.0))
+        if field.any():
+            mark()
         axes.set(**words, aspect="equal", title=_place(field))
         if words["ylabel"].startswith("depth"):
             axes.invert_yaxis()

@@ -46,20 +46,31 @@ def surface(case: Any) -> Figure:
 
 
 def _map(axes: Axes, one: Measured, case: Any) -> None:
-    """Draw the heights of a map as far as it is measured; points without one are gray, or marked."""
-    found, touch = one.placed("").map, case.surfaces.first_touch
-    (x, y), height = (found.x + one.offset[0], found.y + one.offset[1]), -found.gap  # type: ignore[operator]
+    """Draw the heights of a map where it is measured or repeats; points without one are gray, or marked."""
+    found, touch = one.placed("").map, case.surfaces.first_touch[:2]
+    (x, y), gap = (found.x + one.offset[0], found.y + one.offset[1]), found.gap  # type: ignore[operator]
     u, v, z, _ = one.points
     row, col = np.nonzero(np.isnan(z) & (one.holes == "fill"))
     filled = u[row] + one.offset[0], v[col] + one.offset[1]  # type: ignore[operator]
-    shown = height if one.upwards else -height
+    if case.period:
+        x, y = _sides(case)
+        gap = one.height(*np.meshgrid(x, y, indexing="ij"))
+        filled, touch = (
+            tuple(at[0] + np.mod(p - at[0], np.ptp(at)) for p, at in zip(point, (x, y), strict=True))
+            for point in (filled, touch)
+        )
+    shown = -gap if one.upwards else gap
     _colored(axes, x, y, shown, "height" if one.upwards else "gap", case, touch, filled)
+
+
+def _sides(case: Any) -> tuple[Array, ...]:
+    """Return points (m) along x and along y over the rectangle about the window."""
+    return tuple(np.linspace(at.min(), at.max(), _POINTS) for at in case.lattice.outline.T)
 
 
 def _gap(axes: Axes, case: Any) -> None:
     """Draw the gap over the rectangle about the window."""
-    u, v = case.lattice.outline.T
-    x, y = (np.linspace(at.min(), at.max(), _POINTS) for at in (u, v))
+    x, y = _sides(case)
     # of rough surfaces, that over the period of the window
     gap = case.plane_gap.at(*np.meshgrid(x, y, indexing="ij"))
     col, row = np.unravel_index(np.nanargmin(gap), gap.shape)
@@ -101,11 +112,15 @@ def _colored(
 def _line(axes: Axes, one: Measured, case: Any) -> None:
     """Draw a profile across its direction, with the width of the window."""
     placed = one.placed("")
-    y, height = placed.map.y, -placed.map.gap[0] if one.upwards else placed.map.gap[0]
+    _, across = placed.own(*case.lattice.outline.T)
+    y, gap = placed.map.y, placed.map.gap[0]
+    if case.period:
+        y = np.linspace(across.min(), across.max(), _POINTS)
+        gap = one.height(*placed.in_plane(0.0 * y, y))
+    height = -gap if one.upwards else gap
     scale, length = scaled(float(np.ptp(y)), "m")
     times, unit = scaled(float(np.ptp(height[np.isfinite(height)])), "m")
     axes.plot(scale * y, times * height)
-    _, across = placed.own(*case.lattice.outline.T)
     for end in (across.min(), across.max()):
         axes.axvline(scale * end, color=EXACT, lw=0.8, ls="--")
     words = "height" if one.upwards else "gap"

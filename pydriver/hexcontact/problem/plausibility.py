@@ -23,6 +23,7 @@ from ..core.measures import (
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
+from ..deck.surfaces import Cone, Power
 from ..text import counted, listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -226,8 +227,12 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "max_pressure": known.max_pressure,
         "slope": max(known.slope, *known.body_slopes, 0.0),
         "gap_slope": known.slope,
+        "is_full": known.is_full,
         "spacings": known.spacings(case.lattice),
     }
+    if not known.is_full:
+        breadth = known.breadth / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
+        found["spacings"] = min(found["spacings"], breadth)
     if math.isfinite(known.max_pressure):
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
@@ -321,7 +326,11 @@ def _words(case: Problem, found: dict[str, Any]) -> dict[str, str]:
         else "",
         **{name: quantity(found[name], "m", 2) for name in ("end_cell", "end_needed") if name in found},
         "spacing_words": _in_spacings(found.get("spacings", 0.0)),
-        "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
+        "radius_words": "half-width of the parts of the contact"
+        if not found.get("is_full", True)
+        else "smaller half-axis of the contact"
+        if _half_axes(found)
+        else "contact radius",
         "growing_words": "one step" if steps == "1" else f"{steps} even steps",
         "step_percent": percent(found.get("step_error", 0.0)),
         "turning_percent": percent(found.get("turning_error", 0.0)),
@@ -342,12 +351,16 @@ def row(case: Problem) -> str:
     if "pressure_ratio" in found:
         pressures = f"about {quantity(found['max_pressure'], 'Pa', 3)}, {found['pressure_ratio']:.2g} E*"
     spacings = _in_spacings(found["spacings"])
-    size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {spacings}"
+    along, across = (quantity(length, "m", 3) for length in found["extent"])
+    extent = f"; extent about {along} in x, {across} in y"
+    size = f"radius about {quantity(found['contact_radius'], 'm', 3)}"
     if axes:
-        major, minor = (quantity(axis, "m", 3) for axis in axes)
-        along, across = (quantity(length, "m", 3) for length in found["extent"])
-        size = f"half-axes about {major} by {minor}, {spacings} in the smaller one; "
-        size += f"extent about {along} in x, {across} in y"
+        size = "half-axes about " + " by ".join(quantity(axis, "m", 3) for axis in axes)
+        spacings += " in the smaller one" + extent
+    elif not found["is_full"]:
+        size += " of the circle of the same area"
+        spacings = f"about {spacings} in the half-width of its parts{extent}"
+    size = f"{size}, {spacings}"
     return (
         f"{size}; p_max {pressures}; slope at the edge {found['slope']:.2g}"
         f"{_steepest(case, found)['gap_words']}"
@@ -355,8 +368,8 @@ def row(case: Problem) -> str:
 
 
 def notes(case: Problem) -> dict[str, str]:
-    """Return notes by their subjects: limits that are not judged, rounded distances, equal seeds."""
-    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
+    """Return notes by their subjects: limits that are not judged, rounded distances, tips, equal seeds."""
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case), "tips": sharp_tips(case)}
     if case.surfaces.curvature is None:
         found["seeds"] = equal_seeds(case)
     return {about: note for about, note in found.items() if note}
@@ -391,6 +404,14 @@ def rounded_distances(case: Problem) -> str:
                 f"{counted(len(rolled), 'spacing')} of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
+
+
+def sharp_tips(case: Problem) -> str:
+    """Return a note on tips at which the pressure is unbounded; empty without one, or with an interface."""
+    shapes = () if case.gap_given or case.deck.interface else case.shapes
+    if not any(isinstance(one, Cone) or (isinstance(one, Power) and one.exponent <= 1) for one in shapes):
+        return ""
+    return "the pressure is unbounded at a sharp tip: there its largest value grows as the spacing shrinks"
 
 
 def equal_seeds(case: Problem) -> str:

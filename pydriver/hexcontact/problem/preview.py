@@ -397,6 +397,7 @@ def work(case: Problem) -> str:
     count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
     durations = " to ".join(dict.fromkeys(_duration(time) for time in times if time))
     words = f"about {count} operator applications, about {durations} on one core"
+    words += "; stress below the surface not counted" * bool(below)
     if case.adaptive:
         words += "; adaptive load steps: uncertain by a factor of 3"
     if wear := case.deck.wear:

@@ -444,6 +444,8 @@ class Problem:
             if not (self._gap.given or grid.center):
                 key = (self.surfaces.key_of("2" if self.surfaces.surface_1.shape == "flat" else "1"),)
                 sentence = f"{error}{soft}; expected a shape of finite heights that bounds the contact"
+                if any(part.wave for part in self.shapes):
+                    sentence += ', or a window that repeats, grid.boundary = "periodic"'
             raise deck_error([Mistake(key, MISSING, sentence)], source) from None
         # by force, and by approach
         self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())

@@ -31,6 +31,7 @@ GapFunction = Callable[[Array, Array], Array]
 
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 _RIGHT = 1e-6  # rounding of a right angle
+_FULL = 0.8  # share of its ellipse from which a contact counts as full
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
@@ -60,10 +61,16 @@ class Estimate(NamedTuple):
     body_slopes: tuple[float, ...] = ()
     half_length: float = 0.0  # larger semi-axis (m) of that ellipse
     angle: float = 0.0  # its direction from x (rad)
+    breadth: float = math.inf  # twice the area over the length of its edge (m): the radius of equal discs
 
     def along(self, direction: float) -> float:
         """Return the semi-axis (m) of the ellipse nearer to a direction (rad)."""
         return self.half_length if abs(math.cos(self.angle - direction)) > math.sqrt(0.5) else self.half_width
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it fills its ellipse, as no ring and no spots do."""
+        return self.radius**2 > _FULL * self.half_length * self.half_width
 
     def spacings(self, lattice: Lattice) -> float:
         """Return the spacings in the semi-axis of the ellipse that has the fewest."""
@@ -159,7 +166,24 @@ def estimate_contact(
         body_slopes=tuple(body_slopes),
         half_length=half_length,
         angle=0.5 * math.atan2(2 * xy, xx - yy),
+        breadth=_breadth(pressure > 0, lattice),
     )
+
+
+def _breadth(contact: Mask, lattice: Lattice) -> float:
+    """Return twice the area of a contact over the length of its edge (m).
+
+    Pairs of nodes on both sides of it along a direction give its length as seen from there, and the mean of
+    three directions that of a curve of all directions.
+    """
+    inside, (first, second) = np.pad(contact, 1), lattice.basis
+    pairs = (
+        (first, inside[:, 1:] ^ inside[:, :-1]),
+        (second, inside[1:] ^ inside[:-1]),
+        (second - first, inside[1:, :-1] ^ inside[:-1, 1:]),
+    )
+    seen = sum(lattice.cell_area / np.linalg.norm(step) * np.count_nonzero(ends) for step, ends in pairs) / 3
+    return 4 / math.pi * lattice.cell_area * np.count_nonzero(contact) / float(seen)
 
 
 def starting_half_size(

@@ -45,6 +45,7 @@ _NOTICED = 1e-6  # share of the normal load or approach from which tangential on
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 _ELLIPTIC = 0.005  # share by which the area of a contact may differ from that of the ellipse with its moments
+_BEYOND_CIRCLE = 1.1  # extent of a contact over the diameter of a circle from which it is another figure
 _WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
 _UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
@@ -86,14 +87,23 @@ def worth_showing(histories: Iterable[History]) -> list[str]:
 
 def load_or_motion(name: str, history: History) -> str:
     """Write one of `LOADS_AND_MOTIONS`; noise is written as zero."""
-    value = float(history[name])
-    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].unit)
+    return quantity(_above_noise(float(history[name]), name, history), VARIABLES[name].unit)
+
+
+def _above_noise(value: float, name: str, history: History) -> float:
+    """Return a value of a step, 0 for noise."""
+    return 0.0 if abs(value) < _NOISE * _scale(name, history) else value
 
 
 def fitted(name: str, history: History) -> float:
     """Return an area or radius to the edge between the nodes; without a fit, that of the nodes."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
+
+
+def _measured(name: str, history: History) -> str:
+    """Write a measure of a step; noise is written as zero."""
+    return quantity(_above_noise(fitted(name, history), name, history), VARIABLES[name].units)
 
 
 def contact_size(history: History) -> tuple[str, str]:
@@ -141,11 +151,19 @@ def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]
 
 
 def _moments(history: History, extent: Extent | None) -> str:
-    """Name the ellipse of equal moments if the contact is not elliptic, and the extent of the contact."""
+    """Name the ellipse or circle if the contact is another figure, and the extent of the contact."""
     axes, area = half_axes(history), fitted("contact_area", history)
-    if axes is None or repeats(history) or abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+    if repeats(history):
         return ""
-    words = " of the ellipse with the same moments"
+    if axes is None:
+        diameter = 2.0 * fitted("contact_radius", history)
+        if extent is None or max(extent) < _BEYOND_CIRCLE * diameter:
+            return ""
+        words = " of the circle of the same area"
+    elif abs(area / (math.pi * axes[0] * axes[1]) - 1.0) < _ELLIPTIC:
+        return ""
+    else:
+        words = " of the ellipse with the same moments"
     if extent is None:
         return words
     along, across = (quantity(length, "m", 3) for length in extent)
@@ -245,7 +263,7 @@ def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
     rows += [
         (name_of_size, size + _moments(history, extent))
         if name == "contact_radius"
-        else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
+        else (spelled(name), _measured(name, history) + error_of(name, history))
         for name in summary
         if name in history
         and not (name == "dissipated_energy" and rolls(history) and not history[name])

@@ -16,7 +16,7 @@ from ..core import ranks
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
 from ..core.friction import ContactState, FrictionalContact, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import is_unbounded, measures
+from ..core.measures import measures, unbounded
 from ..core.shared import (
     FrictionPart,
     Layout,
@@ -241,23 +241,23 @@ class Window:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
-        measured, unbounded = self._measures(solution)
+        measured, ends = self._measures(solution)
         found = given | measured
-        if not self.case.deck.interface and unbounded:
-            found["max_pressure"] = math.inf
+        if not self.case.deck.interface:
+            found |= dict.fromkeys(ends, math.inf)
         if self.case.period:
             found["mean_pressure"] = solution.normal_load / self.case.period.area
         else:
             del found["contact_area_error"], found["mean_gap"]  # refinement has its own error
         return found
 
-    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
-        """Return the measures of a state, and whether the pressure rises to an end of the surface."""
+    def _measures(self, solution: Any) -> tuple[dict[str, float], list[str]]:
+        """Return the measures of a state, and the names of those that rise to an end of the surface."""
         found = measures(self.contact, solution)
         if self.candidate.all() and not self.case.rollers:
-            return found, False
+            return found, []
         share = self.case.plane_gap.share(self.candidate, self.lattice)
-        return found, bool(is_unbounded(share, solution.pressure))
+        return found, unbounded(share, solution)
 
 
 class SharedWindow(Window):
@@ -292,8 +292,8 @@ class SharedWindow(Window):
         larger: Lattice = self.contact.grown(solution)
         return larger
 
-    def _measures(self, solution: Any) -> tuple[dict[str, float], bool]:
-        found: tuple[dict[str, float], bool] = self.contact.measured(solution)
+    def _measures(self, solution: Any) -> tuple[dict[str, float], list[str]]:
+        found: tuple[dict[str, float], list[str]] = self.contact.measured(solution)
         return found
 
     def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:

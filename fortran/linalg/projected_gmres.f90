@@ -81,15 +81,12 @@ contains
     !> Norms of the columns, with the weights of the residual
     real(wp) :: along(size(constraints%multiplier))
     integer :: directions
-    !> More directions than products may be stored of
-    logical :: many
     type(field_space_t) :: space
 
     space = nodes%space
     iteration%made = 0
     iteration%residual = huge(1.0_wp)
     iteration%drift = 0.0_wp
-    iteration%rounding = 0.0_wp
     iteration%outcome = solution_broke_off
     call constraints%invert(space, inverse, iteration%independent)
     if (.not. iteration%independent) return
@@ -138,6 +135,7 @@ contains
       length = sqrt(space%dot(w, w))
       iteration%residual = length
       iteration%drift = epsilon(1.0_wp)*length
+      iteration%rounding = 0.0_wp
       if (length <= 0.0_wp) iteration%outcome = solution_accurate
     end subroutine begin
 
@@ -149,7 +147,6 @@ contains
       integer :: i, k
 
       directions = 0
-      many = .false.
       began = length
       w = w/length
       call keep(1)
@@ -162,7 +159,7 @@ contains
         call system%product_packed(nodes, w, image, error)
         if (allocated(error)) return
         call nodes%pack(image, w)
-        if (.not. many) call others%pack(image, basis(k)%beyond)
+        if (allocated(basis(k)%beyond)) call others%pack(image, basis(k)%beyond)
         call constraints%add_columns(space, -share(:, k), w, image(:size(w)))
         call weigh(iteration%weight, w)
         do i = 1, k
@@ -206,7 +203,7 @@ contains
       associate (double => merge(0, nodes%n_active, iteration%single), single => merge(nodes%n_active, 0, iteration%single))
         allocate (basis(k)%rounded_mr(single), basis(k)%mr(double), basis(k + 1)%rounded(single), basis(k + 1)%v(double), stat=stat)
       end associate
-      if (stat == 0 .and. .not. many) allocate (basis(k)%beyond(others%n_active), stat=stat)
+      if (stat == 0 .and. k <= iteration%most_products) allocate (basis(k)%beyond(others%n_active), stat=stat)
       if (stat == 0) call system%take_image(size(ax), own, image, stat)
       call agree(stat)
     end subroutine take_memory
@@ -256,8 +253,7 @@ contains
       real(wp), allocatable :: r(:)
       integer :: i, stat
 
-      many = k > iteration%most_products
-      do i = 2, merge(k - 1, 0, many)
+      do i = 2, merge(k - 1, 0, k > iteration%most_products)
         if (allocated(basis(i)%beyond)) deallocate (basis(i)%beyond)
       end do
       ! after a restart the same memory serves again
@@ -289,8 +285,10 @@ contains
     !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
     subroutine take_step()
       real(wp) :: factor, largest
+      logical :: many
       integer :: i
 
+      many = .not. allocated(basis(max(directions, 1))%beyond)
       do i = directions, 1, -1
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do

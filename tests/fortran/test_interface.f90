@@ -280,10 +280,11 @@ contains
     type(contact_state_t) :: state
     type(lattice_t) :: lattice
     real(wp), allocatable :: gap(:, :)
-    integer, parameter :: nodes(2, 2) = reshape([40, 80, 8, 12], [2, 2])
-    real(wp), parameter :: given(4, 2) = reshape([ &
+    integer, parameter :: nodes(2, 3) = reshape([40, 80, 8, 12, 16, 25], [2, 3])
+    real(wp), parameter :: given(4, 3) = reshape([ &
       2.0_wp/pi, 1.5_wp, 4.0_wp/3.0_wp, 1.65_wp, &
-      10.0_wp, 2.5_wp, 4.0_wp/3.0_wp, 5.0_wp], [4, 2])      ! slight_change: 2.8, without 8.3
+      10.0_wp, 2.5_wp, 4.0_wp/3.0_wp, 5.0_wp, &      ! slight_change: 2.8, without 8.3
+      3.0_wp, 4.0_wp, 0.03_wp, 5.0_wp], [4, 3])      ! most_linearized: 2.4; linearised in each iteration it fails
     integer :: i
 
     do i = 1, size(given, 2)

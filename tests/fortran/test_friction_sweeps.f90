@@ -301,7 +301,7 @@ contains
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: state, next
     real(wp), parameter :: press(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], none(4) = 0.0_wp
-    type(hard_t) :: hard(3)
+    type(hard_t) :: hard(4)
     integer :: i, k
 
     ! max_areas_uncoupled: 8.0 in 1 sweep; with 1: 13.3 in 8
@@ -312,6 +312,8 @@ contains
     ! fixed_share: 43.3 in 11 sweeps; with 0.1: 63.0 in 16; fails if one node is fixed
     hard(3) = hard_t(12, 0.17_wp, 0.0_wp, 0.1_wp, 0.0_wp, 0.0_wp, 1.0e-8_wp, 55.0_wp, &
                      reshape([press, 1.0_wp, 0.8_wp, 0.0_wp, 0.15_wp, 0.5_wp, -0.07_wp, 0.0_wp, -0.07_wp], [4, 3]))
+    ! staggered_sweeps: 33.0 in 13 sweeps; fails without coupled ones
+    hard(4) = hard_t(10, 0.16_wp, -0.02_wp, 1.0_wp, 0.025_wp, 11.0_wp, 1.0e-8_wp, 50.0_wp, reshape([press, none, none], [4, 3]))
     do i = 1, size(hard)
       associate (given => hard(i))
         call new_sphere(contact, given%n, given%gamma, given%beta, coulomb_t(given%mu), error, n_threads=1)

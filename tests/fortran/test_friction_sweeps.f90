@@ -300,8 +300,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: state, next
-    real(wp), parameter :: press(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], none(4) = 0.0_wp
-    type(hard_t) :: hard(4)
+    real(wp), parameter :: press(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], none(4) = 0.0_wp, pull(4) = [1.0_wp, 0.5_wp, 0.0_wp, 0.0_wp]
+    type(hard_t) :: hard(5)
     integer :: i, k
 
     ! max_areas_uncoupled: 8.0 in 1 sweep; with 1: 13.3 in 8
@@ -314,6 +314,8 @@ contains
                      reshape([press, 1.0_wp, 0.8_wp, 0.0_wp, 0.15_wp, 0.5_wp, -0.07_wp, 0.0_wp, -0.07_wp], [4, 3]))
     ! staggered_sweeps: 33.0 in 13 sweeps; fails without coupled ones
     hard(4) = hard_t(10, 0.16_wp, -0.02_wp, 1.0_wp, 0.025_wp, 11.0_wp, 1.0e-8_wp, 50.0_wp, reshape([press, none, none], [4, 3]))
+    ! soft_spring: 10.4 in 2 sweeps; with 0: 18.3 in 4
+    hard(5) = hard_t(42, 0.4_wp, 0.15_wp, 0.4_wp, 0.0_wp, 0.0_wp, 1.0e-8_wp, 14.0_wp, reshape([press, pull, pull], [4, 3]))
     do i = 1, size(hard)
       associate (given => hard(i))
         call new_sphere(contact, given%n, given%gamma, given%beta, coulomb_t(given%mu), error, n_threads=1)

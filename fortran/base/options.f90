@@ -68,9 +68,6 @@ module hc_options
     !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
     !> edge; a tolerance that suits a start interpolated from the coarser lattice
     real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
-    !> Residual below which a compliant interface is linearised with the stiffness of a node, times this share, for r': the errors
-    !> that are left sit in a few nodes along the edge
-    real(wp) :: close_residual = 0.3_wp, local_share = 0.3_wp
     !> Share of the residual below which nodes that should enter or leave a compliant interface wait, where projected steps stall
     real(wp) :: slight_change = 0.1_wp
     !> Iterations in which the springs of a compliant layer are linearised again; beyond them (exponents of 3 and more, rough

@@ -381,17 +381,13 @@ contains
     integer, intent(in) :: sweeps
     !> The next direction is not conjugate to the last one
     logical, intent(inout) :: anew
-    real(wp) :: r
     logical :: settled
 
     associate (options => level%options%normal)
       settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
       anew = anew .or. settled
       if (changed .or. settled .or. sweeps <= options%most_linearized) then
-        r = level%normal_classification_parameter(now%n_active)
-        ! close to the solution errors remain at a few nodes along the edge
-        if (now%residual < options%close_residual) r = max(r, options%local_share/level%normal_compliance)
-        call linearize_law(level, now, r)
+        call linearize_law(level, now, level%normal_classification_parameter(now%n_active))
       end if
     end associate
     if (now%by_load) call find_approach(level, now)

@@ -29,6 +29,17 @@ module test_friction_sweeps
   !> Loads of a contact of radius one
   real(wp), parameter :: load = 4.0_wp/3.0_wp
 
+  !> Load steps of a sphere that fail, or take many more products, without one of the options.
+  type :: hard_t
+    !> Nodes on each side of the apex; elastic constants; coefficient of friction; height and wave number of waves on the gap
+    integer :: n
+    real(wp) :: gamma, beta, mu, height, wave
+    !> Tolerance, and the most applications of the last step
+    real(wp) :: tolerance, most
+    !> Normal load, shares of mu P along x and y, and share of the torque mu P of each step
+    real(wp) :: share(4, 3)
+  end type hard_t
+
 contains
 
   subroutine collect_friction_sweeps(tests)
@@ -42,6 +53,7 @@ contains
       new_test('start', test_start), &
       new_test('fronts', test_fronts), &
       new_test('fronts_at_the_rim', test_rim), &
+      new_test('hard_steps', test_hard_steps), &
       new_test('load_factor', test_load_factor), &
       new_test('load_factor_of_shifts', test_load_factor_of_shifts) &
     ]
@@ -282,6 +294,52 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_rim
+
+  !> Each option is needed by one of the steps; beside it stands the work with and without.
+  subroutine test_hard_steps(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, next
+    real(wp), parameter :: press(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], none(4) = 0.0_wp, pull(4) = [1.0_wp, 0.5_wp, 0.0_wp, 0.0_wp]
+    type(hard_t) :: hard(5)
+    integer :: i, k
+
+    ! max_areas_uncoupled: 8.0 in 1 sweep; with 1: 13.3 in 8
+    hard(1) = hard_t(10, 0.4_wp, 0.0_wp, 0.3_wp, 0.0_wp, 0.0_wp, 1.0e-5_wp, 10.0_wp, reshape([press, none, none], [4, 3]))
+    ! sweeps_per_cut: 17.4 in 4 sweeps, without cuts 50.6 in 13
+    hard(2) = hard_t(20, 0.22_wp, 0.0_wp, 0.12_wp, 0.0_wp, 0.0_wp, 1.0e-5_wp, 30.0_wp, &
+                     reshape([press, 1.0_wp, 0.5_wp, 0.77_wp, 0.13_wp, 1.0_wp, 0.6_wp, 0.0_wp, 0.0_wp], [4, 3]))
+    ! fixed_share: 43.3 in 11 sweeps; with 0.1: 63.0 in 16; fails if one node is fixed
+    hard(3) = hard_t(12, 0.17_wp, 0.0_wp, 0.1_wp, 0.0_wp, 0.0_wp, 1.0e-8_wp, 55.0_wp, &
+                     reshape([press, 1.0_wp, 0.8_wp, 0.0_wp, 0.15_wp, 0.5_wp, -0.07_wp, 0.0_wp, -0.07_wp], [4, 3]))
+    ! staggered_sweeps: 33.0 in 13 sweeps; fails without coupled ones
+    hard(4) = hard_t(10, 0.16_wp, -0.02_wp, 1.0_wp, 0.025_wp, 11.0_wp, 1.0e-8_wp, 50.0_wp, reshape([press, none, none], [4, 3]))
+    ! soft_spring: 10.4 in 2 sweeps; with 0: 18.3 in 4
+    hard(5) = hard_t(42, 0.4_wp, 0.15_wp, 0.4_wp, 0.0_wp, 0.0_wp, 1.0e-8_wp, 14.0_wp, reshape([press, pull, pull], [4, 3]))
+    do i = 1, size(hard)
+      associate (given => hard(i))
+        call new_sphere(contact, given%n, given%gamma, given%beta, coulomb_t(given%mu), error, n_threads=1)
+        if (allocated(error)) return
+        associate (x => coordinate(contact%problem%lattice, 1), y => coordinate(contact%problem%lattice, 2))
+          call contact%set_gap(0.5_wp*(x**2 + y**2) + given%height*(cos(given%wave*x) + cos(given%wave*y)))
+        end associate
+        call new_friction_state(next, contact%problem%lattice)
+        do k = 1, count(given%share(1, :) > 0.0_wp)
+          state = next
+          ! the twist is free where there is a torque
+          call contact%solve_step(state, state%relative_displacement, &
+                                  load_target_t([f, f, f, merge(f, d, abs(given%share(4, k)) > 0.0_wp)], &
+                                                load*given%share(:, k)*[1.0_wp, given%mu, given%mu, given%mu]), &
+                                  given%tolerance, 40, next, error)
+          if (allocated(error)) return
+          call check_true(error, next%converged, 'converged')
+          if (allocated(error)) return
+        end do
+        call check_true(error, next%operator_applications < given%most, 'few products')
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine test_hard_steps
 
   !> Shift and torque on Hertz' pressure: too much by a thousandth, and not quite.
   !>

@@ -282,7 +282,7 @@ def test_loads_that_are_not_those_of_the_fields_are_refused(
 def test_every_bound_of_the_table_is_looked_at() -> None:
     lattice = replace(WINDOW, spacing=0.1)
     window = lattice.size * lattice.cell_area
-    known = {"normal_load": 1.0, "contact_radius": 0.5, "contact_area": 0.5}
+    known = {"normal_load": 1.0, "approach": 1.0, "contact_radius": 0.5, "contact_area": 0.5}
     quantities = {**known, "window": window}
 
     def fault(name: str, value: float) -> str:

@@ -227,12 +227,12 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "max_pressure": known.max_pressure,
         "slope": max(known.slope, *known.body_slopes, 0.0),
         "gap_slope": known.slope,
-        "is_full": known.is_full,
-        "spacings": known.spacings(case.lattice),
+        "is_full": math.isinf(known.breadth),
+        "spacings": min(
+            known.spacings(case.lattice),
+            known.breadth / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio)),
+        ),
     }
-    if not known.is_full:
-        breadth = known.breadth / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
-        found["spacings"] = min(found["spacings"], breadth)
     if math.isfinite(known.max_pressure):
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
@@ -369,9 +369,9 @@ def row(case: Problem) -> str:
 
 def notes(case: Problem) -> dict[str, str]:
     """Return notes by their subjects: limits that are not judged, rounded distances, tips, equal seeds."""
-    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case), "tips": sharp_tips(case)}
+    found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
     if case.surfaces.curvature is None:
-        found["seeds"] = equal_seeds(case)
+        found |= {"tips": sharp_tips(case), "seeds": equal_seeds(case)}
     return {about: note for about, note in found.items() if note}
 
 

@@ -31,7 +31,7 @@ GapFunction = Callable[[Array, Array], Array]
 
 GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 _RIGHT = 1e-6  # rounding of a right angle
-_FULL = 0.8  # share of its ellipse from which a contact counts as full
+_FULL = 0.8  # share of its ellipse from which a contact is neither a ring nor spots
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
@@ -61,16 +61,13 @@ class Estimate(NamedTuple):
     body_slopes: tuple[float, ...] = ()
     half_length: float = 0.0  # larger semi-axis (m) of that ellipse
     angle: float = 0.0  # its direction from x (rad)
-    breadth: float = math.inf  # twice the area over the length of its edge (m): the radius of equal discs
+    breadth: float = (
+        math.inf
+    )  # of a ring or of spots: twice the area over the length of the edge (m)
 
     def along(self, direction: float) -> float:
         """Return the semi-axis (m) of the ellipse nearer to a direction (rad)."""
         return self.half_length if abs(math.cos(self.angle - direction)) > math.sqrt(0.5) else self.half_width
-
-    @property
-    def is_full(self) -> bool:
-        """Whether it fills its ellipse, as no ring and no spots do."""
-        return self.radius**2 > _FULL * self.half_length * self.half_width
 
     def spacings(self, lattice: Lattice) -> float:
         """Return the spacings in the semi-axis of the ellipse that has the fewest."""
@@ -154,8 +151,10 @@ def estimate_contact(
     # the principal second moments, with the inertia of a cell itself
     mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12
     half_width, half_length = (2 * math.sqrt(max(mean + sign * apart + cell, 0.0)) for sign in (-1, 1))
+    radius = math.sqrt(lattice.cell_area * search.n_contact / math.pi)
+    is_full = radius**2 > _FULL * half_length * half_width
     return Estimate(
-        radius=math.sqrt(lattice.cell_area * search.n_contact / math.pi),
+        radius=radius,
         half_width=half_width,
         lower=np.array([search.lower_1, search.lower_2]),
         upper=np.array([search.upper_1, search.upper_2]),
@@ -166,7 +165,7 @@ def estimate_contact(
         body_slopes=tuple(body_slopes),
         half_length=half_length,
         angle=0.5 * math.atan2(2 * xy, xx - yy),
-        breadth=_breadth(pressure > 0, lattice),
+        breadth=math.inf if is_full else _breadth(pressure > 0, lattice),
     )
 
 

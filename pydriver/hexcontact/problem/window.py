@@ -61,9 +61,7 @@ class Estimate(NamedTuple):
     body_slopes: tuple[float, ...] = ()
     half_length: float = 0.0  # larger semi-axis (m) of that ellipse
     angle: float = 0.0  # its direction from x (rad)
-    breadth: float = (
-        math.inf
-    )  # of a ring or of spots: twice the area over the length of the edge (m)
+    breadth: float = math.inf  # of a ring or of spots: twice the area over the length of the edge (m)
 
     def along(self, direction: float) -> float:
         """Return the semi-axis (m) of the ellipse nearer to a direction (rad)."""

@@ -14,7 +14,7 @@
 !> Bounds are in lattice coordinates, lengths along the two basis vectors, since windows are parallelograms.
 module hc_contact_search
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_rint
-  use hc_precision, only: wp
+  use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
@@ -65,6 +65,8 @@ module hc_contact_search
     real(wp) :: lower(2) = 0.0_wp, upper(2) = 0.0_wp, size(2) = 0.0_wp
     !> Second moments xx, yy, xy of its nodes about their centroid [m^2]
     real(wp) :: moment(3) = 0.0_wp
+    !> Twice the area of the contact over the length of its edge, the radius of equal discs [m]
+    real(wp) :: breadth = 0.0_wp
   contains
     procedure :: begin, judge
     procedure, private :: put_around, refine, measure, half_width
@@ -187,7 +189,28 @@ contains
     right = right - sum_of(right)/n
     up = up - sum_of(up)/n
     self%moment = [sum_of(right*right), sum_of(up*up), sum_of(right*up)]/n
+    self%breadth = breadth_of(lattice, contact)
   end subroutine measure
+
+  !> Return twice the area of a contact over the length of its edge [m].
+  !>
+  !> Pairs of nodes on both sides of it along a direction give its length as seen from there, and the mean of three directions
+  !> that of a curve of all directions.
+  pure real(wp) function breadth_of(lattice, contact)
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes in contact (n_col, n_row)
+    logical, intent(in) :: contact(:, :)
+    logical :: inside(0:size(contact, 1) + 1, 0:size(contact, 2) + 1)
+    real(wp) :: seen
+
+    inside = .false.
+    inside(1:size(contact, 1), 1:size(contact, 2)) = contact
+    associate (n => size(contact, 1), m => size(contact, 2), first => lattice%basis(:, 1), second => lattice%basis(:, 2))
+      seen = count(inside(1:, :) .neqv. inside(:n, :))/norm2(first) + count(inside(:, 1:) .neqv. inside(:, :m))/norm2(second) &
+             + count(inside(:n, 1:) .neqv. inside(1:, :m))/norm2(second - first)
+    end associate
+    breadth_of = 12.0_wp/pi*count(contact)/seen
+  end function breadth_of
 
   !> Return the smaller semi-axis of the ellipse with the second moments of the nodes, and with the inertia of a cell itself [m].
   pure real(wp) function half_width(self, cell_area)

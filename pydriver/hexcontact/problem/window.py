@@ -163,24 +163,8 @@ def estimate_contact(
         body_slopes=tuple(body_slopes),
         half_length=half_length,
         angle=0.5 * math.atan2(2 * xy, xx - yy),
-        breadth=math.inf if is_full else _breadth(pressure > 0, lattice),
+        breadth=math.inf if is_full else search.breadth,
     )
-
-
-def _breadth(contact: Mask, lattice: Lattice) -> float:
-    """Return twice the area of a contact over the length of its edge (m).
-
-    Pairs of nodes on both sides of it along a direction give its length as seen from there, and the mean of
-    three directions that of a curve of all directions.
-    """
-    inside, (first, second) = np.pad(contact, 1), lattice.basis
-    pairs = (
-        (first, inside[:, 1:] ^ inside[:, :-1]),
-        (second, inside[1:] ^ inside[:-1]),
-        (second - first, inside[1:, :-1] ^ inside[:-1, 1:]),
-    )
-    seen = sum(lattice.cell_area / np.linalg.norm(step) * np.count_nonzero(ends) for step, ends in pairs) / 3
-    return 4 / math.pi * lattice.cell_area * np.count_nonzero(contact) / float(seen)
 
 
 def starting_half_size(

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import wait_for
+from commands import DECK, ENVIRONMENT, wait_for
 from numpy.testing import assert_array_equal
 
 import hexcontact
@@ -92,6 +92,31 @@ def test_cases_in_threads_have_the_answers_of_cases_in_turn(tmp_path: Path) -> N
             for name, result in found:
                 assert_same(result, serial[name])
             assert [name for name, _ in found] in ([*cases], [*cases][::-1])
+
+
+def test_long_rows_have_the_same_answer_in_any_number_of_threads(tmp_path: Path) -> None:
+    deck = DECK.replace("nodes_in_radius = 4", 'spacing = "1 um"\nwindow = [7, 9400]')
+    deck = deck.replace('"20 N"\nsteps = 2', '"1e-4 N"').replace("= 0.2", "= 0.1").replace("432", "72") + (
+        '[[load]]\ntangential_load_x = "6e-6 N"\n[solver]\ntolerance = 1e-12\n'
+    )
+    (tmp_path / "sphere.toml").write_text(deck)
+    for threads in ("1", "2"):
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "hexcontact",
+                "run",
+                "sphere.toml",
+                "--quiet",
+                "--output",
+                f"{threads}.nc",
+            ],
+            cwd=tmp_path,
+            env=ENVIRONMENT | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads},
+            check=True,
+        )
+    assert_same(open_result(tmp_path / "1.nc"), open_result(tmp_path / "2.nc"))
 
 
 def test_files_in_threads_and_xarray_in_another(tmp_path: Path) -> None:

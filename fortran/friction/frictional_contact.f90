@@ -145,7 +145,7 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, in single precision, and of marks
     integer, parameter :: field = 8, half = 4, mark = 1
-    integer(long) :: n, everywhere, inside, last, n_shear, directions, products, found
+    integer(long) :: n, everywhere, inside, last, n_shear, directions, products, stored
     type(newton_options_t) :: options
 
     n = int(extent(1), long)*extent(2)
@@ -153,7 +153,7 @@ contains
     ! all that GMRES may store but one, since mostly a few are enough
     directions = options%max_directions - 1
     products = min(directions, int(options%max_products, long))
-    found = 0
+    stored = 0
     ! iterate without shear traction
     everywhere = 4*field + mark
     ! packed: frames and their compliances; traction estimates
@@ -164,7 +164,7 @@ contains
       ! packed, where half of the nodes stick: slope; unknowns and a residual; estimates of the constraints
       inside = inside + field + 5*2*field/2 + n_shear*2*half + half
       ! two vectors of each direction there and the products off the contact of all but one, or without products
-      found = max(n*3*(products - 1)*half + n_contact*5*products*half/2, n_contact*5*directions*half)
+      stored = max(n*3*(products - 1)*half + n_contact*5*products*half/2, n_contact*5*directions*half)
       ! the last direction, or before it another residual and a vector of the preconditioner of the shear traction
       last = max(3*half*n + 5*half/2*n_contact, int(5*field/2 + field, long)*n_contact)
     else
@@ -173,7 +173,7 @@ contains
       inside = inside + 2*(1 + 3)*field + field + 2*n_shear*(field + half)
       last = 0
     end if
-    friction_step_memory = n*everywhere + n_contact*inside + found + last
+    friction_step_memory = n*everywhere + n_contact*inside + stored + last
   end function friction_step_memory
 
   !> Compute the displacements of given tractions by the operator of the finest lattice.

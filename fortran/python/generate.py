@@ -188,7 +188,10 @@ class Procedure:
             name, kind = argument.name, self.kinds.get(argument.kind)
             turned = len(argument.shape) > 1 and name not in points
             lines += [kind["prepare"].format(name)] if kind and "prepare" in kind else []
-            value = f"np.asarray({name}).T" if turned else name
+            # a byte holds no count: marks of any kind become true or false first
+            marks = argument.kind == "flag" and bool(argument.shape)
+            value = f"np.asarray({name}{', bool' * marks})" if turned or marks else name
+            value += ".T" * turned
             passed.append(kind["python"].format(name) if kind else value)
         passed += filter(None, [self.counts])
         call = f"{'called' if self.fails else f'_flat.{self.name}'}({', '.join(passed)})"

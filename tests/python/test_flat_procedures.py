@@ -82,3 +82,9 @@ def test_fields_of_a_state_are_found_by_their_names() -> None:
     assert flat.numbers_of_state(held).twist == 0.25
     with pytest.raises(HexcontactError, match="the state has no field pressures"):
         held.view("pressures")
+
+
+def test_marks_are_true_or_false_whatever_their_numbers() -> None:
+    zone = np.zeros((6, 6), int)
+    zone[2:4, 2:4] = 256  # 0 in a byte
+    assert np.array_equal(flat.boundary(zone), zone > 0)

@@ -21,7 +21,7 @@ from ..errors import DeckError, NotInResult
 from ..text import counted
 from . import fields
 from .fields import Region, region
-from .stress import Fields, Loaded, NearSurface, add_bulk, embedded, summed, window_over
+from .stress import Fields, Loaded, add_bulk, correct_near_surface, embedded, summed, window_over
 
 COATED = "moduli and constants of fatigue parameters are those of one material"
 SLIPS = ("slip_increment_x", "slip_increment_y")
@@ -109,14 +109,10 @@ def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
 def histories(loaded: Loaded, where: Region) -> Iterator[tuple[slice, Array]]:
     """Yield stress histories (points, steps, 6) of a region by blocks, each with the slice of its points."""
     loads, used = loaded.tractions()
-    found = _of_tractions(loaded, loads, where)
-    if used == "nodes":
-        yield from found
-        return
-    near_surface = NearSurface(loaded, loads)
-    points = where.nodes.reshape(-1, 3)
-    for part, history in found:
-        near_surface.correct(np.swapaxes(history, 0, 1), points[part])
+    points = where.nodes.reshape(-1, 3) if used == "edges" else np.empty(0)
+    for part, history in _of_tractions(loaded, loads, where):
+        if used == "edges":
+            correct_near_surface(loaded, loads, np.swapaxes(history, 0, 1), points[part])
         yield part, history
 
 
@@ -253,23 +249,16 @@ def _about(key: str, criteria: Criteria, moduli: Mapping[str, float]) -> dict[st
     return attributes | constants | _moduli_of("smith_watson_topper" if key == "life" else key, moduli)
 
 
-def tabulated(where: Region, part: slice, history: Array, numbers: Sequence[int]) -> DataFrame:
-    """Return histories as a table that pyLife takes: stresses in MPa by point and load step.
+def tabulated(places: Array, first: int, history: Array, numbers: Sequence[int]) -> DataFrame:
+    """Return histories at some places as a table that pyLife takes: stresses in MPa by point and load step.
 
-    The columns S11 ... S23 are those that pyLife expects; 1, 2, 3 stand for x, y, z.
+    The columns S11 ... S23 are those that pyLife expects; 1, 2, 3 stand for x, y, z. Points count from
+    `first`.
     """
     import pandas
 
-    if where.lattice is None:
-        places = where.points.reshape(-1, 3)[part]
-    else:
-        node = np.arange(part.start, part.stop)
-        plane, node = np.divmod(node, where.lattice.size)
-        x, y = where.lattice.x.ravel()[node], where.lattice.y.ravel()[node]
-        places = np.stack([x, y, where.depths[plane]], axis=1)
-    index = pandas.MultiIndex.from_product(
-        [range(part.start + 1, part.stop + 1), list(numbers)], names=["node_id", "load_step"]
-    )
+    points = range(first, first + len(places))
+    index = pandas.MultiIndex.from_product([points, list(numbers)], names=["node_id", "load_step"])
     table = pandas.DataFrame(np.repeat(places, len(numbers), axis=0), index, ["x", "y", "depth"])
     table[["S11", "S22", "S33", "S12", "S23", "S13"]] = 1e-6 * history.reshape(-1, 6)
     return table

@@ -16,7 +16,7 @@ from ..deck.read import recorded
 from ..errors import DeckError
 from ..files import reading, remove_stale, replacing
 from ..text import counted, quantity
-from .stress import extremes_of, place_of
+from .stress import place_of
 
 STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
 
@@ -55,7 +55,16 @@ def content_of(path: Path) -> dict[str, Any]:
     """Return the content of a file of stresses or fatigue parameters as one object; nothing if it is none."""
     if (found := read_table(path)) is None:
         return {}
-    return {"file": path, **found.attrs, "quantities": extremes_of(found)}
+    quantities = {
+        str(name): {
+            "units": field.attrs.get("units", ""),
+            "range": [float(np.nanmin(field)), float(np.nanmax(field))],
+            **{key: value for key, value in field.attrs.items() if key.startswith(("least", "largest"))},
+        }
+        for name, field in found.data_vars.items()
+        if field.attrs.get("units") != "rad"
+    }
+    return {"file": path, **found.attrs, "quantities": quantities}
 
 
 def description(path: Path) -> list[str]:

@@ -98,26 +98,9 @@ def place_of(field: DataArray) -> str:
     return f"{word} {text} at x = {x}, y = {y}, depth {depth}" + (f", step {step}" if step else "")
 
 
-def extremes_of(found: Dataset) -> dict[str, dict[str, Any]]:
-    """Return the range of each quantity, and the place of the value that counts, for other programs."""
-    return {
-        str(name): {
-            "units": field.attrs.get("units", ""),
-            "range": [float(np.nanmin(field)), float(np.nanmax(field))],
-            **{key: value for key, value in field.attrs.items() if key.startswith(("least", "largest"))},
-        }
-        for name, field in found.data_vars.items()
-        if field.attrs.get("units") != "rad"
-    }
-
-
 Fields = Mapping[str, NDArray[Any]]
 Bodies = Sequence[Body]
-Surface = Callable[[int], TractionField]
-"""The tractions over the surface, to the edges, of the step of a place in a list."""
 
-LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
-"""Fields from which the stress below the surface is computed."""
 # fields of each step, as read and for the core; corrected ones, while others follow and in all
 _LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
 # fields as floats that are read for them, and bytes of each that the netCDF library keeps
@@ -155,7 +138,8 @@ class Loaded:
     bodies: Bodies
     body: int  # 1 or 2
     friction: float = 0.0
-    surface: Surface | None = None  # tractions to the edges, which the stress at depth 0 has exactly
+    # tractions to the edges by the place of a step, which the stress at depth 0 has exactly
+    surface: Callable[[int], TractionField] | None = None
 
     @property
     def layers(self) -> Array:
@@ -253,27 +237,22 @@ def below(
     else:
         moved = np.empty((0, 3))
         if any(name in _DISPLACEMENTS for name in names):
-            moved = _in_box(lattice, loads, body, layers, found, len(_DISPLACEMENTS))
-        stress = _in_box(lattice, loads, body, layers, found, len(TENSOR))
+            moved = _in_box(loaded, loads, found, len(_DISPLACEMENTS))
+        stress = _in_box(loaded, loads, found, len(TENSOR))
     add_bulk(stress, steps, loaded)
     about: dict[str, Any] = {"body": np.int32(body), "tractions": used}
     if used == "edges":
-        near_surface = NearSurface(loaded, loads)
         stress = np.ascontiguousarray(stress)
-        near_surface.correct(stress.reshape(len(steps), -1, len(TENSOR)), found.nodes.reshape(-1, 3))
-        about["edge_without_root"] = near_surface.refused
+        given = loaded, loads, stress.reshape(len(steps), -1, len(TENSOR)), found.nodes.reshape(-1, 3)
+        about["edge_without_root"] = correct_near_surface(*given)
     values = {name: stress[..., k] for k, name in enumerate(TENSOR)}
     if any(name in _INVARIANTS for name in names):
         scalars = fields.invariants(stress)
         values |= {name: scalars[..., k] for k, name in enumerate(_INVARIANTS)}
     values |= {name: moved[..., k] / layers[0, 1] for k, name in enumerate(_DISPLACEMENTS)}
-    one = numbers is None
-    dims = found.dims if one else ("step", *found.dims)
-    return xarray.Dataset(
-        {name: (dims, values[name][0] if one else values[name], STRESSES[name].attributes) for name in names},
-        coords=found.coordinates | ({} if numbers is None else {"step": ("step", list(numbers))}),
-        attrs=about,
-    )
+    quantities = {name: (("step", *found.dims), values[name], STRESSES[name].attributes) for name in names}
+    whole = xarray.Dataset(quantities, coords=found.coordinates, attrs=about)
+    return whole.isel(step=0) if numbers is None else whole.assign_coords(step=list(numbers))
 
 
 def add_bulk(stress: Array, steps: Sequence[Fields], loaded: Loaded) -> Array:
@@ -289,36 +268,31 @@ def add_bulk(stress: Array, steps: Sequence[Fields], loaded: Loaded) -> Array:
     return stress
 
 
-class NearSurface:
-    """Correction of the stress of hats next to the surface: roots at the edges, tractions at depth 0."""
+def correct_near_surface(of: Loaded, loads: Array, stress: Array, points: Array) -> float:
+    """Correct the stress (step, point, 6) of hats at points (point, 3): roots at edges, tractions at depth 0.
 
-    def __init__(self, loaded: Loaded, loads: Array) -> None:
-        self._of, self._loads = loaded, loads
-        thickness, _, self._poisson_ratio = loaded.layers[0]
-        # the correction is that of the outermost material
-        self._deepest = thickness if loaded.coated else math.inf
-        self._law = _law_of(loaded.friction)
-        self.refused = 0.0  # largest share of an edge without a root
-
-    def correct(self, stress: Array, points: Array) -> None:
-        """Correct the stress (step, point, 6) at points (point, 3), m."""
-        lattice, surface = self._of.lattice, self._of.surface
-        near = (points[:, 2] < NEAR * lattice.spacing) & (points[:, 2] <= self._deepest)
-        if near.any():
-            for k, (step, loads) in enumerate(zip(self._of.steps, self._loads, strict=True)):
-                [nodal] = nodal_tractions([step])
-                more, refused = _edges(lattice, nodal, step).stress(
-                    *(nodal[1:], np.asarray(step["zone"]) == _STICK, self._law, loads),
-                    *(self._of.body, self._poisson_ratio, points[near]),
-                )
-                stress[k, near] += more
-                self.refused = max(self.refused, refused)
-        free = points[:, 2] == 0.0
-        if surface is not None and free.any():
-            x, y, _ = points[free].T
-            for k in range(len(stress)):
-                for name, load in zip(_AT_SURFACE, surface(k)(x, y), strict=True):
-                    stress[k, free, TENSOR.index(name)] = 0.0 - load  # no sign on zero
+    Return the largest share of an edge without a root.
+    """
+    thickness, _, poisson_ratio = of.layers[0]
+    # the correction is that of the outermost material
+    deepest, refused = (thickness if of.coated else math.inf), 0.0
+    near = (points[:, 2] < NEAR * of.lattice.spacing) & (points[:, 2] <= deepest)
+    if near.any():
+        for k, (step, load) in enumerate(zip(of.steps, loads, strict=True)):
+            [nodal] = nodal_tractions([step])
+            more, share = _edges(of.lattice, nodal, step).stress(
+                *(nodal[1:], np.asarray(step["zone"]) == _STICK, _law_of(of.friction), load),
+                *(of.body, poisson_ratio, points[near]),
+            )
+            stress[k, near] += more
+            refused = max(refused, share)
+    free = points[:, 2] == 0.0
+    if of.surface is not None and free.any():
+        x, y, _ = points[free].T
+        for k in range(len(stress)):
+            for name, values in zip(_AT_SURFACE, of.surface(k)(x, y), strict=True):
+                stress[k, free, TENSOR.index(name)] = 0.0 - values  # no sign on zero
+    return refused
 
 
 def summed(lattice: Lattice, box: Region) -> bool:
@@ -360,21 +334,19 @@ def tractions_needed(
     return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 
-def _in_box(
-    lattice: Lattice, loads: Array, body: int, layers: Array, where: Region, components: int
-) -> Array:
+def _in_box(of: Loaded, loads: Array, where: Region, components: int) -> Array:
     """Return stress, or displacement times shear modulus, (step, depth, n_row, n_col, component)."""
-    depths, target = where.depths, where.lattice
+    target = where.lattice
     assert target is not None
-    whole, rows, cols = window_over(lattice, target)
     memory.require(
-        memory_needed(lattice, where, len(loads), len(layers) > 1),
-        f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes "
+        memory_needed(of.lattice, where, len(loads), of.coated),
+        f"the stress at {where.depths.size} x {target.n_row} x {target.n_col} nodes "
         f"in {counted(len(loads), 'step')}",
         "choose a smaller box, or one nearer to the window, fewer depths or steps",
     )
-    loads = embedded(lattice, whole, loads)
-    found = fields.on_planes(whole, loads, body, layers, depths, components=components)
+    whole, rows, cols = window_over(of.lattice, target)
+    given = embedded(of.lattice, whole, loads), of.body, of.layers, where.depths
+    found = fields.on_planes(whole, *given, components=components)
     return np.moveaxis(found[..., rows, cols], 2, -1)
 
 

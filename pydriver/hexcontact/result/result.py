@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analytic.hertz_gap import friction_of
 from ..arrays import Array, DataArray, DataFrame, Dataset, has_entries
 from ..core.calls import integer, number
 from ..core.lattice import Lattice
@@ -20,12 +19,12 @@ from ..errors import DeckError, NotInResult, PathWarning, warn
 from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
 from ..interior.fields import region
 from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
-from ..interior.stress import LOADED, Loaded, below, bodies_of, nodal_tractions, with_places
+from ..interior.stress import Loaded, below, bodies_of, nodal_tractions, with_places
 from ..text import counted, did_you_mean, text_table
-from ..variables import CREEPAGES, FIELDS, SHEAR_LIMIT, TRACTIONS, VARIABLES
+from ..variables import CREEPAGES, FIELDS, SHEAR_LIMIT, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .layout import Quantities, history_of, lattice_of, step_of
-from .step import NodalStep, Point, PressureField, TractionField, chosen_fields, loaded, nodal, with_shown
+from .step import Point, PressureField, Step, TractionField, loaded, nodal, under, with_shown
 
 if TYPE_CHECKING:
     from ..analytic.compare import Comparison
@@ -279,29 +278,31 @@ class Result:
         if "dissipation_density" not in self:
             raise DeckError("nothing wears without friction: the result has no dissipation_density")
         if CREEPAGES[0] in self and steps is not None and len(steps) == 1:
-            return self._worn_by_pass(coefficient, self.step(integer(steps[0], "steps")))
+            return self._worn_by_pass(coefficient, self._nodal(integer(steps[0], "steps")))
         cycle = map(self._nodal, self.cycle_steps(segment, steps))
-        given = (chosen_fields(WEARING, one.fields, one.number) for one in cycle)
+        given = (one.chosen(*WEARING) for one in cycle)
         return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
-    def _worn_by_pass(self, coefficient: float, step: Dataset) -> Dataset:
+    def _worn_by_pass(self, coefficient: float, step: Step) -> Dataset:
         """Return the wear of a pass, by the energy of Coulomb friction."""
-        mu = friction_of(self.dataset.attrs)
-        if not 0.0 < mu < math.inf or SHEAR_LIMIT in self.dataset.attrs:
+        if not 0.0 < step.friction < math.inf or SHEAR_LIMIT in self.dataset.attrs:
             raise DeckError("wear of rolling bodies: expected one finite friction.coefficient above 0")
-        if not np.isfinite(step["rolled_distance"]):
-            raise DeckError(f"steps = [{step['step'].item()}]: expected a load step in which the bodies roll")
-        by_energy, names = coefficient / mu, ("slip_power", "creep_power_error")
-        field, one = "dissipation_density", nodal(step, self.lattice)
-        spent = chosen_fields((field,), one.fields, one.number)[field]
+        if not math.isfinite(step.history["rolled_distance"]):
+            raise DeckError(f"steps = [{step.number}]: expected a load step in which the bodies roll")
+        by_energy, names = coefficient / step.friction, ("slip_power", "creep_power_error")
+        spent = step.chosen("dissipation_density")["dissipation_density"]
         depth = ("row", "col"), by_energy * spent, {"units": "m"}
         found = self.dataset[["x", "y"]].assign(worn_depth=depth)
         rates = zip(("wear_by_distance", "wear_by_distance_error"), names, strict=True)
         return found.assign(
-            {name: ((), by_energy * float(step[of]), {"units": "m2"}) for name, of in rates if of in step}
+            {
+                name: ((), by_energy * step.history[of], {"units": "m2"})
+                for name, of in rates
+                if of in step.history
+            }
         )
 
-    def _nodal(self, step: int) -> NodalStep:
+    def _nodal(self, step: int) -> Step:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""
         return nodal(self.step(step), self.lattice)
 
@@ -335,9 +336,7 @@ class Result:
         self, body: int, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = True
     ) -> Loaded:
         """Return a body under the tractions of some steps."""
-        steps = self._loaded(numbers, more, edges)
-        given = self.lattice, steps, bodies_of(self.deck), body, friction_of(self.dataset.attrs)
-        return Loaded(*given, surface=lambda place: self.traction_field(numbers[place], "edges"))
+        return under([self._nodal(number) for number in numbers], bodies_of(self.deck), body, more, edges)
 
     def fatigue(
         self,
@@ -398,8 +397,9 @@ class Result:
         """
         numbers = self.cycle_steps(segment, steps)
         found = region(self.lattice, **(where or Fatigue.default_region))
+        points = found.nodes.reshape(-1, 3)
         for part, history in histories(self._body(body, numbers), found):
-            yield tabulated(found, part, history, numbers)
+            yield tabulated(points[part], part.start + 1, history, numbers)
 
     def cycle_steps(
         self, segment: str | Sequence[str] | None = None, steps: Sequence[int] | None = None
@@ -426,24 +426,19 @@ class Result:
             raise DeckError(f"segment: {error}") from None
         return list(range(first + 1, last + 2))
 
-    def _loaded(
-        self, numbers: Sequence[int], more: Sequence[str] = (), edges: bool = False
-    ) -> list[dict[str, Any]]:
-        """Return tractions, bulk stress and other fields of some steps, and on request those of the edges."""
-        bulk = [name for name in LOADED if name not in TRACTIONS and name in self.dataset]
-        return [
-            loaded(self._nodal(number), more, edges) | {name: self.step(number)[name].item() for name in bulk}
-            for number in numbers
-        ]
-
     def _change_over(self, numbers: Sequence[int]) -> float | None:
         """Return the largest change of a traction over a cycle in the largest pressure; None if not kept."""
         try:
-            start = nodal_tractions(self._loaded([numbers[0] - 1]))[0] if numbers[0] > 1 else np.zeros(())
+            start = self._tractions(numbers[0] - 1) if numbers[0] > 1 else np.zeros(())
         except NotInResult:
             return None
-        [end] = nodal_tractions(self._loaded([numbers[-1]]))
+        end = self._tractions(numbers[-1])
         return float(abs(end - start).max() / max(end[0].max(), np.finfo(float).tiny))
+
+    def _tractions(self, number: int) -> Array:
+        """Return pressure and shear tractions of a step at the nodes."""
+        [found] = nodal_tractions([loaded(self._nodal(number), edges=False)])
+        return np.asarray(found)
 
     # --- tables ---------------------------------------------------------------------------------------------
 

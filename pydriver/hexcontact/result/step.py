@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,9 @@ from ..deck.below import SOURCES
 from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
 from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
+
+if TYPE_CHECKING:
+    from ..interior.stress import Loaded
 
 Point = tuple[float, float]
 Fields = Mapping[str, NDArray[Any]]
@@ -57,29 +60,156 @@ def interpolate(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NodalStep:
-    """A load step by its values at the nodes: fields between them, and along lines."""
+class Step:
+    """A finished load step.
+
+    Its quantities are attributes, too: ``step.pressure`` is an array over the nodes, ``step.approach`` a
+    number. The arrays are those of the run, not copies, and read-only.
+
+    Attributes
+    ----------
+    index : int
+        Position in the whole history, from 0.
+    lattice : Lattice
+        Its window.
+    fields : mapping of str to ndarray
+        Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
+    history : mapping of str to number or text
+        Values by step; names of `hexcontact.variables`.
+    companion : mapping of str to ndarray
+        Fields of the second solution of adaptive load steps, for the journal.
+    control : mapping of str to number
+        Place of an adaptive load step in the history, and data for the choice of the next one, for the
+        journal; empty for given load steps.
+    prescribed : mapping of str to float
+        Prescribed loads (N, N m) and motions (m, rad); empty for a step read from a file.
+    load_fraction : float
+        Finished share of the load history, from 0 to 1; NaN for a step read from a file.
+    ramp_done : float
+        Applied share of the ramp of its segment, usually from 0 to 1; NaN for a step read from a file.
+    bodies : sequence of Body
+        The two bodies; none for a step read from a file.
+    friction : float
+        Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
+    sharp : bool
+        Whether the edge of the contact is known: no compliant layer, and a window that ends.
+    shear_limit : float
+        Bound of the shear traction, Pa; inf: none.
+    """
 
     index: int
     lattice: Lattice
     fields: Fields
-    friction: float = field(default=0.0, kw_only=True)
-    sharp: bool = field(default=True, kw_only=True)
-    shear_limit: float = field(default=math.inf, kw_only=True)
+    history: Mapping[str, Any]
+    companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    control: Mapping[str, Any] = field(default_factory=dict)
+    prescribed: Mapping[str, float] = field(default_factory=dict)
+    load_fraction: float = math.nan
+    ramp_done: float = math.nan
+    bodies: Sequence[Any] = ()
+    friction: float = 0.0
+    sharp: bool = True
+    shear_limit: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.fields, dict | MappingProxyType):  # each is loaded at its use
+            return
+        safe = {name: _read_only(values) for name, values in self.fields.items()}
+        object.__setattr__(self, "fields", MappingProxyType(safe))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
+        plain: dict[str, Any] = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
+        return partial(type(self), **plain), ()
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a quantity."""
+        if name.startswith("_") or name in ("fields", "history"):  # before they are set
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a quantity: an array over the nodes, or a number."""
+        for values in (self.fields, self.history):
+            if name in values:
+                return values[name]
+        hint = did_you_mean(name, [*self.fields, *self.history])
+        raise KeyError(f"a load step of this run has no {name}{hint}")
+
+    def __dir__(self) -> list[str]:
+        """List the quantities, too."""
+        return [*super().__dir__(), *self.fields, *self.history]
 
     @property
     def number(self) -> int:
         """Number of the step, from 1."""
         return self.index + 1
 
+    @property
+    def x(self) -> Array:
+        """Coordinate of each node along x, m."""
+        return self.lattice.x
+
+    @property
+    def y(self) -> Array:
+        """Coordinate of each node along y, m."""
+        return self.lattice.y
+
+    @property
+    def in_contact(self) -> Mask:
+        """Nodes in contact."""
+        return np.asarray(self.fields["zone"] > 0)
+
+    @property
+    def sticking(self) -> Mask:
+        """Nodes that stick."""
+        return np.asarray(self.fields["zone"] == 1)
+
+    @property
+    def residuals(self) -> dict[str, float]:
+        """Residuals of the contact conditions and loads by their symbols: R_n, R_t, R_P, R_Q, R_M."""
+        from .history_words import residuals
+
+        return residuals(self.history)
+
+    @property
+    def head(self) -> Step:
+        """The same step without the values of its fields."""
+        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, _NO_VALUES), companion={})
+
+    @property
+    def done(self) -> float:
+        """Finished share of the load history with adaptive load steps; 0 without."""
+        return float(self.control.get("done", 0.0))
+
     def bands(self, name: str) -> Iterator[tuple[Lattice, NDArray[Any]]]:
         """Yield a field in bands of rows, each with its window."""
         fields, row = self.fields, self.lattice.row_first
-        for band in in_bands(
-            fields.bands(name) if isinstance(fields, Banded) else [np.asarray(fields[name])]
-        ):
+        for band in in_bands(bands_of(fields, name)):
             yield dataclasses.replace(self.lattice, row_first=row, n_row=len(band)), band
             row += len(band)
+
+    def chosen(self, *names: str) -> dict[str, NDArray[Any]]:
+        """Return the named fields, by default all that were kept."""
+        fields = self.fields
+        for name in names:
+            if name not in fields:
+                known = name in VARIABLES and VARIABLES[name].is_field
+                hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
+                if known:
+                    raise NotInResult(f"{name} was not kept (output.fields){hint}")
+                raise DeckError(f"{name} is no field{hint}")
+        found = {name: np.asarray(fields[name]) for name in names or fields}
+        kept = {name: values for name, values in found.items() if is_kept(values)}
+        for name in names:
+            if name not in kept:
+                raise NotInResult(f"{name} of step {self.number} was not kept (output.every)")
+        if not names and not any(VARIABLES[name].is_field for name in kept):
+            raise NotInResult(f"no field of step {self.number} was kept (output.fields, output.every)")
+        return kept
 
     @property
     def law(self) -> FrictionLaw | None:
@@ -122,7 +252,7 @@ class NodalStep:
 
     def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
         """Return a field at points of the plane; see `hexcontact.Result.at`."""
-        [values] = chosen_fields([name], self.fields, self.number).values()
+        values = self.chosen(name)[name]
         return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
 
     def profile(
@@ -140,41 +270,108 @@ class NodalStep:
         source: str | None = None,
     ) -> Dataset:
         """Return fields along a line across the contact; see `hexcontact.Result.section`."""
-        pressure = chosen_fields(["pressure"], self.fields, self.number)["pressure"]
+        pressure = self.chosen("pressure")["pressure"]
         return self._along(Line(*section_ends(self.lattice, pressure, angle, through)), names, points, source)
 
     def _along(self, line: Line, names: Sequence[str], points: int | None, source: str | None) -> Dataset:
-        fields = chosen_fields(names, self.fields, self.number)
+        fields = self.chosen(*names)
         return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
 
     def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
         """Return the tractions between the nodes, if there is one among some fields."""
         return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
+    def stress_at(
+        self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
+    ) -> Dataset:
+        """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
+        from ..interior.stress import below
 
-def nodal(step: Dataset, lattice: Lattice) -> NodalStep:
+        return below(under([self], self.bodies, body), {"points": points}, components, source=source)
+
+    # --- display --------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        """Describe the step in a line."""
+        from .history_words import describe
+
+        try:
+            about = describe(self.history)
+        except KeyError:
+            about = ", ".join(self.history)
+        return f"Step {self.number}: {about}"
+
+    def _repr_html_(self) -> str:
+        from ..text import html_table
+        from .history_words import extent_of, step_rows
+
+        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
+
+
+def _read_only(values: NDArray[Any]) -> NDArray[Any]:
+    if isinstance(values, np.ndarray) and not values.flags.writeable:
+        return values
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
+
+
+_NO_VALUES = _read_only(np.empty(0))  # of the fields of a head
+
+
+def bands_of(fields: Fields, name: str) -> Iterable[NDArray[Any]]:
+    """Return a field in bands of rows, as they come."""
+    return fields.bands(name) if isinstance(fields, Banded) else [np.asarray(fields[name])]
+
+
+def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
+    """Join and cut bands into bands of a number of rows; the last may have fewer."""
+    left: NDArray[Any] = np.empty(0)
+    for part in parts:
+        for first in range(0, len(part), rows):
+            some = part[first : first + rows]
+            left = np.concatenate([left, some]) if len(left) else some
+            if len(left) >= rows:
+                yield left[:rows]
+                left = left[rows:]
+    if len(left):
+        yield left
+
+
+# --- load steps of a result ---------------------------------------------------------------------------------
+
+
+def nodal(step: Dataset, lattice: Lattice) -> Step:
     """Return a load step of a result, whose fields are read at their first use."""
-    known = step.attrs
-    return NodalStep(
+    known, values = step.attrs, step.variables
+    fields = [name for name in step.data_vars if values[name].dims == ("row", "col")]
+    return Step(
         int(step["step"]) - 1,
         lattice,
-        {str(name): cast(Any, v) for name, v in step.data_vars.items() if v.dims == ("row", "col")},
+        cast(Fields, step[fields].data_vars),
+        {str(name): values[name].values.item() for name in step.data_vars if not values[name].dims},
         friction=friction_of(known),
         sharp=not (is_compliant(known) or lattice.periodic),
         shear_limit=float(known.get(SHEAR_LIMIT, math.inf)),
     )
 
 
-def loaded(step: NodalStep, more: Sequence[str] = (), edges: bool = True) -> dict[str, Any]:
-    """Return the tractions and `more` fields of a step; with `edges`, those that show the edges, if known."""
+def loaded(step: Step, more: Sequence[str] = (), edges: bool = True) -> dict[str, Any]:
+    """Return the history, tractions and `more` fields of a step; `edges`: those that show the edges, too."""
     names = [name for name in (*TRACTIONS, *more) if name in step.fields]
-    if (
-        edges
-        and step.sharp
-        and all(name in step.fields and is_kept(np.asarray(step.fields[name])) for name in EDGES)
-    ):
+    if edges and step.sharp and all(n in step.fields and is_kept(np.asarray(step.fields[n])) for n in EDGES):
         names += EDGES
-    return dict(chosen_fields(names, step.fields, step.number))
+    return {**step.history, **step.chosen(*names)}
+
+
+def under(
+    steps: Sequence[Step], bodies: Sequence[Any], body: int, more: Sequence[str] = (), edges: bool = True
+) -> Loaded:
+    """Return a body under the tractions of some steps; `more` and `edges` as of `loaded`."""
+    from ..interior.stress import Loaded
+
+    given = steps[0].lattice, [loaded(step, more, edges) for step in steps], bodies, body, steps[0].friction
+    return Loaded(*given, surface=lambda place: steps[place].traction_field("edges"))
 
 
 def with_shown(step: Dataset, lattice: Lattice, source: str | None = None) -> Dataset:
@@ -244,30 +441,6 @@ class Line:
         return np.asarray(x), np.asarray(y)
 
 
-def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return the named fields of a load step, by default all that were kept."""
-    for name in names:
-        if name not in fields:
-            known = name in VARIABLES and VARIABLES[name].is_field
-            hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
-            if known:
-                raise NotInResult(f"{name} was not kept (output.fields){hint}")
-            raise DeckError(f"{name} is no field{hint}")
-    found = {name: np.asarray(fields[name]) for name in names or fields}
-    kept = {name: values for name, values in found.items() if is_kept(values)}
-    for name in names:
-        if name not in kept:
-            raise NotInResult(f"{name} of step {step} was not kept (output.every)")
-    if not names and not any(VARIABLES[name].is_field for name in kept):
-        raise NotInResult(f"no field of step {step} was kept (output.fields, output.every)")
-    return kept
-
-
-def is_kept(values: NDArray[Any]) -> bool:
-    """Test by its values whether the output has a field of a step."""
-    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
-
-
 def profile(
     lattice: Lattice,
     fields: Fields,
@@ -313,173 +486,6 @@ def profile(
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Step(NodalStep):
-    """A finished load step.
-
-    Its quantities are attributes, too: ``step.pressure`` is an array over the nodes, ``step.approach`` a
-    number. The arrays are those of the run, not copies, and read-only.
-
-    Attributes
-    ----------
-    index : int
-        Position in the whole history, from 0.
-    lattice : Lattice
-        Its window.
-    fields : mapping of str to ndarray
-        Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
-    history : mapping of str to number or text
-        Values by step; names of `hexcontact.variables`.
-    companion : mapping of str to ndarray
-        Fields of the second solution of adaptive load steps, for the journal.
-    control : mapping of str to number
-        Place of an adaptive load step in the history, and data for the choice of the next one, for the
-        journal; empty for given load steps.
-    prescribed : mapping of str to float
-        Prescribed loads (N, N m) and motions (m, rad); empty for a step read from a file.
-    load_fraction : float
-        Finished share of the load history, from 0 to 1; NaN for a step read from a file.
-    ramp_done : float
-        Applied share of the ramp of its segment, usually from 0 to 1; NaN for a step read from a file.
-    bodies : sequence of Body
-        The two bodies; none for a step read from a file.
-    friction : float
-        Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
-    sharp : bool
-        Whether the edge of the contact is known: no compliant layer, and a window that ends.
-    shear_limit : float
-        Bound of the shear traction, Pa; inf: none.
-    """
-
-    history: Mapping[str, Any]
-    companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    control: Mapping[str, Any] = field(default_factory=dict)
-    prescribed: Mapping[str, float] = field(default_factory=dict)
-    load_fraction: float = math.nan
-    ramp_done: float = math.nan
-    bodies: Sequence[Any] = ()
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.fields, dict | MappingProxyType):  # each is loaded at its use
-            return
-        safe = {name: _read_only(values) for name, values in self.fields.items()}
-        object.__setattr__(self, "fields", MappingProxyType(safe))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        given = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
-        plain: dict[str, Any] = {name: dict(v) if isinstance(v, Mapping) else v for name, v in given.items()}
-        return partial(type(self), **plain), ()
-
-    def __getattr__(self, name: str) -> Any:
-        """Return a quantity."""
-        if name.startswith("_") or name in ("fields", "history"):  # before they are set
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except KeyError as error:
-            raise AttributeError(error.args[0]) from None
-
-    def __getitem__(self, name: str) -> Any:
-        """Return a quantity: an array over the nodes, or a number."""
-        for values in (self.fields, self.history):
-            if name in values:
-                return values[name]
-        hint = did_you_mean(name, [*self.fields, *self.history])
-        raise KeyError(f"a load step of this run has no {name}{hint}")
-
-    def __dir__(self) -> list[str]:
-        """List the quantities, too."""
-        return [*super().__dir__(), *self.fields, *self.history]
-
-    @property
-    def x(self) -> Array:
-        """Coordinate of each node along x, m."""
-        return self.lattice.x
-
-    @property
-    def y(self) -> Array:
-        """Coordinate of each node along y, m."""
-        return self.lattice.y
-
-    @property
-    def in_contact(self) -> Mask:
-        """Nodes in contact."""
-        return np.asarray(self.fields["zone"] > 0)
-
-    @property
-    def sticking(self) -> Mask:
-        """Nodes that stick."""
-        return np.asarray(self.fields["zone"] == 1)
-
-    @property
-    def residuals(self) -> dict[str, float]:
-        """Residuals of the contact conditions and loads by their symbols: R_n, R_t, R_P, R_Q, R_M."""
-        from .history_words import residuals
-
-        return residuals(self.history)
-
-    @property
-    def head(self) -> Step:
-        """The same step without the values of its fields."""
-        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, _NO_VALUES), companion={})
-
-    @property
-    def done(self) -> float:
-        """Finished share of the load history with adaptive load steps; 0 without."""
-        return float(self.control.get("done", 0.0))
-
-    def stress_at(
-        self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
-    ) -> Dataset:
-        """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
-        from ..interior.stress import Loaded, below
-
-        fields: dict[str, Any] = {**self.history, **loaded(self)}
-        given = self.lattice, [fields], self.bodies, body, self.friction
-        of = Loaded(*given, surface=lambda _: self.traction_field("edges"))
-        return below(of, {"points": points}, components, source=source)
-
-    # --- display --------------------------------------------------------------------------------------------
-
-    def __repr__(self) -> str:
-        """Describe the step in a line."""
-        from .history_words import describe
-
-        try:
-            about = describe(self.history)
-        except KeyError:
-            about = ", ".join(self.history)
-        return f"Step {self.number}: {about}"
-
-    def _repr_html_(self) -> str:
-        from ..text import html_table
-        from .history_words import extent_of, step_rows
-
-        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
-
-
-def _read_only(values: NDArray[Any]) -> NDArray[Any]:
-    if isinstance(values, np.ndarray) and not values.flags.writeable:
-        return values
-    view = np.asarray(values).view()
-    view.flags.writeable = False
-    return view
-
-
-_NO_VALUES = _read_only(np.empty(0))  # of the fields of a head
-
-
-def in_bands(parts: Iterable[NDArray[Any]], rows: int = BAND) -> Iterator[NDArray[Any]]:
-    """Join and cut bands into bands of a number of rows; the last may have fewer."""
-    left: list[NDArray[Any]] = []
-    for part in parts:
-        start = 0
-        while start < len(part):
-            missing = rows - sum(map(len, left))
-            left.append(part[start : start + missing])
-            start += missing
-            if sum(map(len, left)) == rows:
-                yield left[0] if len(left) == 1 else np.concatenate(left)
-                left = []
-    if left:
-        yield left[0] if len(left) == 1 else np.concatenate(left)
+def is_kept(values: NDArray[Any]) -> bool:
+    """Test by its values whether the output has a field of a step."""
+    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())

@@ -34,18 +34,16 @@ class _Lock:
         """Take the lock; False without waiting if another thread has it."""
         if not self.own.acquire(blocking):
             return False
-        if self._depth == 0:
-            try:
+        taken = self._depth > 0
+        try:
+            if not taken:
                 self._foreign = lock_of_xarray()
                 taken = self._foreign is None or self._foreign.acquire(blocking)
-            except BaseException:
-                self.own.release()
-                raise
+            self._depth += taken
+        finally:
             if not taken:
                 self.own.release()
-                return False
-        self._depth += 1
-        return True
+        return taken
 
     def release(self) -> None:
         """Release the lock."""
@@ -113,22 +111,26 @@ def _waiting(method: Callable[..., Any]) -> Callable[..., Any]:
 @contextlib.contextmanager
 def opened(path: Path, mode: Literal["r", "w"] = "r", **options: Any) -> Iterator[netCDF4.Dataset]:
     """Open a file of netCDF, and close it, with no other thread in the library meanwhile."""
+    with LOCK, shared(path, mode, **options) as file:
+        yield file
+
+
+@contextlib.contextmanager
+def shared(path: Path, mode: Literal["r", "w"], **options: Any) -> Iterator[netCDF4.Dataset]:
+    """Open a file of netCDF, and close it; who uses it takes the lock."""
     import netCDF4
 
     with LOCK:
         file = netCDF4.Dataset(path, mode, **options)
-        try:
-            yield file
-        finally:
-            close(file)
-
-
-def created(path: Path, **options: Any) -> netCDF4.Dataset:
-    """Create a file of netCDF, which `close` closes."""
-    import netCDF4
-
-    with LOCK:
-        return netCDF4.Dataset(path, "w", **options)
+    try:
+        yield file
+    finally:
+        with LOCK:
+            try:
+                file.close()
+            except BaseException:
+                file._close(False)  # else its destructor does, when another file may have its number
+                raise
 
 
 def attributes(path: Path) -> dict[str, Any]:
@@ -140,27 +142,13 @@ def attributes(path: Path) -> dict[str, Any]:
     return {}
 
 
-def close(file: netCDF4.Dataset) -> None:
-    """Close a file, so that its destructor does not, not even after an error."""
-    with LOCK:
-        try:
-            file.close()
-        except BaseException:
-            file._close(False)
-            raise
-
-
 def write(dataset: Dataset, path: Path, mode: Literal["w", "a"] = "w", **options: Any) -> None:
     """Write a dataset of xarray to a file, or to a group of it."""
     from xarray.backends import NetCDF4DataStore
 
     encoding = options.pop("encoding", None)
-    with LOCK:
-        store = NetCDF4DataStore.open(path, mode, lock=LOCK, **options)
-        try:
-            dataset.dump_to_store(store, encoding=encoding)
-        finally:
-            store.close()
+    with LOCK, contextlib.closing(NetCDF4DataStore.open(path, mode, lock=LOCK, **options)) as store:
+        dataset.dump_to_store(store, encoding=encoding)
 
 
 def opened_by_xarray(path: Path, **options: Any) -> Dataset:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import datetime
+import itertools
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..arrays import Banded, Dataset
+from ..arrays import Dataset
 from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
-from ..files import made, require_kinds
+from ..files import made
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
-from .step import Step, in_bands
+from .step import Step, bands_of, in_bands
 
 COORDINATES = ("step", "row", "col", "x", "y")
 MISSING = {name: variable.missing for name, variable in VARIABLES.items()}
@@ -62,9 +63,7 @@ class Metadata:
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
         """Return the metadata from the table of `dataclasses.asdict`, after JSON."""
-        require_kinds(values, fields=list, resumed=list)
-        tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
-        return made(cls, {**values, **tuples})
+        return made(cls, {**values, **{name: tuple(values[name]) for name in ("fields", "resumed")}})
 
 
 class Layout:
@@ -107,14 +106,6 @@ class Layout:
             attributes["ancillary_variables"] = error
         return attributes
 
-    def axes(self) -> dict[str, NDArray[Any]]:
-        """Return the values of the coordinates along the dimensions."""
-        return {
-            "step": np.array([step.number for step in self.steps], dtype="i4"),
-            "row": np.asarray(self.window.rows, dtype="i4"),
-            "col": np.asarray(self.window.cols, dtype="i4"),
-        }
-
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Return the global attributes; `complete`: the result has all planned steps."""
         window, metadata = self.window, self.metadata
@@ -147,9 +138,14 @@ class Layout:
         """Names of the quantities with a value at every node."""
         return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
 
-    def histories(self) -> dict[str, NDArray[Any]]:
-        """Return the values of quantities with one value by step; texts as objects."""
-        return {
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return coordinates along the dimensions, quantities with one value by step, and those of trials."""
+        axes = {
+            "step": np.array([step.number for step in self.steps], dtype="i4"),
+            "row": np.asarray(self.window.rows, dtype="i4"),
+            "col": np.asarray(self.window.cols, dtype="i4"),
+        }
+        histories = {
             name: np.array(
                 [step.history.get(name, "" if v.dtype == "str" else MISSING[name]) for step in self.steps],
                 dtype=object if v.dtype == "str" else v.dtype,
@@ -157,54 +153,45 @@ class Layout:
             for name, v in self.variables.items()
             if v.dims == ("step",)
         }
+        return axes | histories | self.trials
 
-    def _rows(self, name: str, step: Step, kept: bool) -> Iterator[NDArray[Any]]:
+    def _rows(self, name: str, step: Step) -> Iterator[NDArray[Any]]:
         """Yield a field of a step on the window of the whole result, in bands as they come."""
         variable, window, lattice = VARIABLES[name], self.window, step.lattice
+        kept = name in FIXED or step.number % self.metadata.every == 0 or step.number == self.steps[-1].number
         if not (kept and name in step.fields):
             yield np.broadcast_to(np.asarray(MISSING[name], variable.dtype), window.shape)
             return
-        wide = (lattice.col_first, lattice.n_col) == (window.col_first, window.n_col)
-        below, done = lattice.row_first - window.row_first, 0
+        below, left = lattice.row_first - window.row_first, lattice.col_first - window.col_first
+        sides, done = (left, window.n_col - left - lattice.n_col), 0
         yield np.full((below, window.n_col), variable.padding, dtype=variable.dtype)
-        fields = step.fields
-        for band in fields.bands(name) if isinstance(fields, Banded) else [np.asarray(fields[name])]:
-            rows, done = done, done + len(band)
+        for band in bands_of(step.fields, name):
+            done += len(band)
             if band.shape[1:] != lattice.shape[1:] or done > lattice.n_row:
                 raise ValueError(f"{name} of step {step.number} has shape {band.shape}, not {lattice.shape}")
             values = np.asarray(band, dtype=variable.dtype)
-            if not wide:
-                part = dataclasses.replace(lattice, row_first=lattice.row_first + rows, n_row=len(band))
-                larger = dataclasses.replace(part, col_first=window.col_first, n_col=window.n_col)
-                values = np.asarray(part.embed(values, larger, variable.padding), dtype=variable.dtype)
-            yield values
+            yield np.pad(values, ((0, 0), sides), constant_values=variable.padding)
         if done != lattice.n_row:
             raise ValueError(f"{name} of step {step.number} has {done} rows, not {lattice.n_row}")
         yield np.full((window.n_row - below - done, window.n_col), variable.padding, dtype=variable.dtype)
 
     def fill(self, columns: Mapping[str, Any], steps: Iterable[Step], lock: Any = None) -> None:
         """Fill columns of `fields` from the steps, which are read once; the lock is held to write."""
-        lock, last = lock or contextlib.nullcontext(), len(self.steps) - 1
+        lock, steps, done = lock or contextlib.nullcontext(), iter(steps), 0
         fixed: dict[Lattice, Step] = {}  # the first step on each window, for fields of all steps
-        block: list[Step] = []
-        for position, step in enumerate(steps):
-            block.append(step)
-            if len(block) == self.block or position == last:
-                place = slice(position + 1 - len(block), position + 1)
-                kept = [one.number % self.metadata.every == 0 for one in block]
-                kept[-1] |= position == last
-                with lock:
-                    for name in columns:
-                        if name not in FIXED:
-                            rows = [self._rows(name, *each) for each in zip(block, kept, strict=True)]
-                            self._write(columns[name], place, rows)
-                block.clear()
-            if step.lattice not in fixed and step.fields.keys() & {*FIXED}:
-                fixed[step.lattice] = step
+        while block := list(itertools.islice(steps, self.block)):
+            place = slice(done, done := done + len(block))
+            with lock:
+                for name in columns:
+                    if name not in FIXED:
+                        self._write(columns[name], place, [self._rows(name, step) for step in block])
+            for step in block:
+                if step.fields.keys() & FIXED:
+                    fixed.setdefault(step.lattice, step)
         with lock:
             for name in FIXED:
                 if name in columns:
-                    rows = [self._rows(name, one, True) for one in fixed.values() if name in one.fields]
+                    rows = [self._rows(name, step) for step in fixed.values() if name in step.fields]
                     self._write(columns[name], None, rows)
 
     @staticmethod
@@ -269,9 +256,7 @@ def assemble(
         for name in layout.fields
     }
     layout.fill(values, steps)
-    values |= (
-        layout.histories() | layout.axes() | layout.trials | {"x": layout.window.x, "y": layout.window.y}
-    )
+    values |= layout.columns() | {"x": layout.window.x, "y": layout.window.y}
     variables = {
         name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()

@@ -7,7 +7,6 @@ chunks. A program that rewrites the file with HDF5 removes the seal.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
 import math
@@ -29,7 +28,7 @@ from ..deck.keys import BULK_STATES
 from ..deck.kinds import SMALLEST
 from ..errors import DeckError
 from ..files import reading
-from ..netcdf_library import LOCK, attributes, close, created, opened, opened_by_xarray
+from ..netcdf_library import LOCK, attributes, opened, opened_by_xarray, shared
 from ..variables import (
     INTERFACE,
     LARGEST,
@@ -41,7 +40,7 @@ from ..variables import (
     names_where,
 )
 from .layout import COORDINATES, MISSING, Layout, history_of, lattice_of
-from .step import Step
+from .step import Step, nodal
 
 if TYPE_CHECKING:
     import netCDF4
@@ -161,11 +160,8 @@ def _faults(dataset: Dataset) -> Iterator[str]:
     except tomllib.TOMLDecodeError as error:
         yield f"its deck is no TOML: {error}"
     for index, number in enumerate(numbers):
-        step = dataset.isel(step=index)
-        fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
-        history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
         kept = number % int(attributes["output_every"]) == 0 or number == numbers[-1]
-        for fault in _faults_of_fields(fields, history, lattice, kept):
+        for fault in _faults_of_fields(nodal(dataset.isel(step=index), lattice), kept):
             yield f"{fault} in step {number}"
 
 
@@ -198,10 +194,9 @@ def _faults_of_numbers(
             yield f"{name} holds numbers that no load step has"
 
 
-def _faults_of_fields(
-    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], lattice: Lattice, kept: bool
-) -> Iterator[str]:
+def _faults_of_fields(step: Step, kept: bool) -> Iterator[str]:
     """Yield faults of the nodal values of a step, which have bounds and fit the history."""
+    lattice, fields = step.lattice, {name: np.asarray(values) for name, values in step.fields.items()}
     zone, p = fields.get("zone"), fields.get("pressure")
     contact = zone > 0 if zone is not None else p > 0 if p is not None else None
     for name, values in fields.items():
@@ -236,14 +231,37 @@ def _faults_of_fields(
         own.append((name, load, size, f"{name} is not the resultant of the tractions"))
     for name, value, size, fault in own:
         # the largest pressure is infinite at a sharp end
-        if name in history and math.inf > abs(value - history[name]) > _CLOSE * size:
+        if name in step.history and math.inf > abs(value - step.history[name]) > _CLOSE * size:
             yield fault
 
 
 NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
 TOPOLOGY, FACE_NODES = "mesh", "mesh_face_nodes"
-MESH = (TOPOLOGY, "mesh_node_x", "mesh_node_y", FACE_NODES)
-_TRIANGLES = 1 << 14  # triangles
+MESH: dict[str, dict[str, Any]] = {  # attributes of its variables
+    TOPOLOGY: {
+        "cf_role": "mesh_topology",
+        "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "mesh_node_x mesh_node_y",
+        "face_node_connectivity": FACE_NODES,
+        "face_dimension": FACE,
+    },
+    **{
+        f"mesh_node_{axis}": {
+            "standard_name": f"projection_{axis}_coordinate",
+            "long_name": f"{axis} coordinate of the node",
+            "units": "m",
+        }
+        for axis in "xy"
+    },
+    FACE_NODES: {
+        "cf_role": "face_node_connectivity",
+        "long_name": "nodes at the corners of each triangle, counterclockwise",
+        "start_index": np.int32(0),
+    },
+}
+_PACKED: dict[str, Any] = {"compression": "zlib", "complevel": 1, "fletcher32": True}  # damage is an error
+_TRIANGLES = 1 << 14  # triangles, or nodes, in a chunk
 
 
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
@@ -264,34 +282,14 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
     count = 2 * (lattice.n_row - 1) * (lattice.n_col - 1)
     for name, size in ((NODE, lattice.size), (FACE, count), (CORNER, 3)):
         file.createDimension(name, size)
-    about: dict[str, Any] = {
-        "cf_role": "mesh_topology",
-        "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
-        "topology_dimension": np.int32(2),
-        "node_coordinates": "mesh_node_x mesh_node_y",
-        "face_node_connectivity": FACE_NODES,
-        "face_dimension": FACE,
-    }
-    add_column(file, TOPOLOGY, "i4", (), about, np.int32(0))
-    packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
-    columns = []
-    for axis in "xy":
-        standard = {"standard_name": f"projection_{axis}_coordinate"}
-        about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
-        chunks = [min(_TRIANGLES, lattice.size)]
-        columns.append(
-            add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, chunksizes=chunks, **packed)
-        )
-    about = {
-        "cf_role": "face_node_connectivity",
-        "long_name": "nodes at the corners of each triangle, counterclockwise",
-        "start_index": np.int32(0),
-    }
-    chunks = [min(_TRIANGLES, count), 3]
-    columns.append(add_column(file, FACE_NODES, "i4", (FACE, CORNER), about, chunksizes=chunks, **packed))
-    for column in columns:  # the chunk that a band ends in, and the next
-        column.set_var_chunk_cache(size=2 * _TRIANGLES * 12)
-    x, y, corners = columns
+    add_column(file, TOPOLOGY, "i4", (), MESH[TOPOLOGY], np.int32(0))
+    for name in [*MESH][1:]:
+        of_faces = name == FACE_NODES
+        dtype, dims = ("i4", (FACE, CORNER)) if of_faces else ("f8", (NODE,))
+        chunks = [min(_TRIANGLES, count), 3] if of_faces else [min(_TRIANGLES, lattice.size)]
+        column = add_column(file, name, dtype, dims, MESH[name], chunksizes=chunks, **_PACKED)
+        column.set_var_chunk_cache(size=2 * _TRIANGLES * 12)  # the chunk that a band ends in, and the next
+    x, y, corners = file["mesh_node_x"], file["mesh_node_y"], file[FACE_NODES]
     for first, band in _bands(lattice, max(1, _TRIANGLES // lattice.n_col)):
         node, face = first * lattice.n_col, 2 * first * (lattice.n_col - 1)
         x[node : node + band.size], y[node : node + band.size] = band.x.ravel(), band.y.ravel()
@@ -339,47 +337,42 @@ _END = slice(28, 36)  # in the head: the address where the file ends
 
 
 def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
-    """Write the file of a result from its steps, which are read once; OSError if that fails."""
-    with _new_file(path) as file:
-        with LOCK:
-            for name, size in layout.sizes.items():
-                file.createDimension(name, size)
-            given = layout.axes() | layout.histories() | layout.trials
-            for name in (name for name in given if VARIABLES[name].dtype == "str"):
-                # characters, not netCDF strings, on which HDF5 crashes if a file is open more than once
-                texts = np.array([text.encode() for text in given[name]])
-                given[name] = texts.view("S1").reshape(len(texts), -1)
-                file.createDimension(f"{name}_length", given[name].shape[1])
-            for name in (*COORDINATES, *layout.variables):
-                _column(file, name, layout)
-            file.setncatts(layout.attributes(complete))
-            # chunks are written once; the default is 64 MB a variable
-            for column in file.variables.values():
-                if column.dimensions[-2:] == ("row", "col"):
-                    column.set_var_chunk_cache(size=0)
-            for name, values in given.items():
-                file[name][...] = values
-            for first, band in _bands(layout.window, _CHUNK):
-                for name in "xy":
-                    file[name][first : first + band.n_row] = getattr(band, name)
-            write_mesh(file, layout.window)
-        layout.fill({name: file[name] for name in layout.fields}, steps, LOCK)
-
-
-@contextlib.contextmanager
-def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; at the end close it and add its checksum."""
+    """Write the file of a result from its steps, which are read once, and seal it; OSError if that fails."""
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
-        file = created(path, format="NETCDF4_CLASSIC")
-        try:
-            yield file
-        finally:
-            close(file)
+        with shared(path, "w", format="NETCDF4_CLASSIC") as file:
+            with LOCK:
+                _begin(file, layout, complete)
+            layout.fill({name: file[name] for name in layout.fields}, steps, LOCK)
     except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
+
+
+def _begin(file: netCDF4.Dataset, layout: Layout, complete: bool) -> None:
+    """Write all of a result but the fields of its steps."""
+    for name, size in layout.sizes.items():
+        file.createDimension(name, size)
+    given = layout.columns()
+    for name in (name for name in given if VARIABLES[name].dtype == "str"):
+        # characters, not netCDF strings, on which HDF5 crashes if a file is open more than once
+        texts = np.array([text.encode() for text in given[name]])
+        given[name] = texts.view("S1").reshape(len(texts), -1)
+        file.createDimension(f"{name}_length", given[name].shape[1])
+    for name in (*COORDINATES, *layout.variables):
+        _column(file, name, layout)
+    file.setncatts(layout.attributes(complete))
+    # chunks are written once; the default is 64 MB a variable
+    for column in file.variables.values():
+        if column.dimensions[-2:] == ("row", "col"):
+            column.set_var_chunk_cache(size=0)
+    for name, values in given.items():
+        file[name][...] = values
+    for first, band in _bands(layout.window, _CHUNK):
+        for name in "xy":
+            file[name][first : first + band.n_row] = getattr(band, name)
+    write_mesh(file, layout.window)
 
 
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:
@@ -394,8 +387,7 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     if variable.dims[-2:] == ("row", "col"):
         block = {"step": layout.block, "row": _CHUNK, "col": _CHUNK}
         sizes = [min(block[dim], layout.sizes[dim]) for dim in variable.dims]
-        options = {"compression": "zlib", "complevel": 1, "chunksizes": sizes}
-        options["fletcher32"] = True  # damage is an error
+        options = {**_PACKED, "chunksizes": sizes}
         if variable.dtype == "f8":
             options["fill_value"] = MISSING[name]
     if options and name not in ("x", "y"):

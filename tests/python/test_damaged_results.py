@@ -11,7 +11,7 @@ from fuzz.file_made import WINDOW, made_step, written
 
 from hexcontact import Case
 from hexcontact.errors import DeckError
-from hexcontact.result import netcdf
+from hexcontact.result import journal, netcdf
 from hexcontact.result.journal import Solution, TrialFolder, journal_of, write_record
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
@@ -176,6 +176,20 @@ def test_a_record_that_was_written_again_is_refused(out: Path, what: str) -> Non
         arrays["about"] = np.frombuffer(text, "u1")
     np.savez(record, **arrays)
     with pytest.raises(DeckError, match=r"000001\.npz is damaged: its checksum differs"):
+        open_result(out)
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_shorter_type_in_a_record_is_noticed(
+    out: Path, monkeypatch: pytest.MonkeyPatch, large: bool
+) -> None:
+    """The checksum is compared at the end of an array, though its header asks for fewer bytes."""
+    monkeypatch.setattr(journal, "LARGE", 0 if large else journal.LARGE)
+    with Store(out, Metadata(title="a case", deck="deck = 1", planned_steps=2)) as store:
+        store.append(made_step(0, replace(WINDOW, n_row=60, n_col=60)))
+    record = journal_of(out) / "000001.npz"
+    record.write_bytes(record.read_bytes().replace(b"'<f8'", b"'<f4'", 1))
+    with pytest.raises(DeckError, match=r"000001\.npz is damaged"):
         open_result(out)
 
 

@@ -33,10 +33,10 @@ from .._version import __version__
 from ..arrays import BAND, Banded
 from ..core.lattice import Lattice
 from ..errors import DeckError
-from ..files import beginning, made, names_a_run, reading, replacing, require_kinds
+from ..files import beginning, made, names_a_run, reading, replacing, require_table
 from ..variables import VARIABLES
 from .layout import Metadata, assemble
-from .step import Step
+from .step import Step, bands_of
 
 if TYPE_CHECKING:
     from .result import Result
@@ -56,7 +56,8 @@ _ABOUT = "about"  # name of the text among the arrays
 _KIND = "a record of a journal"
 LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _COMPANION = "companion."  # before the names of restart data
-_PARTS = {"run": str, "index": int, **dict.fromkeys(("lattice", "history", "control"), dict)}
+_PARTS = ("run", "index", "lattice", "history", "control")
+_HEAD = rb"PK\x03\x04.{26}" + _ABOUT.encode() + rb"|\{\"journal_version\": "  # of a record, of a text
 _CHANGED = "{} is damaged: its checksum differs"
 
 
@@ -123,7 +124,7 @@ def read_sealed(path: Path) -> dict[str, Any]:
 
 def _require_layout(about: Any, path: Path) -> None:
     """Refuse a text of another layout of the journal."""
-    require_kinds(about)
+    require_table(about)
     if (layout := about["journal_version"]) != VERSION:
         raise DeckError(
             f"{path} was kept by hexcontact {about['hexcontact_version']}, whose journal has the layout "
@@ -141,15 +142,15 @@ def _digest(about: Any) -> str:
 class Journal:
     """The finished steps of a run, read from the disk one at a time.
 
-    Each field of a large record is loaded at its use, unless restart data are read, too (`companions`).
+    Each field of a large record is loaded at its use. With `restart` the steps have their restart data.
     """
 
-    def __init__(self, folder: Path, companions: bool = False) -> None:
-        self.folder, self._companions = folder, companions
+    def __init__(self, folder: Path, restart: bool = False) -> None:
+        self.folder, self._restart = folder, restart
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
-        self._left = [folder / name for name in names if _is_left(name, folder)]
-        self._headers = [folder / HEADER] if HEADER in names else []
+        others = [folder / name for name in reversed(names) if _is_ours(name, folder)]
+        self.files = [*reversed(self.records), *others]  # in the order in which they are deleted
         self._controls: dict[Path, Mapping[str, Any]] = {}  # of records that were read
 
     def __len__(self) -> int:
@@ -161,7 +162,7 @@ class Journal:
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            about, step = read_record(record, self._companions, lazy=not self._companions)
+            about, step = read_record(record, self._restart)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
@@ -172,7 +173,7 @@ class Journal:
     @cached_property
     def header(self) -> Header:
         """The header."""
-        if not self._headers:
+        if not (self.folder / HEADER).exists():
             read_about(self.records[0])  # DeckError for another version
             raise DeckError(f"{self.folder} lacks its header, {HEADER}")
         return read_header(self.folder)
@@ -215,21 +216,13 @@ class Journal:
     @property
     def is_ours(self) -> bool:
         """Whether one of the files begins as a run writes it; the rest may be damaged."""
-        heads = (beginning(record, 30 + len(_ABOUT)) for record in self.records)
-        if any(head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode() for head in heads):
-            return True
-        return any(beginning(path, 200).startswith(b'{"journal_version": ') for path in self._headers)
-
-    @property
-    def files(self) -> list[Path]:
-        """The records and the header, the reason of an early end, and remains of an interrupted write."""
-        return [*self.records, *self._headers, *self._left]
+        heads = (beginning(path, 30 + len(_ABOUT)) for path in self.files)
+        return any(re.match(_HEAD, head, re.DOTALL) for head in heads)
 
     def remove(self) -> None:
         """Delete all `files`, but not the lock."""
-        for path in [*reversed(self.records), *self._headers]:  # a killed process leaves the first steps
+        for path in self.files:
             path.unlink(missing_ok=True)
-        self.tidy()
 
     def clear(self) -> None:
         """Delete a journal that no run is writing, but no other files in its folder."""
@@ -239,19 +232,13 @@ class Journal:
         with contextlib.suppress(OSError):
             self.folder.rmdir()
 
-    def tidy(self) -> None:
-        """Delete the reason of an early end, and remains of an interrupted write."""
-        for path in self._left:
-            path.unlink(missing_ok=True)
 
-
-def _is_left(name: str, folder: Path) -> bool:
-    """Test whether a run leaves a file of this name: the reason of its end, a finished lattice, remains."""
+def _is_ours(name: str, folder: Path) -> bool:
+    """Test whether a run writes a file of this name beside the records, or an interrupted write leaves it."""
     stem = name.removesuffix(_TEMPORARY)
-    if folder.name == FOLDER and re.fullmatch(_LATTICE, stem):
+    if name in (HEADER, STOPPED) or (folder.name == FOLDER and re.fullmatch(_LATTICE, stem)):
         return True
-    ours = _RECORD.fullmatch(stem) or stem in (HEADER, folder.name.removesuffix(".d"))
-    return name == STOPPED or (stem != name and bool(ours))
+    return stem != name and bool(_RECORD.fullmatch(stem) or stem in (HEADER, folder.name.removesuffix(".d")))
 
 
 def journals(folder: Path) -> list[Journal]:
@@ -272,17 +259,17 @@ def remove_all(folder: Path) -> None:
         journal.clear()
 
 
-def foreign_file(folder: Path) -> Path | None:
-    """Return a file named like one of a journal in a folder that no run has written to, or None."""
+def foreign(folder: Path, known: bool) -> Path | None:
+    """Return a folder of lattices that is a link, or a file named like one of a journal, but of no run.
+
+    If the folder is `known` as that of a run, its files may be damaged.
+    """
     found = journals(folder)
-    if any(journal.is_ours for journal in found[:2]):
+    if links := [journal.folder for journal in found[1:] if journal.folder.is_symlink()]:
+        return links[0]
+    if known or any(journal.is_ours for journal in found[:2]):
         return None
     return next((journal.files[0] for journal in found if journal.files and not journal.is_ours), None)
-
-
-def linked_folder(folder: Path) -> Path | None:
-    """Return a folder of lattices that is a link, or None."""
-    return next((journal.folder for journal in journals(folder)[1:] if journal.folder.is_symlink()), None)
 
 
 # --- records ------------------------------------------------------------------------------------------------
@@ -293,15 +280,17 @@ def write_record(path: Path, run: str, step: Step) -> None:
     about = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,
-        **{"run": run, "index": step.index, "lattice": dataclasses.asdict(step.lattice)},
-        **{"history": dict(step.history), "control": dict(step.control)},
+        "run": run,
+        "index": step.index,
+        "lattice": dataclasses.asdict(step.lattice),
+        "history": dict(step.history),
+        "control": dict(step.control),
     }
     text = json.dumps(about, default=np.generic.item).encode()
     with zipfile.ZipFile(path, "w") as file:
         _write(file, _ABOUT, [np.frombuffer(text, "u1")], (len(text),), "u1")
         for name in step.fields:
-            bands = step.fields.bands(name) if isinstance(step.fields, Banded) else [step.fields[name]]
-            _write(file, name, bands, step.lattice.shape, VARIABLES[name].dtype)
+            _write(file, name, bands_of(step.fields, name), step.lattice.shape, VARIABLES[name].dtype)
         for name, values in step.companion.items():
             _write(file, f"{_COMPANION}{name}", [values], values.shape, values.dtype)
         file.comment = _seal_of(file)
@@ -329,31 +318,23 @@ def _seal_of(archive: zipfile.ZipFile) -> bytes:
     return f"hexcontact {_digest(members)}".encode()
 
 
-def read_record(path: Path, companion: bool = False, lazy: bool = False) -> tuple[dict[str, Any], Step]:
-    """Read the text and the step of a record; restart data on request.
+def read_record(path: Path, restart: bool = False) -> tuple[dict[str, Any], Step]:
+    """Read the text and the step of a record; on request with its restart data.
 
-    Fields of a large one are read at their use; unless `lazy`, they are compared with their checksums now.
+    Fields of a large one are read at their use; before a restart they are compared with their checksums.
     """
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
         about = _about(file, path)
         names = [name.removesuffix(".npy") for name in file.namelist() if name != f"{_ABOUT}.npy"]
-        more = [name for name in names if name.startswith(_COMPANION)]
-        names = [name for name in names if name not in more]
-        if path.stat().st_size >= LARGE:
-            fields: Mapping[str, NDArray[Any]] = Stored(path, names)
-            for name in () if lazy else names:  # damage shows now
-                for _ in _bands(file, name):
-                    pass
-        else:
-            fields = {name: _array(file, name) for name in names}
-        lattice = made(Lattice, about["lattice"] | {"origin": tuple(about["lattice"]["origin"])})
-        beside = {name.removeprefix(_COMPANION): _array(file, name) for name in more if companion}
-        step = Step(
-            *(about["index"], lattice, fields, about["history"]),
-            companion=beside,
-            control=about["control"],
-        )
-        return about, step
+        others = [name for name in names if name.startswith(_COMPANION)]
+        fields: Mapping[str, NDArray[Any]] = Stored(path, [name for name in names if name not in others])
+        if path.stat().st_size < LARGE:
+            fields = {name: _array(file, name) for name in fields}
+        elif restart and (name := file.testzip()):
+            raise zipfile.BadZipFile(f"Bad CRC-32 for file {name!r}")
+        lattice = made(Lattice, {**about["lattice"], "origin": tuple(about["lattice"]["origin"])})
+        beside = {name.removeprefix(_COMPANION): _array(file, name) for name in others if restart}
+        return about, Step(about["index"], lattice, fields, about["history"], beside, about["control"])
 
 
 def read_about(path: Path) -> dict[str, Any]:
@@ -368,7 +349,6 @@ def _about(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     _require_layout(about, path)
     if archive.comment != _seal_of(archive):
         raise DeckError(_CHANGED.format(path))
-    require_kinds(about, **_PARTS)
     return about
 
 
@@ -376,28 +356,19 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     """Return an array of a record; zipfile compares its checksum at the end."""
     with archive.open(f"{name}.npy") as member:
         values: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
-        if member.read(1):
-            raise ValueError(f"{name} is longer than its shape")
+        member.read()  # to the end, also if a damaged header asks for less
         return values
 
 
 def _bands(archive: zipfile.ZipFile, name: str) -> Iterator[NDArray[Any]]:
     """Read an array of a record in bands of rows; zipfile compares its checksum at the end."""
     with archive.open(f"{name}.npy") as member:
-        version = np.lib.format.read_magic(member)
-        if version != (1, 0):
-            raise ValueError(f"{name} has an unknown format")
-        (n_row, n_col), by_columns, dtype = np.lib.format.read_array_header_1_0(member)
-        if by_columns:
-            raise ValueError(f"{name} is stored by columns")
+        np.lib.format.read_magic(member)
+        (n_row, n_col), _, dtype = np.lib.format.read_array_header_1_0(member)
         for first in range(0, n_row, BAND):
             shape = min(BAND, n_row - first), n_col
-            size = math.prod(shape) * dtype.itemsize
-            if len(text := member.read(size)) != size:
-                raise ValueError(f"{name} is shorter than its shape")
-            yield np.frombuffer(text, dtype).reshape(shape)
-        if member.read(1):
-            raise ValueError(f"{name} is longer than its shape")
+            yield np.frombuffer(member.read(math.prod(shape) * dtype.itemsize), dtype).reshape(shape)
+        member.read()  # to the end, also if a damaged header asks for less
 
 
 class Stored(Banded):
@@ -465,10 +436,9 @@ class TrialFolder:
         """Write a finished lattice, and delete the load steps that are no longer needed."""
         path = self.path(solution.level, solution.copy).with_suffix(".json")
         write_sealed(path, {"run": self.metadata.run, **solution._asdict()})
-        if solution.copy:
-            Journal(journal_of(self.path(solution.level, solution.copy))).clear()
-        elif solution.level:
-            Journal(journal_of(self.path(solution.level - 1))).clear()
+        # those of the shifted copy, or of the lattice that this one refines
+        done = path.with_suffix(".nc") if solution.copy else self.path(solution.level - 1)
+        Journal(journal_of(done)).clear()
 
     def _latest(self) -> tuple[int, Journal]:
         """Return the level of the finest finished lattice, else 0, and its load steps."""

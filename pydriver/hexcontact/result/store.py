@@ -147,7 +147,7 @@ class Store:
 
         The time at which the run `began` shows whether a complete output is its own if it left no records.
         """
-        journal, trials = records.Journal(self.folder, companions=True), records.TrialFolder(self.folder)
+        journal, trials = records.Journal(self.folder, restart=True), records.TrialFolder(self.folder)
         left = trials.metadata if trials else None
         output = None
         with contextlib.suppress(DeckError):  # another file is not replaced
@@ -204,7 +204,7 @@ class Store:
         """Prepare a reopened journal for further steps."""
         self.describe(records.Header(metadata))
         with self.writing("the journal"):
-            records.Journal(self.folder).tidy()
+            (self.folder / records.STOPPED).unlink(missing_ok=True)
 
     def _locked(self) -> tuple[Lock, bool]:
         """Return the lock of the journal, and whether its folder was there before."""
@@ -216,11 +216,8 @@ class Store:
                 self.folder.mkdir(exist_ok=True)  # fails for another file of this name
                 there = True
             flush(self.path.parent)
-            left = there and names_a_run(self.folder / "lock")
-            if there and (
-                foreign := records.linked_folder(self.folder)
-                or (None if left else records.foreign_file(self.folder))
-            ):
+            known = there and names_a_run(self.folder / "lock")
+            if there and (foreign := records.foreign(self.folder, known)):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import netcdf_library
 from .._version import __version__
-from ..arrays import DataFrame, Dataset
+from ..arrays import DataArray, DataFrame, Dataset
 from ..deck.below import Fatigue
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
@@ -35,17 +35,12 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
 
     A requested step without fields is a DeckError, and so is a result without any.
     """
-    wanted = [int(step) for step in result.dataset["step"].values]
-    if numbers is not None:
-        try:
-            wanted = [int(result.step(number)["step"]) for number in numbers]
-        except NoSuchStep as error:
-            raise DeckError(f"--step: {error}") from error
-    kept = [
-        number
-        for number in wanted
-        if any(is_kept(field.values) for field in _fields(result, number).data_vars.values())
-    ]
+    try:
+        every = result.dataset["step"].values if numbers is None else numbers
+        wanted = [int(result.step(number)["step"]) for number in every]
+    except NoSuchStep as error:
+        raise DeckError(f"--step: {error}") from error
+    kept = [n for n in wanted if any(is_kept(field.values) for field in _fields(result, n).values())]
     if not kept or (numbers is not None and len(kept) < len(wanted)):
         lost = sorted(set(wanted) - set(kept))
         where = f"step {lost[0]}" if numbers is not None else "any step"
@@ -119,41 +114,37 @@ def histories_to_csv(result: Result, folder: Path, stem: str) -> list[Path]:
 
 def _series(folder: Path, stem: str, kind: str, pages: Mapping[int, str]) -> Path:
     """Write a file for each load step, and their list."""
-    steps = list(pages)
-    width = max(4, len(str(steps[-1])))
-    names = [f"{stem}_{number:0{width}d}.{kind}" for number in steps]
-    series = folder / f"{stem}.pvd"
-    for path in (series, *(folder / name for name in names)):
-        require_replaceable(path)
-    for name, page in zip(names, pages.values(), strict=True):
-        with replacing(folder / name) as path:
-            path.write_text(page, encoding="utf-8")
-    sets = "".join(
-        f'    <DataSet timestep="{number}" part="0" file="{escaped(name)}"/>\n'
-        for number, name in zip(steps, names, strict=True)
+    width = max(4, len(str([*pages][-1])))
+    names = {number: f"{stem}_{number:0{width}d}.{kind}" for number in pages}
+    sets = (f'    <DataSet timestep="{n}" part="0" file="{escaped(name)}"/>\n' for n, name in names.items())
+    series = (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
+        f"<!-- {MADE_BY} -->\n"
+        f"  <Collection>\n{''.join(sets)}  </Collection>\n</VTKFile>\n"
     )
-    with replacing(series) as path:
-        path.write_text(
-            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
-            f"<!-- {MADE_BY} -->\n"
-            f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n",
-            encoding="utf-8",
-        )
-    return series
+    texts = {**{names[number]: page for number, page in pages.items()}, f"{stem}.pvd": series}
+    for name in texts:
+        require_replaceable(folder / name)
+    for name, text in texts.items():
+        with replacing(folder / name) as path:
+            path.write_text(text, encoding="utf-8")
+    return folder / f"{stem}.pvd"
 
 
 def _vtu(result: Result, number: int, source: str | None) -> str:
-    """Return a load step as an unstructured grid in XML."""
-    lattice, one = result.lattice, result.step(number)
+    """Return a load step as an unstructured grid in XML, with components of vectors joined."""
+    lattice, one, fields = result.lattice, result.step(number), _fields(result, number, source)
     points = np.stack([lattice.x.ravel(), lattice.y.ravel(), np.zeros(lattice.size)], axis=1)
     faces = netcdf.triangles(lattice.n_row, lattice.n_col)
-    history = {
-        name: one[name].values.reshape(1)
-        for name, variable in VARIABLES.items()
-        if variable.dims == ("step",) and variable.dtype != "str" and name in one.variables
-    }
-    data = [_array(name, values, VARIABLES[name].unit) for name, values in history.items()]
-    fields = [_array(name, values, unit) for name, values, unit in _point_data(result, number, source)]
+    numbers = [name for name, v in VARIABLES.items() if v.dims == ("step",) and v.dtype != "str"]
+    history = {name: one[name] for name in numbers if name in one.variables}
+    data = _arrays({name: one[name] for name in FIXED if name in one})
+    for name, parts in VECTORS.items():
+        if all(part in fields for part in parts):
+            columns = [fields[part].values.ravel() for part in parts]
+            columns += [np.zeros_like(columns[0])] * (3 - len(parts))
+            data += _array(name, np.stack(columns, axis=1), VARIABLES[parts[0]].unit)
+            fields = fields.drop_vars(parts)
     cells = [
         _array("connectivity", faces.ravel().astype("i4")),
         _array("offsets", np.arange(3, 3 * len(faces) + 1, 3, dtype="i4")),
@@ -161,9 +152,9 @@ def _vtu(result: Result, number: int, source: str | None) -> str:
     ]
     return _vtk(
         *("UnstructuredGrid", result, number),
-        f"<UnstructuredGrid>\n<FieldData>\n{''.join(data)}</FieldData>\n"
+        f"<UnstructuredGrid>\n<FieldData>\n{_arrays(history)}</FieldData>\n"
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(faces)}">\n'
-        f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
+        f"<PointData>\n{data}{_arrays(fields.data_vars)}</PointData>\n<CellData/>\n"
         f"<Points>\n{_array('Points', points, 'm')}</Points>\n<Cells>\n{''.join(cells)}</Cells>\n"
         "</Piece>\n</UnstructuredGrid>\n",
     )
@@ -173,14 +164,13 @@ def _vts(result: Result, found: Dataset) -> str:
     """Return quantities below the surface as a structured grid in XML; z points into body 1."""
     points, shape = as_volume(found)
     extent = " ".join(f"0 {n - 1}" for n in reversed(shape))
-    values = {str(name): field.values.ravel() for name, field in found.data_vars.items()}
-    fields = [_array(name, field, str(found[name].attrs["units"])) for name, field in values.items()]
-    if all(name in values for name in TENSOR):  # in the order of a symmetric tensor, as filters take it
-        fields.append(_array("stress", np.stack([values[name] for name in TENSOR], axis=1), "Pa"))
+    data = _arrays(found.data_vars)
+    if all(name in found for name in TENSOR):  # in the order of a symmetric tensor, as filters take it
+        data += _array("stress", np.stack([found[name].values.ravel() for name in TENSOR], axis=1), "Pa")
     return _vtk(
         *("StructuredGrid", result, int(found["step"].item())),
         f'<StructuredGrid WholeExtent="{extent}">\n<Piece Extent="{extent}">\n'
-        f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
+        f"<PointData>\n{data}</PointData>\n<CellData/>\n"
         f"<Points>\n{_array('Points', points, 'm')}</Points>\n</Piece>\n</StructuredGrid>\n",
     )
 
@@ -195,19 +185,10 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
     )
 
 
-def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
-    fields = {str(name): field.values for name, field in _fields(result, number, source).items()}
-    for name in FIXED:
-        if name in result.dataset:
-            yield name, result.dataset[name].values.ravel(), VARIABLES[name].unit
-    for vector, parts in VECTORS.items():
-        if all(part in fields for part in parts):
-            columns = [fields.pop(part).ravel() for part in parts]
-            columns += [np.zeros_like(columns[0])] * (3 - len(parts))
-            yield vector, np.stack(columns, axis=1), VARIABLES[parts[0]].unit
-    for name, values in fields.items():
-        yield name, values.ravel(), VARIABLES[name].unit
+def _arrays(found: Mapping[Any, DataArray]) -> str:
+    """Return numbers by node or point in XML, with their units."""
+    units = {name: str(values.attrs.get("units", "")).removesuffix("1") for name, values in found.items()}
+    return "".join(_array(str(name), values.values.ravel(), units[name]) for name, values in found.items())
 
 
 def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
@@ -279,28 +260,25 @@ def to_csv(
     """Write tables of the history, of the nodes in some steps, and those of the deck."""
     steps = [] if numbers is None else kept_steps(result, numbers)
     written = [folder / f"{stem}_history.csv", *(folder / f"{stem}_{number:04d}.csv" for number in steps)]
-    wanted = (
-        {name: folder / f"{stem}_{name}.csv" for name in tables_of(result.deck)} if result.complete else {}
-    )
+    names = tables_of(result.deck) if result.complete else ()
+    wanted = {name: folder / f"{stem}_{name}.csv" for name in names}
     for name, target in wanted.items():
         if target in written:
             raise DeckError(f"the table {name} would be written to {target}, as others are; rename it")
-    tables = {n: flat(found) for n, found in (at_hand(result, kept_steps(result)) if wanted else ())}
-    _make(folder)
-    history = result.history.rename(columns=_with_unit).map(_cell)
-    require_replaceable(written[0], ",".join([str(history.index.name), *history.columns[:2]]))
+    found = at_hand(result, kept_steps(result)) if wanted else ()
+    history = result.history.reset_index().rename(columns=_with_unit)
+    tables = {written[0]: history} | {wanted[name]: flat(values) for name, values in found}
     for target in written[1:]:
         require_replaceable(target, "row,col,x [m],")
-    for name, target in wanted.items():
-        require_replaceable(target, _beginning(tables[name]))
-    with replacing(written[0]) as path:
-        history.to_csv(path)
+    for target, table in tables.items():
+        require_replaceable(target, _beginning(table))
     for number, target in zip(steps, written[1:], strict=True):
         fields = _fields(result, number, source)
-        table = fields.to_dataframe(dim_order=["row", "col"])[["x", "y", *fields.data_vars]]
-        with replacing(target) as path:
-            table.rename(columns=_with_unit).to_csv(path)
-    return written + [write_table(tables[name], target) for name, target in wanted.items()]
+        table = fields.to_dataframe(dim_order=["row", "col"]).reset_index()
+        write_table(table[["row", "col", "x", "y", *fields.data_vars]].rename(columns=_with_unit), target)
+    for target, table in tables.items():
+        write_table(table, target)
+    return [*written, *wanted.values()]
 
 
 def flat(found: Dataset) -> DataFrame:
@@ -316,14 +294,15 @@ def write_table(table: DataFrame, target: Path) -> Path:
     """Write a table as CSV."""
     require_replaceable(target, _beginning(table))
     _make(target.parent)
+    texts = {name: table[name].map(_cell) for name in table.select_dtypes(exclude="number")}
     with replacing(target) as path:
-        table.map(_cell).to_csv(path, index=False)
+        table.assign(**texts).to_csv(path, index=False)
     return target
 
 
 def _beginning(table: DataFrame) -> str:
     """Return the start of the file of a table, by which it is known again."""
-    return ",".join(table.columns[:4])
+    return ",".join(table.columns[: 3 if "segment" in table else 4])
 
 
 def _cell(value: Any) -> Any:

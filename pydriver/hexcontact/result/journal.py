@@ -151,7 +151,6 @@ class Journal:
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         others = [folder / name for name in reversed(names) if _is_ours(name, folder)]
         self.files = [*reversed(self.records), *others]  # in the order in which they are deleted
-        self._controls: dict[Path, Mapping[str, Any]] = {}  # of records that were read
 
     def __len__(self) -> int:
         """Return the number of finished steps."""
@@ -167,7 +166,6 @@ class Journal:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             if about["run"] != self.run:
                 raise DeckError(f"{record} does not belong to the records before it: its run is another")
-            self._controls[record] = step.control
             yield step
 
     @cached_property
@@ -178,16 +176,10 @@ class Journal:
             raise DeckError(f"{self.folder} lacks its header, {HEADER}")
         return read_header(self.folder)
 
-    @property
+    @cached_property
     def metadata(self) -> Metadata:
         """Metadata of the run."""
-        return self.header.whole(map(self._control, self.records))
-
-    def _control(self, record: Path) -> Mapping[str, Any]:
-        """Return the control data of a record, which is read once."""
-        if record not in self._controls:
-            self._controls[record] = read_about(record)["control"]
-        return self._controls[record]
+        return self.header.whole(read_about(record)["control"] for record in self.records)
 
     @property
     def run(self) -> str:
@@ -202,7 +194,7 @@ class Journal:
     @property
     def complete(self) -> bool:
         """Whether it has all planned steps."""
-        done = self._control(self.records[-1]).get("done")
+        done = read_about(self.records[-1])["control"].get("done")
         return len(self) == self.metadata.planned_steps or done == 1.0
 
     def result(self, path: Path) -> Result:
@@ -403,7 +395,7 @@ class TrialFolder:
 
     def __bool__(self) -> bool:
         """Test whether there are any."""
-        return any((self.folder / name).exists() for name in (HEADER, _EARLIER))
+        return (self.folder / HEADER).exists() or (self.folder / _EARLIER).exists()
 
     def path(self, level: int, copy: int = 0) -> Path:
         """Return the path of the output of a lattice, to which its journal belongs."""

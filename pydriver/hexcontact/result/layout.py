@@ -92,6 +92,7 @@ class Layout:
         if metadata.fields:
             present -= set(FIELDS) - set(metadata.fields)
         self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
+        self.fields = [name for name, v in self.variables.items() if v.dims[-2:] == ("row", "col")]
         self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
         self.block = max(1, _STEPS // self.window.size)  # load steps in a chunk
         self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
@@ -133,11 +134,6 @@ class Layout:
             "deck": metadata.deck,
         }
 
-    @property
-    def fields(self) -> list[str]:
-        """Names of the quantities with a value at every node."""
-        return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
-
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return coordinates along the dimensions, quantities with one value by step, and those of trials."""
         axes = {
@@ -170,7 +166,7 @@ class Layout:
             if band.shape[1:] != lattice.shape[1:] or done > lattice.n_row:
                 raise ValueError(f"{name} of step {step.number} has shape {band.shape}, not {lattice.shape}")
             values = np.asarray(band, dtype=variable.dtype)
-            yield np.pad(values, ((0, 0), sides), constant_values=variable.padding)
+            yield np.pad(values, ((0, 0), sides), constant_values=variable.padding) if any(sides) else values
         if done != lattice.n_row:
             raise ValueError(f"{name} of step {step.number} has {done} rows, not {lattice.n_row}")
         yield np.full((window.n_row - below - done, window.n_col), variable.padding, dtype=variable.dtype)

@@ -289,18 +289,15 @@ class Result:
             raise DeckError("wear of rolling bodies: expected one finite friction.coefficient above 0")
         if not math.isfinite(step.history["rolled_distance"]):
             raise DeckError(f"steps = [{step.number}]: expected a load step in which the bodies roll")
-        by_energy, names = coefficient / step.friction, ("slip_power", "creep_power_error")
+        by_energy = coefficient / step.friction
         spent = step.chosen("dissipation_density")["dissipation_density"]
         depth = ("row", "col"), by_energy * spent, {"units": "m"}
         found = self.dataset[["x", "y"]].assign(worn_depth=depth)
-        rates = zip(("wear_by_distance", "wear_by_distance_error"), names, strict=True)
-        return found.assign(
-            {
-                name: ((), by_energy * step.history[of], {"units": "m2"})
-                for name, of in rates
-                if of in step.history
-            }
-        )
+        rates = {"wear_by_distance": "slip_power", "wear_by_distance_error": "creep_power_error"}
+        for name, of in rates.items():
+            if of in step.history:
+                found[name] = (), by_energy * step.history[of], {"units": "m2"}
+        return found
 
     def _nodal(self, step: int) -> Step:
         """Return a load step by its nodal values; xarray reads those that are used from the file."""
@@ -458,8 +455,6 @@ class Result:
         data = self.dataset if step is None else self.dataset.sel(step=[int(self.step(step)["step"])])
         chosen = [self[name].name for name in names] or list(self.history.columns)
         fields = any("row" in data[name].dims for name in chosen)
-        for name in () if fields else ("x", "y"):
-            data = data.drop_vars(name)
         index = ["step", "row", "col"] if fields else ["step"]
         table = data[chosen].to_dataframe(dim_order=index)
         if fields:

@@ -81,9 +81,9 @@ class Store:
         self._at(path)
         self.describe(records.Header(metadata))
         with self.writing("the journal"):
-            self._lock, there = self._locked()
+            self._lock = self._locked()
         try:
-            self._take_over(overwrite, there)
+            self._take_over(overwrite)
         except BaseException:
             self.close()
             raise
@@ -206,32 +206,25 @@ class Store:
         with self.writing("the journal"):
             (self.folder / records.STOPPED).unlink(missing_ok=True)
 
-    def _locked(self) -> tuple[Lock, bool]:
-        """Return the lock of the journal, and whether its folder was there before."""
+    def _locked(self) -> Lock:
+        """Return the lock of the journal, in whose folder no other files are in the way."""
         while True:
-            try:
-                self.folder.mkdir()
-                there = False
-            except FileExistsError:
-                self.folder.mkdir(exist_ok=True)  # fails for another file of this name
-                there = True
+            there = self.folder.exists()
+            self.folder.mkdir(exist_ok=True)  # fails for another file of this name
             flush(self.path.parent)
-            known = there and names_a_run(self.folder / "lock")
-            if there and (foreign := records.foreign(self.folder, known)):
+            if there and (foreign := records.foreign(self.folder, names_a_run(self.folder / "lock"))):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
                 )
             with contextlib.suppress(FileNotFoundError):  # a run that just ended deleted the folder
-                return Lock(self.folder / "lock", self.path), there
+                return Lock(self.folder / "lock", self.path)
 
-    def _take_over(self, overwrite: bool, there: bool) -> None:
-        """Refuse or delete an existing output or unfinished run, whose folder is `there`."""
-        left, trials = (
-            (records.Journal(self.folder), records.TrialFolder(self.folder)) if there else (None, None)
-        )
+    def _take_over(self, overwrite: bool) -> None:
+        """Refuse or delete an existing output or unfinished run."""
+        left, trials = records.Journal(self.folder), records.TrialFolder(self.folder)
         if (left or trials) and not overwrite:
-            count, what = (len(trials.solutions), "lattice") if trials else (len(left or ()), "step")
+            count, what = (len(trials.solutions), "lattice") if trials else (len(left), "step")
             raise DeckError(
                 f"{self.folder} holds {counted(count, f'finished {what}')} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
@@ -254,8 +247,7 @@ class Store:
                         self._put_together(layout, left, left.complete)
                     if old is not None:
                         old.close()
-            if there:
-                records.remove_all(self.folder)
+            records.remove_all(self.folder)
 
     def __enter__(self) -> Self:
         """Return the store."""

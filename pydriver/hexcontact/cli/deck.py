@@ -72,8 +72,8 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
 
 @frame.command("hexcontact schema -o deck.schema.json")
 def schema(
-    output: Annotated[Path | None, frame.output_to("File to write; default: print it.")] = None,
-    study: Annotated[bool, frame.flag("study", "Write the schema of study files instead.")] = False,
+    output: Annotated[Path | None, frame.option("--output -o", "File to write; default: print it.")] = None,
+    study: Annotated[bool, frame.option("--study", "Write the schema of study files instead.")] = False,
 ) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
@@ -95,8 +95,10 @@ def schema(
 @frame.command("hexcontact new sphere")
 def new(
     name: Annotated[str | None, frame.argument("NAME", "Which starter deck.")] = None,
-    listing: Annotated[bool, frame.flag("list", "List the starter decks.")] = False,
-    output: Annotated[Path | None, frame.output_to("File to write; default: NAME.toml; - prints it.")] = None,
+    listing: Annotated[bool, frame.option("--list", "List the starter decks.")] = False,
+    output: Annotated[
+        Path | None, frame.option("--output -o", "File to write; default: NAME.toml; - prints it.")
+    ] = None,
 ) -> None:
     """Write a commented deck to start from."""
     from ..deck.toml import STARTERS, starter

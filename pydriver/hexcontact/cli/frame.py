@@ -45,46 +45,27 @@ _OTHER_FILES = (".png", ".pdf", ".svg", ".csv", ".html", ".json", ".vtk", ".vtu"
 
 def argument(metavar: str, help: str) -> Any:
     """Declare an argument of a command; the command itself tests whether it can read a file."""
-    return typer.Argument(metavar=metavar, help=_escaped(help), show_default=False, readable=False)
+    return typer.Argument(metavar=metavar, help=_plain(help), show_default=False, readable=False)
 
 
-def option(*names: str, help: str, metavar: str | None = None) -> Any:
-    """Declare an option, with a value unless its argument is a bool."""
-    return typer.Option(*names, metavar=metavar, help=_escaped(help), readable=False)
+def option(names: str, help: str, metavar: str | None = None) -> Any:
+    """Declare an option by its names, with blanks between; it has a value unless its argument is a bool."""
+    return typer.Option(*names.split(), metavar=metavar, help=_plain(help), readable=False)
 
 
-def output_to(help: str) -> Any:
-    """Declare the option for the file or folder to write."""
-    return option("--output", "-o", help=help)
-
-
-def steps_option(help: str) -> Any:
-    """Declare the option that selects load steps."""
-    return option("--step", "-s", metavar="N,...", help=help)
-
-
-def settings_option(help: str) -> Any:
-    """Declare the option that replaces keys."""
-    return option("--set", metavar="KEY=VALUE", help=f"{help}. Repeatable.")
-
-
-def flag(name: str, help: str) -> Any:
-    """Declare an option without a value."""
-    return option(f"--{name}", help=help)
-
-
-def _escaped(help: str) -> str:
+def _plain(help: str) -> str:
     return help.replace("[", r"\[")  # typer reads markup in it
 
 
 DeckFile = Annotated[Path, argument("DECK", "The deck, a TOML file.")]
 ResultFile = Annotated[Path, argument("FILE", "The result, a netCDF file.")]
 Settings = Annotated[
-    list[str] | None, settings_option("Replace a key of the deck, as grid.spacing='0.05 mm'")
+    list[str] | None,
+    option("--set", "Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable.", "KEY=VALUE"),
 ]
-Plot = Annotated[bool, flag("plot", "Draw the result beside the output (.png).")]
-Quiet = Annotated[bool, option("--quiet", "-q", help="Print nothing but errors.")]
-AsJson = Annotated[bool, flag("json", "Print one JSON object for programs, errors too; docs/running.md.")]
+Plot = Annotated[bool, option("--plot", "Draw the result beside the output (.png).")]
+Quiet = Annotated[bool, option("--quiet -q", "Print nothing but errors.")]
+AsJson = Annotated[bool, option("--json", "Print one JSON object for programs, errors too; docs/running.md.")]
 
 
 Source = enum.StrEnum("Source", ["edges", "nodes"])
@@ -92,9 +73,7 @@ Source = enum.StrEnum("Source", ["edges", "nodes"])
 
 Shown = Annotated[
     Source | None,
-    option(
-        "--source", help="Tractions to the edges between the nodes (default if known), or as solved at nodes."
-    ),
+    option("--source", "Tractions to the edges between the nodes (default if known), or as solved at nodes."),
 ]
 
 
@@ -104,11 +83,11 @@ LogLevel = enum.StrEnum("LogLevel", ["debug", "info", "warning", "error"])
 
 LogFile = Annotated[
     Path | None,
-    option("--log-file", metavar="LOG", help="Append a line for each load step, with time and work."),
+    option("--log-file", "Append a line for each load step, with time and work.", "LOG"),
 ]
 Level = Annotated[
     LogLevel | None,
-    option("--log-level", help="Least level of the log; without LOG it goes to standard error."),
+    option("--log-level", "Least level of the log; without LOG it goes to standard error."),
 ]
 
 

@@ -71,48 +71,44 @@ def plot(
             "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
         ),
     ] = None,
-    what: Annotated[str, frame.option("--what", "-w", help="Which picture; see above.")] = "overview",
+    what: Annotated[str, frame.option("--what -w", "Which picture; see above.")] = "overview",
     step: Annotated[
         str | None,
-        frame.steps_option(
+        frame.option(
+            "--step -s",
             "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
-            "10,20,30 or 10-30 or all. The label of a segment is its last step."
+            "10,20,30 or 10-30 or all. The label of a segment is its last step.",
+            "N,...",
         ),
     ] = None,
     angle: Annotated[
         str | None,
-        frame.option(
-            "--angle", metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."
-        ),
+        frame.option("--angle", "Direction of the line of section and tractions from x, degrees.", "ANGLE"),
     ] = None,
     through: Annotated[
         str | None,
-        frame.option(
-            "--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."
-        ),
+        frame.option("--through", "A point of that line, as 10um,0um; default: the center.", "X,Y"),
     ] = None,
     cycle: Annotated[
         str | None,
-        frame.option(
-            "--cycle", metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."
-        ),
+        frame.option("--cycle", "Cycles of loop and torsion: 2, or 1,2, or all; -1: the last.", "N,..."),
     ] = None,
     over: Annotated[
         str | None,
-        frame.option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
+        frame.option("--over", "Variable of the horizontal axis, as tangential_load_x.", "NAME"),
     ] = None,
     arrows: Annotated[
         Arrows | None,
-        frame.option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step."),
+        frame.option("--arrows", "Arrows on zone maps: shear traction, or slip in the step."),
     ] = None,
     source: frame.Shown = None,
     output: Annotated[
         Path | None,
-        frame.output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."),
+        frame.option(
+            "--output -o", "Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
+        ),
     ] = None,
-    format: Annotated[
-        Format | None, frame.option("--format", "-f", help="Format where --output names none.")
-    ] = None,
+    format: Annotated[Format | None, frame.option("--format -f", "Format where --output names none.")] = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
     from ..interior.files import read_table

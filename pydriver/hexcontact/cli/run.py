@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 def run(
     deck: frame.DeckFile,
     output: Annotated[
-        Path | None, frame.output_to("File to write; default: the deck's output.file, or DECK.nc here.")
+        Path | None,
+        frame.option("--output -o", "File to write; default: the deck's output.file, or DECK.nc here."),
     ] = None,
-    overwrite: Annotated[bool, frame.flag("overwrite", "Replace an existing output.")] = False,
+    overwrite: Annotated[bool, frame.option("--overwrite", "Replace an existing output.")] = False,
     again: Annotated[
-        bool, frame.flag("resume", "Resume an interrupted run of this deck; keep a finished result.")
+        bool, frame.option("--resume", "Resume an interrupted run of this deck; keep a finished result.")
     ] = False,
     plot: frame.Plot = False,
     quiet: frame.Quiet = False,
@@ -69,7 +70,11 @@ def resume(
     log_level: frame.Level = None,
     settings: Annotated[
         list[str] | None,
-        frame.settings_option("Change the solver for the further steps, as solver.tolerance=1e-7"),
+        frame.option(
+            "--set",
+            "Change the solver for the further steps, as solver.tolerance=1e-7. Repeatable.",
+            "KEY=VALUE",
+        ),
     ] = None,
 ) -> frame.Content:
     """Resume a run that was interrupted or killed, ran out of disk or did not converge.

@@ -38,7 +38,9 @@ def info(file: frame.ResultFile, as_json: frame.AsJson = False) -> frame.Content
 @frame.command("hexcontact report fretting.nc")
 def report(
     file: frame.ResultFile,
-    output: Annotated[Path | None, frame.output_to("Page to write (.html); default: FILE.html.")] = None,
+    output: Annotated[
+        Path | None, frame.option("--output -o", "Page to write (.html); default: FILE.html.")
+    ] = None,
 ) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
     from ..result.store import open_result
@@ -52,23 +54,27 @@ def export(
     file: frame.ResultFile,
     vtk: Annotated[
         bool,
-        frame.flag(
-            "vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
+        frame.option(
+            "--vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
         ),
     ] = False,
-    ugrid: Annotated[bool, frame.flag("ugrid", "A netCDF file with the fields on a mesh.")] = False,
+    ugrid: Annotated[bool, frame.option("--ugrid", "A netCDF file with the fields on a mesh.")] = False,
     csv: Annotated[
-        bool, frame.flag("csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields.")
+        bool,
+        frame.option("--csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields."),
     ] = False,
     histories: Annotated[
-        bool, frame.flag("histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
+        bool, frame.option("--histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
     ] = False,
     step: Annotated[
-        str | None, frame.steps_option("Only these load steps, as 10,20 or 10-30 or a label; -1: the last.")
+        str | None,
+        frame.option(
+            "--step -s", "Only these load steps, as 10,20 or 10-30 or a label; -1: the last.", "N,..."
+        ),
     ] = None,
     source: frame.Shown = None,
     output: Annotated[
-        Path | None, frame.output_to("Folder to write into; default: FILE_export beside FILE.")
+        Path | None, frame.option("--output -o", "Folder to write into; default: FILE_export beside FILE.")
     ] = None,
 ) -> None:
     """Write a result for other programs; of a study the table of its cases, of a table its values."""

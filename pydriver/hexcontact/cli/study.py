@@ -29,28 +29,30 @@ def study(
     file: Annotated[Path, frame.argument("STUDY", "The study, a TOML file.")],
     output: Annotated[
         Path | None,
-        frame.output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it."),
+        frame.option(
+            "--output -o", "Result; default: the study's output, or STUDY.nc here. Cases go beside it."
+        ),
     ] = None,
     jobs: Annotated[
-        int | None, frame.option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+        int | None, frame.option("--jobs -j", "Cases at a time on this machine; default: the cores.")
     ] = None,
     dask: Annotated[
         str | None,
-        frame.option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786."),
+        frame.option("--dask", "Run on a Dask cluster, as tcp://host:8786.", "ADDRESS"),
     ] = None,
-    slurm: Annotated[bool, frame.flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
+    slurm: Annotated[bool, frame.option("--slurm", "Run nothing; print a job array for sbatch.")] = False,
     case: Annotated[
         str | None,
-        frame.option("--case", metavar="N,...", help="Run only these cases, as a task does: 3, or 1,4-6."),
+        frame.option("--case", "Run only these cases, as a task does: 3, or 1,4-6.", "N,..."),
     ] = None,
-    collect: Annotated[bool, frame.flag("collect", "Run nothing; combine the finished cases.")] = False,
+    collect: Annotated[bool, frame.option("--collect", "Run nothing; combine the finished cases.")] = False,
     plan: Annotated[
-        bool, frame.option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
+        bool, frame.option("--plan --dry-run", "Run nothing; print all cases and their states.")
     ] = False,
     skip_invalid: Annotated[
-        bool, frame.option("--skip-invalid", help="Leave out invalid cases, and name each.")
+        bool, frame.option("--skip-invalid", "Leave out invalid cases, and name each.")
     ] = False,
-    retry: Annotated[bool, frame.flag("retry", "Repeat cases that failed.")] = False,
+    retry: Annotated[bool, frame.option("--retry", "Repeat cases that failed.")] = False,
     quiet: frame.Quiet = False,
     as_json: frame.AsJson = False,
     log_file: frame.LogFile = None,

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from ..errors import DeckError, PlausibilityWarning
 from ..text import TextTable, counted, quantity
 from ..variables import VARIABLES
-from .frame import AsJson, Content, argument, command, flag, print_error
+from .frame import AsJson, Content, argument, command, option, print_error
 
 Check = Mapping[str, Any]
 """An entry of the self-test: name, title, note, deck, values."""
@@ -28,7 +28,7 @@ _WIDE = 150  # a narrow terminal wraps lines, it does not lose digits
 @command("hexcontact verify")
 def verify(
     names: Annotated[list[str] | None, argument("[NAME]...", "Which comparisons; default: all.")] = None,
-    listing: Annotated[bool, flag("list", "List the comparisons.")] = False,
+    listing: Annotated[bool, option("--list", "List the comparisons.")] = False,
     as_json: AsJson = False,
 ) -> Content:
     """Test the installation: solve a few contacts and compare them with known solutions.

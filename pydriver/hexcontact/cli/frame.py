@@ -16,10 +16,10 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec, get_type_hints
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from .. import launcher
 from .._version import __version__
@@ -57,38 +57,28 @@ def _plain(help: str) -> str:
     return help.replace("[", r"\[")  # typer reads markup in it
 
 
-DeckFile = Annotated[Path, argument("DECK", "The deck, a TOML file.")]
-ResultFile = Annotated[Path, argument("FILE", "The result, a netCDF file.")]
-Settings = Annotated[
-    list[str] | None,
-    option("--set", "Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable.", "KEY=VALUE"),
-]
-Plot = Annotated[bool, option("--plot", "Draw the result beside the output (.png).")]
-Quiet = Annotated[bool, option("--quiet -q", "Print nothing but errors.")]
-AsJson = Annotated[bool, option("--json", "Print one JSON object for programs, errors too; docs/running.md.")]
-
+OPTIONS = {
+    "deck": argument("DECK", "The deck, a TOML file."),
+    "file": argument("FILE", "The result, a netCDF file."),
+    "settings": option(
+        "--set", "Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable.", "KEY=VALUE"
+    ),
+    "source": option(
+        "--source", "Tractions to the edges between the nodes (default if known), or as solved at nodes."
+    ),
+    "plot": option("--plot", "Draw the result beside the output (.png)."),
+    "quiet": option("--quiet -q", "Print nothing but errors."),
+    "as_json": option("--json", "Print one JSON object for programs, errors too; docs/running.md."),
+    "log_file": option("--log-file", "Append a line for each load step, with time and work.", "LOG"),
+    "log_level": option("--log-level", "Least level of the log; without LOG it goes to standard error."),
+}
+"""Arguments and options of several commands, by the names of their parameters."""
 
 Source = enum.StrEnum("Source", ["edges", "nodes"])
 """Where pressure and shear traction come from."""
 
-Shown = Annotated[
-    Source | None,
-    option("--source", "Tractions to the edges between the nodes (default if known), or as solved at nodes."),
-]
-
-
 LogLevel = enum.StrEnum("LogLevel", ["debug", "info", "warning", "error"])
 """Levels of a log."""
-
-
-LogFile = Annotated[
-    Path | None,
-    option("--log-file", "Append a line for each load step, with time and work.", "LOG"),
-]
-Level = Annotated[
-    LogLevel | None,
-    option("--log-level", "Least level of the log; without LOG it goes to standard error."),
-]
 
 
 def setting(text: str) -> tuple[str, Any]:
@@ -412,11 +402,20 @@ app = typer.Typer(
 """The command, with the sub-commands of the modules that are imported."""
 
 
-def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
-    """Register a function, guarded, as the sub-command of its name; options as of `typer.Typer.command`."""
+def command(
+    example: str, *, short_help: str | None = None, cls: type[TyperCommand] | None = None, **declared: Any
+) -> Callable[[Callable[P, Content]], Callable[P, None]]:
+    """Register a function, guarded, as the sub-command of its name.
+
+    Each parameter is an argument or an option, as `declared` by its name, or by `OPTIONS`.
+    """
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:
-        return app.command(epilog=f"Example: {example}", **options)(guarded(function))
+        for name, kind in get_type_hints(function).items():
+            if name != "return":
+                function.__annotations__[name] = Annotated[kind, declared.get(name) or OPTIONS[name]]
+        add = app.command(cls=cls, short_help=short_help, epilog=f"Example: {example}")
+        return add(guarded(function))
 
     return register
 

@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
@@ -62,53 +62,39 @@ class _WithFigures(TyperCommand):
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
     cls=_WithFigures,
+    files=frame.argument(
+        "FILE",
+        "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
+    ),
+    what=frame.option("--what -w", "Which picture; see above."),
+    step=frame.option(
+        "--step -s",
+        "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
+        "10,20,30 or 10-30 or all. The label of a segment is its last step.",
+        "N,...",
+    ),
+    angle=frame.option("--angle", "Direction of the line of section and tractions from x, degrees.", "ANGLE"),
+    through=frame.option("--through", "A point of that line, as 10um,0um; default: the center.", "X,Y"),
+    cycle=frame.option("--cycle", "Cycles of loop and torsion: 2, or 1,2, or all; -1: the last.", "N,..."),
+    over=frame.option("--over", "Variable of the horizontal axis, as tangential_load_x.", "NAME"),
+    arrows=frame.option("--arrows", "Arrows on zone maps: shear traction, or slip in the step."),
+    output=frame.option(
+        "--output -o", "Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
+    ),
+    format=frame.option("--format -f", "Format where --output names none."),
 )
 def plot(
-    files: Annotated[
-        list[Path] | None,
-        frame.argument(
-            "FILE",
-            "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
-        ),
-    ] = None,
-    what: Annotated[str, frame.option("--what -w", "Which picture; see above.")] = "overview",
-    step: Annotated[
-        str | None,
-        frame.option(
-            "--step -s",
-            "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
-            "10,20,30 or 10-30 or all. The label of a segment is its last step.",
-            "N,...",
-        ),
-    ] = None,
-    angle: Annotated[
-        str | None,
-        frame.option("--angle", "Direction of the line of section and tractions from x, degrees.", "ANGLE"),
-    ] = None,
-    through: Annotated[
-        str | None,
-        frame.option("--through", "A point of that line, as 10um,0um; default: the center.", "X,Y"),
-    ] = None,
-    cycle: Annotated[
-        str | None,
-        frame.option("--cycle", "Cycles of loop and torsion: 2, or 1,2, or all; -1: the last.", "N,..."),
-    ] = None,
-    over: Annotated[
-        str | None,
-        frame.option("--over", "Variable of the horizontal axis, as tangential_load_x.", "NAME"),
-    ] = None,
-    arrows: Annotated[
-        Arrows | None,
-        frame.option("--arrows", "Arrows on zone maps: shear traction, or slip in the step."),
-    ] = None,
-    source: frame.Shown = None,
-    output: Annotated[
-        Path | None,
-        frame.option(
-            "--output -o", "Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
-        ),
-    ] = None,
-    format: Annotated[Format | None, frame.option("--format -f", "Format where --output names none.")] = None,
+    files: list[Path] | None = None,
+    what: str = "overview",
+    step: str | None = None,
+    angle: str | None = None,
+    through: str | None = None,
+    cycle: str | None = None,
+    over: str | None = None,
+    arrows: Arrows | None = None,
+    source: frame.Source | None = None,
+    output: Path | None = None,
+    format: Format | None = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
     from ..interior.files import read_table

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DeckError
 from ..solve.interruption import signal_pipe
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from .solving import Messages
 
 
-@frame.command("hexcontact run cases/hertz_spheres.toml --plot")
+@frame.command(
+    "hexcontact run cases/hertz_spheres.toml --plot",
+    output=frame.option("--output -o", "File to write; default: the deck's output.file, or DECK.nc here."),
+    overwrite=frame.option("--overwrite", "Replace an existing output."),
+    again=frame.option("--resume", "Resume an interrupted run of this deck; keep a finished result."),
+)
 def run(
-    deck: frame.DeckFile,
-    output: Annotated[
-        Path | None,
-        frame.option("--output -o", "File to write; default: the deck's output.file, or DECK.nc here."),
-    ] = None,
-    overwrite: Annotated[bool, frame.option("--overwrite", "Replace an existing output.")] = False,
-    again: Annotated[
-        bool, frame.option("--resume", "Resume an interrupted run of this deck; keep a finished result.")
-    ] = False,
-    plot: frame.Plot = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
-    settings: frame.Settings = None,
+    deck: Path,
+    output: Path | None = None,
+    overwrite: bool = False,
+    again: bool = False,
+    plot: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
+    settings: list[str] | None = None,
 ) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..core import ranks
@@ -60,22 +60,23 @@ def run(
         return messages.conclude(case, store, extent, target, picture)
 
 
-@frame.command("hexcontact resume fretting.nc")
+@frame.command(
+    "hexcontact resume fretting.nc",
+    file=frame.argument("FILE", "The output of the run."),
+    settings=frame.option(
+        "--set",
+        "Change the solver for the further steps, as solver.tolerance=1e-7. Repeatable.",
+        "KEY=VALUE",
+    ),
+)
 def resume(
-    file: Annotated[Path, frame.argument("FILE", "The output of the run.")],
-    plot: frame.Plot = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
-    settings: Annotated[
-        list[str] | None,
-        frame.option(
-            "--set",
-            "Change the solver for the further steps, as solver.tolerance=1e-7. Repeatable.",
-            "KEY=VALUE",
-        ),
-    ] = None,
+    file: Path,
+    plot: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
+    settings: list[str] | None = None,
 ) -> frame.Content:
     """Resume a run that was interrupted or killed, ran out of disk or did not converge.
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 from ..errors import DeckError
 from . import frame
 
 
 @frame.command("hexcontact info hertz_spheres.nc")
-def info(file: frame.ResultFile, as_json: frame.AsJson = False) -> frame.Content:
+def info(file: Path, as_json: bool = False) -> frame.Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
     from ..interior.files import content_of, description
     from ..result.store import open_result
@@ -35,13 +34,11 @@ def info(file: frame.ResultFile, as_json: frame.AsJson = False) -> frame.Content
     return None
 
 
-@frame.command("hexcontact report fretting.nc")
-def report(
-    file: frame.ResultFile,
-    output: Annotated[
-        Path | None, frame.option("--output -o", "Page to write (.html); default: FILE.html.")
-    ] = None,
-) -> None:
+@frame.command(
+    "hexcontact report fretting.nc",
+    output=frame.option("--output -o", "Page to write (.html); default: FILE.html."),
+)
+def report(file: Path, output: Path | None = None) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
     from ..result.store import open_result
     from .report import write_report
@@ -49,33 +46,30 @@ def report(
     frame.print_output(f"written: {write_report(open_result(file), output or frame.beside(file, '.html'))}")
 
 
-@frame.command("hexcontact export fretting.nc --vtk")
+@frame.command(
+    "hexcontact export fretting.nc --vtk",
+    vtk=frame.option(
+        "--vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
+    ),
+    ugrid=frame.option("--ugrid", "A netCDF file with the fields on a mesh."),
+    csv=frame.option("--csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields."),
+    histories=frame.option(
+        "--histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue."
+    ),
+    step=frame.option(
+        "--step -s", "Only these load steps, as 10,20 or 10-30 or a label; -1: the last.", "N,..."
+    ),
+    output=frame.option("--output -o", "Folder to write into; default: FILE_export beside FILE."),
+)
 def export(
-    file: frame.ResultFile,
-    vtk: Annotated[
-        bool,
-        frame.option(
-            "--vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
-        ),
-    ] = False,
-    ugrid: Annotated[bool, frame.option("--ugrid", "A netCDF file with the fields on a mesh.")] = False,
-    csv: Annotated[
-        bool,
-        frame.option("--csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields."),
-    ] = False,
-    histories: Annotated[
-        bool, frame.option("--histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
-    ] = False,
-    step: Annotated[
-        str | None,
-        frame.option(
-            "--step -s", "Only these load steps, as 10,20 or 10-30 or a label; -1: the last.", "N,..."
-        ),
-    ] = None,
-    source: frame.Shown = None,
-    output: Annotated[
-        Path | None, frame.option("--output -o", "Folder to write into; default: FILE_export beside FILE.")
-    ] = None,
+    file: Path,
+    vtk: bool = False,
+    ugrid: bool = False,
+    csv: bool = False,
+    histories: bool = False,
+    step: str | None = None,
+    source: frame.Source | None = None,
+    output: Path | None = None,
 ) -> None:
     """Write a result for other programs; of a study the table of its cases, of a table its values."""
     if not (vtk or ugrid or csv or histories):

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from .. import launcher
 from ..errors import DeckError
@@ -24,39 +24,36 @@ _SOME_FAILED = 3  # exit code of a study with failed or missing cases
 _MOST_NAMED = 20  # failures listed at the end
 
 
-@frame.command("hexcontact study cases/study_friction.toml --jobs 4")
+@frame.command(
+    "hexcontact study cases/study_friction.toml --jobs 4",
+    file=frame.argument("STUDY", "The study, a TOML file."),
+    output=frame.option(
+        "--output -o", "Result; default: the study's output, or STUDY.nc here. Cases go beside it."
+    ),
+    jobs=frame.option("--jobs -j", "Cases at a time on this machine; default: the cores."),
+    dask=frame.option("--dask", "Run on a Dask cluster, as tcp://host:8786.", "ADDRESS"),
+    slurm=frame.option("--slurm", "Run nothing; print a job array for sbatch."),
+    case=frame.option("--case", "Run only these cases, as a task does: 3, or 1,4-6.", "N,..."),
+    collect=frame.option("--collect", "Run nothing; combine the finished cases."),
+    plan=frame.option("--plan --dry-run", "Run nothing; print all cases and their states."),
+    skip_invalid=frame.option("--skip-invalid", "Leave out invalid cases, and name each."),
+    retry=frame.option("--retry", "Repeat cases that failed."),
+)
 def study(
-    file: Annotated[Path, frame.argument("STUDY", "The study, a TOML file.")],
-    output: Annotated[
-        Path | None,
-        frame.option(
-            "--output -o", "Result; default: the study's output, or STUDY.nc here. Cases go beside it."
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None, frame.option("--jobs -j", "Cases at a time on this machine; default: the cores.")
-    ] = None,
-    dask: Annotated[
-        str | None,
-        frame.option("--dask", "Run on a Dask cluster, as tcp://host:8786.", "ADDRESS"),
-    ] = None,
-    slurm: Annotated[bool, frame.option("--slurm", "Run nothing; print a job array for sbatch.")] = False,
-    case: Annotated[
-        str | None,
-        frame.option("--case", "Run only these cases, as a task does: 3, or 1,4-6.", "N,..."),
-    ] = None,
-    collect: Annotated[bool, frame.option("--collect", "Run nothing; combine the finished cases.")] = False,
-    plan: Annotated[
-        bool, frame.option("--plan --dry-run", "Run nothing; print all cases and their states.")
-    ] = False,
-    skip_invalid: Annotated[
-        bool, frame.option("--skip-invalid", "Leave out invalid cases, and name each.")
-    ] = False,
-    retry: Annotated[bool, frame.option("--retry", "Repeat cases that failed.")] = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
+    file: Path,
+    output: Path | None = None,
+    jobs: int | None = None,
+    dask: str | None = None,
+    slurm: bool = False,
+    case: str | None = None,
+    collect: bool = False,
+    plan: bool = False,
+    skip_invalid: bool = False,
+    retry: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
 ) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
     from ..deck.toml import read_toml

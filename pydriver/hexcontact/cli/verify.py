@@ -12,12 +12,12 @@ import math
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Any
 
 from ..errors import DeckError, PlausibilityWarning
 from ..text import TextTable, counted, quantity
 from ..variables import VARIABLES
-from .frame import AsJson, Content, argument, command, option, print_error
+from .frame import Content, argument, command, option, print_error
 
 Check = Mapping[str, Any]
 """An entry of the self-test: name, title, note, deck, values."""
@@ -25,12 +25,12 @@ Check = Mapping[str, Any]
 _WIDE = 150  # a narrow terminal wraps lines, it does not lose digits
 
 
-@command("hexcontact verify")
-def verify(
-    names: Annotated[list[str] | None, argument("[NAME]...", "Which comparisons; default: all.")] = None,
-    listing: Annotated[bool, option("--list", "List the comparisons.")] = False,
-    as_json: AsJson = False,
-) -> Content:
+@command(
+    "hexcontact verify",
+    names=argument("[NAME]...", "Which comparisons; default: all."),
+    listing=option("--list", "List the comparisons."),
+)
+def verify(names: list[str] | None = None, listing: bool = False, as_json: bool = False) -> Content:
     """Test the installation: solve a few contacts and compare them with known solutions.
 
     Exit code 1 if a comparison fails.

@@ -129,6 +129,17 @@ def beside(file: Path, ending: str) -> Path:
     return there.parent / f"{there.stem}{ending}"
 
 
+def opened(file: Path) -> tuple[str, Path, Any]:
+    """Return the kind of a file, "study", "table" or "result", its path, and the data of the first two."""
+    from ..interior.files import read_table
+    from ..study.dataset import read_study, study_of
+
+    if (path := study_of(file)) is not None:
+        return "study", path, read_study(path)
+    table = read_table(file)
+    return "result" if table is None else "table", file, table
+
+
 def case_of(deck: Path, settings: list[str] | None) -> Problem:
     """Return the case of a deck with the keys that ``--set`` replaces."""
     from ..problem.problem import Problem

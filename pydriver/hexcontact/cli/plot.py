@@ -97,10 +97,8 @@ def plot(
     format: Format | None = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
-    from ..interior.files import read_table
     from ..plotting.registry import entries
     from ..result.store import open_result
-    from ..study.dataset import read_study, study_of
 
     figures = entries()
     if what not in (known := [*figures, _ALL]):
@@ -109,17 +107,18 @@ def plot(
         raise DeckError(f"--what {what}: expected the FILE of a result")
     if output and format:
         raise DeckError(f"--format {format}: the name of --output {output} has a format already")
+    options = {"step": step, "cycle": cycle, "angle": angle, "through": through, "over": over}
+    options |= {"arrows": arrows, "source": source}
+    given = {name: text for name, text in options.items() if text is not None}
+    suffix = f".{format or 'png'}"
     if what in figures and figures[what].shows == "deck":
-        options = (step, angle, through, cycle, over, arrows, source)
-        if len(files) > 1 or any(one is not None for one in options):
+        if len(files) > 1 or given:
             raise DeckError(f"--what {what}: expected one deck, and no other options but --output, --format")
-        picture = output or frame.beside(files[0], f"_{what}.{format or 'png'}")
+        picture = output or frame.beside(files[0], f"_{what}{suffix}")
         figure = figures[what].draw(frame.case_of(files[0], None))
         frame.print_output(f"written: {_save(figure, f'{what} of {files[0]}', picture)}")
         return
-    study = study_of(files[0]) if len(files) == 1 else None
-    table = read_table(files[0]) if len(files) == 1 and study is None else None
-    holds = "study" if study is not None else "table" if table is not None else "result"
+    holds, path, data = frame.opened(files[0]) if len(files) == 1 else ("result", files[0], None)
     if holds != "result" and what == "overview":
         what = holds
     shows = "result" if what == _ALL else figures[what].shows
@@ -127,33 +126,22 @@ def plot(
         words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
         kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
-    results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
-    cycles = len(results[0].cycles) if cycle is not None and results else 0
-    given = {
-        "step": None
-        if step is None
-        else frame.steps_of(step, frame.labels_of(results[0]) if results else [""]),
-        "cycle": None if cycle is None else frame.steps_of(cycle, [""] * cycles, "cycle"),
-        "angle": None if angle is None else angle_of(angle),
-        "through": None if through is None else point_of(through),
-        "over": over,
-        "arrows": None if arrows is None else arrows.value,
-        "source": None if source is None else source.value,
+    results = [open_result(file) for file in files] if holds == "result" else []
+    parsers = {
+        "step": lambda text: frame.steps_of(text, frame.labels_of(results[0]) if results else [""]),
+        "cycle": lambda text: frame.steps_of(text, [""] * len(results and results[0].cycles), "cycle"),
+        "angle": angle_of,
+        "through": point_of,
     }
-    chosen = {name: value for name, value in given.items() if value is not None}
-    suffix = f".{format or 'png'}"
+    chosen = {name: parsers.get(name, str)(text) for name, text in given.items()}
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
         first = output or frame.beside(files[0], suffix)
         frame.print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
-    if study is not None:
-        files, results = [study], [read_study(study)]
-    elif table is not None:
-        results = [table]
-    picture = output or frame.beside(files[0], f"_{what}{suffix}")
-    frame.print_output(f"written: {picture_of(results, what, picture, chosen)}")
+    picture = output or frame.beside(path, f"_{what}{suffix}")
+    frame.print_output(f"written: {picture_of(results or [data], what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.measures import half_axes
@@ -189,25 +189,19 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:
     """Return the columns of a table of load steps by their headers, with or without estimated errors."""
-
-    def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
-        return lambda history: entry(history) + (words.error_of(name, history) if with_errors else "")
-
+    write = words.with_error if with_errors else words.value_of
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
-    for name in words.worth_showing(histories):
-        columns[label_of(name)] = column(functools.partial(words.load_or_motion, name), name)
+    columns |= {label_of(name): partial(write, name) for name in words.worth_showing(histories)}
     if words.is_frictional(histories[-1]):
-        columns["stick"] = column(words.stick_share, "stick_area")
+        columns["stick"] = partial(words.stick_share, with_error=with_errors)
     else:
-        columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
+        columns["p_max"] = partial(write, "max_pressure")
         if any(words.repeats(history) for history in histories):
             columns["contact area"] = lambda h: words.contact_size(h)[1]
         elif any(half_axes(history) for history in histories):
             columns["half-axes"] = lambda h: words.contact_size(h)[1]
         else:
-            columns["radius"] = column(
-                lambda h: quantity(words.fitted("contact_radius", h), "m"), "contact_radius"
-            )
+            columns["radius"] = partial(write, "contact_radius")
     columns["residual"] = lambda h: f"{max(words.residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
     return columns

@@ -38,7 +38,7 @@ from ..plotting.maps import Limits, Part
 from ..plotting.sections import line_of
 from ..problem.preview import case_rows
 from ..problem.problem import Problem
-from ..result.history_words import load_or_motion, rolled_steps, rolls, step_rows, worth_showing
+from ..result.history_words import rolled_steps, rolls, step_rows, value_of, worth_showing
 from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, mapped_steps
@@ -185,7 +185,7 @@ def _loads(histories: Sequence[printed.History]) -> printed.Table:
     for segment, history in ends.items():
         steps = f"{before + 1} to {history['step']}" if history["step"] > before + 1 else str(history["step"])
         rows.append(
-            (str(segment), str(history.get("label", "")), steps, *(load_or_motion(n, history) for n in names))
+            (str(segment), str(history.get("label", "")), steps, *(value_of(n, history) for n in names))
         )
         before = history["step"]
     symbols = [label_of(name) for name in names]

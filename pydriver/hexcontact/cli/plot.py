@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
-from ..deck.units import ANGLE, LENGTH, UnitError, to_si
+from ..deck.units import ANGLE, LENGTH, Dimension, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
@@ -126,7 +126,7 @@ def plot(
         words = {"study": "the result of a study", "table": "a table [[stress]] or [[fatigue]]"}
         kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
-    results = [open_result(file) for file in files] if holds == "result" else []
+    results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
     parsers = {
         "step": lambda text: frame.steps_of(text, frame.labels_of(results[0]) if results else [""]),
         "cycle": lambda text: frame.steps_of(text, [""] * len(results and results[0].cycles), "cycle"),
@@ -150,8 +150,7 @@ def plot(
 def angle_of(text: str) -> float:
     """Return an angle (rad) from text; a bare number is in degrees."""
     try:
-        number = _number_or_text(text)
-        return to_si(number, ANGLE) if isinstance(number, str) else math.radians(number)
+        return _quantity_of(text, ANGLE, math.radians(1.0))
     except UnitError as error:
         raise DeckError(f"--angle {text}: expected an angle such as 30 or 0.5rad{_because(error)}") from None
 
@@ -159,17 +158,18 @@ def angle_of(text: str) -> float:
 def point_of(text: str) -> tuple[float, float]:
     """Return a point (m) from text such as "10um,0um"."""
     try:
-        x, y = (to_si(_number_or_text(part), LENGTH) for part in text.split(","))
+        x, y = (_quantity_of(part, LENGTH, 1.0) for part in text.split(","))
     except ValueError as error:
         raise DeckError(f"--through {text}: expected two lengths such as 10um,0um{_because(error)}") from None
     return x, y
 
 
-def _number_or_text(text: str) -> float | str:
+def _quantity_of(text: str, dimension: Dimension, bare: float) -> float:
+    """Return a quantity in SI from text; `bare` is the unit of a number without one."""
     try:
-        return float(text)
+        return bare * float(text)
     except ValueError:
-        return text
+        return to_si(text, dimension)
 
 
 def _because(error: ValueError) -> str:

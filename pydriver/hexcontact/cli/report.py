@@ -38,7 +38,7 @@ from ..plotting.maps import Limits, Part
 from ..plotting.sections import line_of
 from ..problem.preview import case_rows
 from ..problem.problem import Problem
-from ..result.history_words import rolled_steps, rolls, step_rows, value_of, worth_showing
+from ..result.history_words import rolled_steps, rolls, segments, step_rows, value_of, worth_showing
 from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, mapped_steps
@@ -179,17 +179,13 @@ def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tu
 
 def _loads(histories: Sequence[printed.History]) -> printed.Table:
     """Return the loads at the end of each segment as a table."""
-    ends = {int(history.get("segment", 1)): history for history in histories}
-    names = worth_showing(histories)
-    rows, before = [], 0
-    for segment, history in ends.items():
-        steps = f"{before + 1} to {history['step']}" if history["step"] > before + 1 else str(history["step"])
-        rows.append(
-            (str(segment), str(history.get("label", "")), steps, *(value_of(n, history) for n in names))
-        )
-        before = history["step"]
-    symbols = [label_of(name) for name in names]
-    return ("segment", "label", "steps", *symbols), rows
+    names, rows = worth_showing(histories), []
+    for part in segments(histories):
+        first, last = part["first_step"], part["last_step"]
+        steps = f"{first} to {last}" if first < last else f"{last}"
+        loads = (value_of(name, histories[last - 1]) for name in names)
+        rows.append((f"{part['segment']}", part["label"], steps, *loads))
+    return ("segment", "label", "steps", *map(label_of, names)), rows
 
 
 def _below(result: Result) -> printed.Table:
@@ -228,21 +224,18 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _residuals(histories: Sequence[printed.History]) -> printed.Table:
-    signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
+    """Return residuals and work of each load step as a table."""
+    signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
     rows = [
         (
-            str(h["step"]),
-            str(h.get("label", "")),
-            *(f"{float(h[RESIDUALS[sign]]):.1e}" for sign in signs),
-            str(h["sweeps"]),
-            str(h.get("cuts", 0)),
-            f"{float(h['operator_applications']):.3g}",
+            *(str(h["step"]), str(h.get("label", ""))),
+            *(f"{float(h[name]):.1e}" for name in signs.values()),
+            *(str(h["sweeps"]), str(h.get("cuts", 0)), f"{float(h['operator_applications']):.3g}"),
             quantity(float(h["seconds"]), "s", 3),
         )
         for h in histories
     ]
-    headers = ("step", "label", *signs, "iterations", "halved", "operator applications", "time")
-    return headers, rows
+    return ("step", "label", *signs, "iterations", "halved", "operator applications", "time"), rows
 
 
 # --- data of charts and maps -------------------------------------------------------------------------

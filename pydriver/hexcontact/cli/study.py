@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from . import frame
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
-    from ..study.study import Outcome, PlannedCase, Study
+    from ..study.study import Outcome, Study
     from .solving import Messages
 
 _SOME_FAILED = 3  # exit code of a study with failed or missing cases
@@ -60,7 +59,10 @@ def study(
     from ..study.study import Study, study_reporter
     from .solving import Messages
 
-    if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
+    options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}
+    options["--plan"] = plan
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    if len(given) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
@@ -70,9 +72,8 @@ def study(
         launcher.refuse_copies("study does not use MPI", "and set OMP_NUM_THREADS to use more cores")
     messages = Messages("study", quiet, as_json, log_file, log_level)
     if "creep_table" in read_toml(file, "a study")[0]:
-        options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}
-        options |= {"--plan": plan, "--skip-invalid": skip_invalid, "--retry": retry}
-        if given := [name for name, value in options.items() if value not in (None, False)]:
+        given += ["--skip-invalid"] * skip_invalid + ["--retry"] * retry
+        if given:
             raise DeckError(f"{given[0]}: expected no such option with a creep table, which is one case")
         return _creep_table(file, output, messages)
     unchecked = case is not None or (collect and not skip_invalid)
@@ -104,7 +105,7 @@ def study(
         else:
             listener = study_reporter(messages.silent)
             _run_missing(planned, jobs=jobs, dask=dask, retry=retry, listener=listener)
-    state = _State.of(planned)
+    state = _State(planned)
     state.report(quiet or as_json)
     if as_json:
         return {"exit_code": state.exit_code, **state.content()}
@@ -156,25 +157,14 @@ def _plan(study: Study, as_json: bool) -> frame.Content:
     return None
 
 
-@dataclass(frozen=True)
 class _State:
-    """State of a study: numbers of finished and of missing cases, and the failed cases."""
+    """State of a study from the files of its cases, with the exit code of the command."""
 
-    study: Study
-    done: int
-    failures: Sequence[tuple[PlannedCase, Outcome]]
-    missing: int
-
-    @classmethod
-    def of(cls, study: Study) -> _State:
-        """Return the state from the files of the cases."""
-        done, failures = sum(study.folder.done(case) for case in study.cases), study.failures()
-        return cls(study, done, failures, len(study) - done - len(failures) - len(study.invalid))
-
-    @property
-    def exit_code(self) -> int:
-        """Exit code of the command."""
-        return _SOME_FAILED if self.failures or self.missing else 0
+    def __init__(self, study: Study) -> None:
+        self.study, self.failures = study, study.failures()
+        self.done = sum(study.folder.done(case) for case in study.cases)
+        self.missing = len(study) - self.done - len(self.failures) - len(study.invalid)
+        self.exit_code = _SOME_FAILED if self.failures or self.missing else 0
 
     def report(self, quiet: bool) -> None:
         """Print the number of finished cases, and why cases failed."""
@@ -248,7 +238,7 @@ def _run_missing(study: Study, **options: Any) -> None:
     def work() -> None:
         try:
             study.run(cancel=cancel, **options)
-            if not _State.of(study).missing:
+            if not _State(study).missing:
                 complete.set()
         finally:
             over.set()
@@ -262,9 +252,7 @@ def _run_missing(study: Study, **options: Any) -> None:
         with signal_pipe() as pipe:
             in_background(work, pipe, ends)
     except Interrupted as signaled:
-        saved = (
-            f"{_State.of(study).done} of {counted(len(study), 'case is', 'cases are')} finished and recorded"
-        )
+        saved = f"{_State(study).done} of {counted(len(study), 'case is', 'cases are')} finished and recorded"
         message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"
         raise frame.Failure(message, signaled.exit_code) from None
 

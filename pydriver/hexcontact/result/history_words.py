@@ -131,18 +131,15 @@ def extent_of(step: Any) -> Extent | None:
         zones = step.bands("zone") if "zone" in step.fields else ()
     else:
         zones = [] if (zone := getattr(step, "zone", None)) is None else [(step, np.asarray(zone))]
-    if not (bounds := [*_bounds(zones)]):
-        return None
-    low, high = np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]
-    return float(high[0] - low[0]), float(high[1] - low[1])
-
-
-def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]:
-    """Yield the smallest and largest x and y of the nodes in contact, by bands of zones that have some."""
+    corners = []  # of the nodes in contact of each band
     for nodes, zone in zones:
         if (inside := zone > 0).any():
             x, y = np.asarray(nodes.x)[inside], np.asarray(nodes.y)[inside]
-            yield np.array([[x.min(), y.min()], [x.max(), y.max()]])
+            corners.append([[x.min(), y.min()], [x.max(), y.max()]])
+    if not corners:
+        return None
+    low, high = np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]
+    return float(high[0] - low[0]), float(high[1] - low[1])
 
 
 def _moments(history: History, extent: Extent | None) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DeckError
 from ..files import beginning, replacing
-from ..text import did_you_mean, listed, visible
+from ..text import Table, did_you_mean, listed, visible
 from . import frame
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def check(deck: Path, settings: list[str] | None = None, as_json: bool = False) 
 
     case = frame.case_of(deck, settings)
     if not as_json:
-        printed.console().print(printed.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
+        printed.console().print(Table(("", ""), case_rows(case, peak_memory), case.title or deck.stem))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first possible result
     require_memory(first, first.lattice)
     target = frame.target_of(case, deck)

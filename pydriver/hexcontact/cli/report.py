@@ -42,7 +42,7 @@ from ..result.history_words import rolled_steps, rolls, segments, step_rows, val
 from ..result.html import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, mapped_steps
-from ..text import counted, quantity, scaled, visible, worded
+from ..text import Table, counted, quantity, scaled, visible, worded
 from ..variables import LOADS, MAPS, RESIDUALS, ROLLED, TRACTIONS, VARIABLES, label_of, spelled
 from . import printed
 
@@ -177,7 +177,7 @@ def _provenance(result: Result, histories: Sequence[printed.History]) -> list[tu
     ]
 
 
-def _loads(histories: Sequence[printed.History]) -> printed.Table:
+def _loads(histories: Sequence[printed.History]) -> Table:
     """Return the loads at the end of each segment as a table."""
     names, rows = worth_showing(histories), []
     for part in segments(histories):
@@ -185,10 +185,10 @@ def _loads(histories: Sequence[printed.History]) -> printed.Table:
         steps = f"{first} to {last}" if first < last else f"{last}"
         loads = (value_of(name, histories[last - 1]) for name in names)
         rows.append((f"{part['segment']}", part["label"], steps, *loads))
-    return ("segment", "label", "steps", *map(label_of, names)), rows
+    return Table(("segment", "label", "steps", *map(label_of, names)), rows)
 
 
-def _below(result: Result) -> printed.Table:
+def _below(result: Result) -> Table:
     """Return the tables [[stress]] and [[fatigue]] of the deck, with their files, as a table."""
     rows = []
     for name, table in tables_of(result.deck).items():
@@ -202,7 +202,7 @@ def _below(result: Result) -> printed.Table:
         places = [f"{key}: {place}" for key, field in fields.items() if (place := place_of(field))]
         shown = ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))
         rows.append((file.name, *shown, "; ".join(places)))
-    return ("file", "quantities", "body", "load steps", "largest values"), rows
+    return Table(("file", "quantities", "body", "load steps", "largest values"), rows)
 
 
 def _pictures(result: Result) -> Iterator[tuple[str, str]]:
@@ -223,7 +223,7 @@ def _pictures(result: Result) -> Iterator[tuple[str, str]]:
             yield title, base64.b64encode(data.getvalue()).decode()
 
 
-def _residuals(histories: Sequence[printed.History]) -> printed.Table:
+def _residuals(histories: Sequence[printed.History]) -> Table:
     """Return residuals and work of each load step as a table."""
     signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
     rows = [
@@ -235,7 +235,7 @@ def _residuals(histories: Sequence[printed.History]) -> printed.Table:
         )
         for h in histories
     ]
-    return ("step", "label", *signs, "iterations", "halved", "operator applications", "time"), rows
+    return Table(("step", "label", *signs, "iterations", "halved", "operator applications", "time"), rows)
 
 
 # --- data of charts and maps -------------------------------------------------------------------------

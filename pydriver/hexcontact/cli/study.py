@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .. import launcher
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
-from ..text import counted, text_table
+from ..text import Table, counted
 from . import frame
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _plan(study: Study, as_json: bool) -> frame.Content:
         (str(number), *(in_short(case.settings.get(axis.key, "-")) for axis in study.plan.axes), state)
         for number, case, state in cases
     ]
-    print(text_table(headers, rows))
+    print(Table(headers, rows))
     counts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     frame.print_output(f"{study.title}: {counted(len(study), 'case')}, {', '.join(counts)}")
     return None

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import DeckError, PlausibilityWarning
-from ..text import TextTable, counted, quantity
+from ..text import Table, counted, quantity
 from ..variables import VARIABLES
 from .frame import Content, argument, command, option, print_error
 
@@ -114,7 +114,7 @@ def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
     ]
     screen = console()
     screen.width = max(screen.width, _WIDE)
-    screen.print(TextTable(check["title"], headers, cells))
+    screen.print(Table(headers, cells, check["title"]))
     screen.print(check["note"], soft_wrap=True)
     passed = sum(row["passed"] for row in rows)
     screen.print(f"{check['name']}: {passed} of {counted(len(rows), 'comparison')} passed\n", soft_wrap=True)

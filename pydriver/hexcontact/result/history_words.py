@@ -14,7 +14,7 @@ from ..arrays import Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import half_axes, line_of, turning_points
 from ..deck.below import Stage
-from ..text import Row, counted, cycle_count, listed, percent, quantity
+from ..text import Row, Table, counted, cycle_count, listed, percent, quantity
 from ..variables import (
     BULK_STRESS,
     CREEPAGES,
@@ -404,12 +404,12 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     return []
 
 
-def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row]]:
+def energy_table(histories: Sequence[History], most: int) -> Table:
     """Return headers and rows of the dissipated energy of segments and cycles; no rows for one segment."""
     headers = ("", "label", "steps", "dissipated energy", "area of the loop")
     parts, loops = segments(histories), cycles(histories)
     if len(parts) < 2 or not is_frictional(histories[-1]):
-        return headers, []
+        return Table(headers, [])
     if rolls(histories[-1]):
         return _power_table(histories, parts[-most:])
     for row in parts:
@@ -423,10 +423,10 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
         area += f", without {row['other_work']}" if row.get("other_work") else ""
         steps = f"{row['first_step']} to {row['last_step']}"
         rows.append((name, words, steps, quantity(row["dissipated_energy"], "J"), area)[:shown])
-    return headers[:shown], rows
+    return Table(headers[:shown], rows)
 
 
-def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]]) -> tuple[Row, list[Row]]:
+def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]]) -> Table:
     """Return headers and rows of segments of rolling bodies: energy, way, and power at their ends."""
     rows: list[Row] = []
     for row in parts:
@@ -439,7 +439,7 @@ def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]
         steps = f"{row['first_step']} to {row['last_step']}"
         shown = ("", energy, "") if math.isnan(way) else (rolled, energy if way else "", power)
         rows.append((f"segment {row['segment']}", str(row["label"]), steps, *shown))
-    return ("", "label", "steps", "rolled", "dissipated energy", "frictional power"), rows
+    return Table(("", "label", "steps", "rolled", "dissipated energy", "frictional power"), rows)
 
 
 def _of_wear(history: History) -> bool:

@@ -307,11 +307,10 @@ class Case(Problem):
     def _repr_html_(self) -> str:
         from .problem.preview import case_rows
         from .solve.memory_needed import peak_memory
-        from .text import html_table
+        from .text import Table
 
-        return html_table(
-            self.title or "Case", ("", ""), case_rows(self, peak_memory), "; ".join(self._notes)
-        )
+        rows, note = case_rows(self, peak_memory), "; ".join(self._notes)
+        return Table(("", ""), rows, self.title or "Case", note)._repr_html_()
 
 
 def _deck_keys(arguments: Mapping[str, Any], lattice: Lattice | None) -> dict[str, Any]:

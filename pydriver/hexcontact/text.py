@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
 Row = tuple[str, ...]
 
@@ -155,63 +155,62 @@ def cycle_count(cycles: float) -> str:
     return (f"{cycles:,.1f}" if cycles >= 1.0 else f"{cycles:.2g}").removesuffix(".0")
 
 
-def text_table(headers: Row, rows: Iterable[Row]) -> str:
-    """Return a table as plain text with numbers at the right of their columns."""
-    table = [[visible(cell) for cell in row] for row in (headers, *rows)]
-    widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
-    left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if first else cell.rjust(width)
-            for cell, width, first in zip(row, widths, left, strict=True)
-        ).rstrip()
-        for row in table
-    ]
-    return "\n".join(lines if any(headers) else lines[1:])
+class Table(NamedTuple):
+    """A table: printed as text, in notebooks as HTML, in terminals by `rich`."""
 
-
-def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") -> str:
-    """Return a table as HTML for light and dark notebooks."""
-    rows = [tuple(row) for row in rows]
-    right = [k > 0 and _numbers(row[k] for row in rows) for k in range(len(headers))]
-
-    def line(row: Row, tag: str, style: str) -> str:
-        cells = (
-            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{escaped(cell)}</{tag}>'
-            for cell, at_right in zip(row, right, strict=True)
-        )
-        return f'<tr style="background:none">{"".join(cells)}</tr>'
-
-    head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
-    body = "".join(line(row, "td", _CELL) for row in rows)
-    caption = f'<caption style="{_TITLE}">{escaped(title)}</caption>' if title else ""
-    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{escaped(note)}</div>' if note else ""
-    return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
-
-
-def _numbers(cells: Iterable[str]) -> bool:
-    """Test whether a column holds numbers; some may be missing."""
-    found = [cell for cell in cells if cell not in ("", "-")]
-    return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
-
-
-class TextTable(NamedTuple):
-    """A table for terminals; columns of names and labels may wrap, those of numbers do not."""
-
-    title: str  # its title
-    headers: Sequence[str]  # headers of its columns; none if all are empty
+    headers: Row  # of its columns; none is shown if all are empty
     rows: Sequence[Row]  # its cells
-    tight: bool = False  # whether its columns stand closer
+    title: str = ""
+    note: str = ""  # sentence below it
+    tight: bool = False  # whether its columns stand closer in a terminal
 
-    def __rich__(self) -> Table:
-        """Return the table of `rich`."""
+    def _aligned(self) -> list[str]:
+        """Return the sides of the columns: numbers, some of which may be missing, stand at the right."""
+        cells = [[row[k] for row in self.rows if row[k] not in ("", "-")] for k in range(len(self.headers))]
+        numbers = [
+            [cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in column] for column in cells
+        ]
+        return ["right" if k > 0 and known and all(known) else "left" for k, known in enumerate(numbers)]
+
+    def __str__(self) -> str:
+        """Return title, table and note as plain text."""
+        lines = [[visible(cell) for cell in row] for row in (self.headers, *self.rows)]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        pads = [str.rjust if side == "right" else str.ljust for side in self._aligned()]
+        shown = [
+            "  ".join(pad(cell, width) for pad, cell, width in zip(pads, line, widths, strict=True)).rstrip()
+            for line in (lines if any(self.headers) else lines[1:])
+        ]
+        return "\n".join([self.title] * bool(self.title) + shown + [self.note] * bool(self.note))
+
+    def _repr_html_(self) -> str:
+        """Return the table as HTML for light and dark notebooks."""
+        sides = self._aligned()
+
+        def line(row: Row, tag: str, style: str) -> str:
+            cells = (
+                f'<{tag} style="{style};text-align:{side}">{escaped(cell)}</{tag}>'
+                for cell, side in zip(row, sides, strict=True)
+            )
+            return f'<tr style="background:none">{"".join(cells)}</tr>'
+
+        head = f"<thead>{line(self.headers, 'th', _HEAD)}</thead>" if any(self.headers) else ""
+        body = "".join(line(row, "td", _CELL) for row in self.rows)
+        caption = f'<caption style="{_TITLE}">{escaped(self.title)}</caption>' if self.title else ""
+        under = (
+            f'<div style="opacity:0.75;margin-bottom:0.6em">{escaped(self.note)}</div>' if self.note else ""
+        )
+        return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
+
+    def __rich__(self) -> RichTable:
+        """Return the table of `rich`; columns of names and labels may wrap, those of numbers do not."""
         from rich import box
-        from rich.table import Table
+        from rich.table import Table as RichTable
         from rich.text import Text
 
-        shown = Table(
+        shown = RichTable(
             title=Text(visible(self.title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
-            show_header=any(self.headers),
+            show_header=any(self.headers), caption=self.note or None,
             pad_edge=False, collapse_padding=self.tight,
         )  # fmt: skip
         for header in self.headers:

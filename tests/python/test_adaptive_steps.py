@@ -26,6 +26,7 @@ from hexcontact.result.store import open_result
 from hexcontact.solve.events import Lines
 from hexcontact.solve.restart import resume
 from hexcontact.solve.window import FrictionWindow
+from hexcontact.text import Table
 
 SPHERE = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
 ALUMINIUM = {"young_modulus": 72e9, "poisson_ratio": 0.32}
@@ -338,7 +339,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     rows = dict(history.step_rows(result.history.iloc[-1].to_dict()))
     assert rows["load steps"].startswith("stick area within ")
     console = Console(file=io.StringIO(), width=150)
-    console.print(printed.pairs("", preview.case_rows(case)))
+    console.print(Table(("", ""), preview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "adaptive in 2 segments (step_tolerance 0.1)" in text
     assert "uncertain by a factor of 3" in preview.work(case)

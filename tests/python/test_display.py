@@ -18,7 +18,7 @@ from hexcontact import Case, Result
 from hexcontact.deck.surfaces import Sphere
 from hexcontact.result.html import Plane
 from hexcontact.result.view import StepView
-from hexcontact.text import html_table, text_table
+from hexcontact.text import Table
 from hexcontact.variables import VARIABLES
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -75,17 +75,17 @@ class Page(HTMLParser):
 
 def test_tables_align_numbers_and_escape_words() -> None:
     rows = [("a", "1.5 mm", "x"), ("long name", "-12 mm", "<y>")]
-    text = text_table(("", "size", "word"), rows)
+    text = str(Table(("", "size", "word"), rows))
     assert text.splitlines() == [
         "             size  word",
         "a          1.5 mm  x",
         "long name  -12 mm  <y>",
     ]
-    page = Page(html_table("A & B", ("", "size", "word"), rows, "note <1>"))
+    page = Page(Table(("", "size", "word"), rows, "A & B", "note <1>")._repr_html_())
     assert page.rows == [["", "size", "word"], ["a", "1.5 mm", "x"], ["long name", "-12 mm", "<y>"]]
     assert "A & B" in page.text
     assert "note <1>" in page.text
-    assert text_table(("", ""), [("a", "b")]) == "a  b"
+    assert str(Table(("", ""), [("a", "b")])) == "a  b"
 
 
 def test_a_result_says_what_it_is(result: Result) -> None:

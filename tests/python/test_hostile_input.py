@@ -29,7 +29,7 @@ from hexcontact.deck.series import MOST_STEPS, read_series
 from hexcontact.files import LARGEST_TEXT, text_of
 from hexcontact.result.journal import Journal
 from hexcontact.solve.events import Bar
-from hexcontact.text import html_table, text_table, visible
+from hexcontact.text import Table, visible
 
 OBEYED = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ufffe\uffff]"
@@ -154,8 +154,8 @@ def test_tables_of_notebooks_and_of_repr_show_text_as_text(result: Path) -> None
     found = open_result(result)
     for text in (repr(found), found._repr_html_(), repr(Case.from_toml("deck.toml"))):
         assert not OBEYED.search(text)
-    assert text_table(("", ""), [(HOSTILE, "1")]).startswith(r"\u001b]0;x")
-    assert r"\u001b]0;x\u0007" in html_table(HOSTILE, ("", ""), [])
+    assert str(Table(("", ""), [(HOSTILE, "1")])).startswith(r"\u001b]0;x")
+    assert r"\u001b]0;x\u0007" in Table(("", ""), [], HOSTILE)._repr_html_()
 
 
 def test_a_bar_takes_titles_as_text(

@@ -20,9 +20,9 @@ from hexcontact import (
 )
 from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.cli.printed import _columns, hertz_rows
+from hexcontact.cli.report import charts_of
 from hexcontact.plotting.below import table
 from hexcontact.plotting.maps import mesh_of
-from hexcontact.plotting.report_data import charts_of
 from hexcontact.plotting.sections import line_of
 from hexcontact.problem.preview import case_rows
 from hexcontact.result.history_words import step_rows

@@ -29,11 +29,10 @@ from hexcontact import Case, analytic, open_result
 from hexcontact.cli.app import app
 from hexcontact.cli.report import report, write_report
 from hexcontact.errors import DeckError
-from hexcontact.plotting.report_data import MOST_STEPS, mapped_steps
 from hexcontact.result.html import Plane
 from hexcontact.result.result import Result
 from hexcontact.result.step import Step
-from hexcontact.result.view import StepView
+from hexcontact.result.view import MOST_STEPS, StepView, mapped_steps
 from hexcontact.text import quantity, worded
 
 DECK = """\

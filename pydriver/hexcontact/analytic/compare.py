@@ -26,14 +26,14 @@ from ..core.measures import line_of
 from ..deck.read import recorded
 from ..deck.surfaces import Punch, Surface
 from ..errors import DeckError
-from ..text import TextTable, counted, html_table, quantity, text_table
+from ..text import Table, counted, quantity
 from ..variables import VARIABLES, spelled
 from . import friction, hertz_gap
 from .friction import LubkinTorsion, MindlinContact, SuperposedContact
 from .frictionless import EllipticContact, cone, flat_punch, power_law, rounded_punch
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
 
 CIRCULAR = 0.999  # least ratio of the axes of a circular contact
@@ -528,8 +528,9 @@ class Comparison(Sequence[Entry]):
         table.insert(2, "unit", [VARIABLES[name].units for name in table["quantity"]])
         return table.set_index("quantity")
 
-    def _rows(self) -> list[tuple[str, ...]]:
-        return [
+    @property
+    def _table(self) -> Table:
+        rows = [
             (
                 spelled(entry.quantity),
                 entry.solution,
@@ -542,24 +543,19 @@ class Comparison(Sequence[Entry]):
             )
             for entry in self
         ]
-
-    @property
-    def _title(self) -> str:
-        return f"Load step {self.step} against closed-form solutions"
+        title = f"Load step {self.step} against closed-form solutions"
+        return Table(_HEADERS if self.entries else (), rows, title, self.note)
 
     def __repr__(self) -> str:
         """Return the table as text."""
-        table = text_table(_HEADERS, self._rows()) if self.entries else ""
-        return "\n".join(filter(None, (self._title, table, self.note)))
+        return str(self._table)
 
-    def __rich__(self) -> Table:
+    def __rich__(self) -> RichTable:
         """Return the table for a terminal."""
-        shown = TextTable(self._title, _HEADERS, self._rows()).__rich__()
-        shown.caption = self.note or None
-        return shown
+        return self._table._replace(headers=_HEADERS).__rich__()
 
     def _repr_html_(self) -> str:
-        return html_table(self._title, _HEADERS if self.entries else (), self._rows(), self.note)
+        return self._table._repr_html_()
 
 
 # --- comparing ----------------------------------------------------------------------------------------------

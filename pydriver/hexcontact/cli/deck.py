@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DeckError
 from ..files import beginning, replacing
-from ..text import did_you_mean, listed, visible
+from ..text import Table, did_you_mean, listed, visible
 from . import frame
 
 if TYPE_CHECKING:
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 
 
 @frame.command("hexcontact check fretting.toml --set grid.spacing='2 um'")
-def check(
-    deck: frame.DeckFile, settings: frame.Settings = None, as_json: frame.AsJson = False
-) -> frame.Content:
+def check(deck: Path, settings: list[str] | None = None, as_json: bool = False) -> frame.Content:
     """Check a deck, report all its faults, and print a summary of the case."""
     from ..problem import plausibility
     from ..problem.preview import case_rows, least_and_most
@@ -27,7 +25,7 @@ def check(
 
     case = frame.case_of(deck, settings)
     if not as_json:
-        printed.console().print(printed.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
+        printed.console().print(Table(("", ""), case_rows(case, peak_memory), case.title or deck.stem))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first possible result
     require_memory(first, first.lattice)
     target = frame.target_of(case, deck)
@@ -70,11 +68,12 @@ def case_content(case: Problem, output: Path) -> dict[str, Any]:
     }
 
 
-@frame.command("hexcontact schema -o deck.schema.json")
-def schema(
-    output: Annotated[Path | None, frame.output_to("File to write; default: print it.")] = None,
-    study: Annotated[bool, frame.flag("study", "Write the schema of study files instead.")] = False,
-) -> None:
+@frame.command(
+    "hexcontact schema -o deck.schema.json",
+    output=frame.option("--output -o", "File to write; default: print it."),
+    study=frame.option("--study", "Write the schema of study files instead."),
+)
+def schema(output: Path | None = None, study: bool = False) -> None:
     """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
     from ..deck.json_schema import deck_schema
     from ..study.plan import study_schema
@@ -92,12 +91,13 @@ def schema(
     )
 
 
-@frame.command("hexcontact new sphere")
-def new(
-    name: Annotated[str | None, frame.argument("NAME", "Which starter deck.")] = None,
-    listing: Annotated[bool, frame.flag("list", "List the starter decks.")] = False,
-    output: Annotated[Path | None, frame.output_to("File to write; default: NAME.toml; - prints it.")] = None,
-) -> None:
+@frame.command(
+    "hexcontact new sphere",
+    name=frame.argument("NAME", "Which starter deck."),
+    listing=frame.option("--list", "List the starter decks."),
+    output=frame.option("--output -o", "File to write; default: NAME.toml; - prints it."),
+)
+def new(name: str | None = None, listing: bool = False, output: Path | None = None) -> None:
     """Write a commented deck to start from."""
     from ..deck.toml import STARTERS, starter
 

@@ -16,10 +16,10 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec, get_type_hints
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from .. import launcher
 from .._version import __version__
@@ -45,71 +45,40 @@ _OTHER_FILES = (".png", ".pdf", ".svg", ".csv", ".html", ".json", ".vtk", ".vtu"
 
 def argument(metavar: str, help: str) -> Any:
     """Declare an argument of a command; the command itself tests whether it can read a file."""
-    return typer.Argument(metavar=metavar, help=_escaped(help), show_default=False, readable=False)
+    return typer.Argument(metavar=metavar, help=_plain(help), show_default=False, readable=False)
 
 
-def option(*names: str, help: str, metavar: str | None = None) -> Any:
-    """Declare an option, with a value unless its argument is a bool."""
-    return typer.Option(*names, metavar=metavar, help=_escaped(help), readable=False)
+def option(names: str, help: str, metavar: str | None = None) -> Any:
+    """Declare an option by its names, with blanks between; it has a value unless its argument is a bool."""
+    return typer.Option(*names.split(), metavar=metavar, help=_plain(help), readable=False)
 
 
-def output_to(help: str) -> Any:
-    """Declare the option for the file or folder to write."""
-    return option("--output", "-o", help=help)
-
-
-def steps_option(help: str) -> Any:
-    """Declare the option that selects load steps."""
-    return option("--step", "-s", metavar="N,...", help=help)
-
-
-def settings_option(help: str) -> Any:
-    """Declare the option that replaces keys."""
-    return option("--set", metavar="KEY=VALUE", help=f"{help}. Repeatable.")
-
-
-def flag(name: str, help: str) -> Any:
-    """Declare an option without a value."""
-    return option(f"--{name}", help=help)
-
-
-def _escaped(help: str) -> str:
+def _plain(help: str) -> str:
     return help.replace("[", r"\[")  # typer reads markup in it
 
 
-DeckFile = Annotated[Path, argument("DECK", "The deck, a TOML file.")]
-ResultFile = Annotated[Path, argument("FILE", "The result, a netCDF file.")]
-Settings = Annotated[
-    list[str] | None, settings_option("Replace a key of the deck, as grid.spacing='0.05 mm'")
-]
-Plot = Annotated[bool, flag("plot", "Draw the result beside the output (.png).")]
-Quiet = Annotated[bool, option("--quiet", "-q", help="Print nothing but errors.")]
-AsJson = Annotated[bool, flag("json", "Print one JSON object for programs, errors too; docs/running.md.")]
-
+OPTIONS = {
+    "deck": argument("DECK", "The deck, a TOML file."),
+    "file": argument("FILE", "The result, a netCDF file."),
+    "settings": option(
+        "--set", "Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable.", "KEY=VALUE"
+    ),
+    "source": option(
+        "--source", "Tractions to the edges between the nodes (default if known), or as solved at nodes."
+    ),
+    "plot": option("--plot", "Draw the result beside the output (.png)."),
+    "quiet": option("--quiet -q", "Print nothing but errors."),
+    "as_json": option("--json", "Print one JSON object for programs, errors too; docs/running.md."),
+    "log_file": option("--log-file", "Append a line for each load step, with time and work.", "LOG"),
+    "log_level": option("--log-level", "Least level of the log; without LOG it goes to standard error."),
+}
+"""Arguments and options of several commands, by the names of their parameters."""
 
 Source = enum.StrEnum("Source", ["edges", "nodes"])
 """Where pressure and shear traction come from."""
 
-Shown = Annotated[
-    Source | None,
-    option(
-        "--source", help="Tractions to the edges between the nodes (default if known), or as solved at nodes."
-    ),
-]
-
-
 LogLevel = enum.StrEnum("LogLevel", ["debug", "info", "warning", "error"])
 """Levels of a log."""
-
-
-LogFile = Annotated[
-    Path | None,
-    option("--log-file", metavar="LOG", help="Append a line for each load step, with time and work."),
-]
-Level = Annotated[
-    LogLevel | None,
-    option("--log-level", help="Least level of the log; without LOG it goes to standard error."),
-]
 
 
 def setting(text: str) -> tuple[str, Any]:
@@ -158,6 +127,17 @@ def beside(file: Path, ending: str) -> Path:
     """Return the name of a file beside a result, which may be the current folder (a journal)."""
     there = file if file.name not in ("", "..") else file.resolve()
     return there.parent / f"{there.stem}{ending}"
+
+
+def opened(file: Path) -> tuple[str, Path, Any]:
+    """Return the kind of a file, "study", "table" or "result", its path, and the data of the first two."""
+    from ..interior.files import read_table
+    from ..study.dataset import read_study, study_of
+
+    if (path := study_of(file)) is not None:
+        return "study", path, read_study(path)
+    table = read_table(file)
+    return "result" if table is None else "table", file, table
 
 
 def case_of(deck: Path, settings: list[str] | None) -> Problem:
@@ -433,11 +413,20 @@ app = typer.Typer(
 """The command, with the sub-commands of the modules that are imported."""
 
 
-def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
-    """Register a function, guarded, as the sub-command of its name; options as of `typer.Typer.command`."""
+def command(
+    example: str, *, short_help: str | None = None, cls: type[TyperCommand] | None = None, **declared: Any
+) -> Callable[[Callable[P, Content]], Callable[P, None]]:
+    """Register a function, guarded, as the sub-command of its name.
+
+    Each parameter is an argument or an option, as `declared` by its name, or by `OPTIONS`.
+    """
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:
-        return app.command(epilog=f"Example: {example}", **options)(guarded(function))
+        for name, kind in get_type_hints(function).items():
+            if name != "return":
+                function.__annotations__[name] = Annotated[kind, declared.get(name) or OPTIONS[name]]
+        add = app.command(cls=cls, short_help=short_help, epilog=f"Example: {example}")
+        return add(guarded(function))
 
     return register
 

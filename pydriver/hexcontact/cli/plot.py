@@ -6,11 +6,11 @@ import enum
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
-from ..deck.units import ANGLE, LENGTH, UnitError, to_si
+from ..deck.units import ANGLE, LENGTH, Dimension, UnitError, to_si
 from ..errors import DeckError, NoSuchStep
 from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
@@ -62,63 +62,43 @@ class _WithFigures(TyperCommand):
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
     short_help=_DRAWS,
     cls=_WithFigures,
+    files=frame.argument(
+        "FILE",
+        "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
+    ),
+    what=frame.option("--what -w", "Which picture; see above."),
+    step=frame.option(
+        "--step -s",
+        "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
+        "10,20,30 or 10-30 or all. The label of a segment is its last step.",
+        "N,...",
+    ),
+    angle=frame.option("--angle", "Direction of the line of section and tractions from x, degrees.", "ANGLE"),
+    through=frame.option("--through", "A point of that line, as 10um,0um; default: the center.", "X,Y"),
+    cycle=frame.option("--cycle", "Cycles of loop and torsion: 2, or 1,2, or all; -1: the last.", "N,..."),
+    over=frame.option("--over", "Variable of the horizontal axis, as tangential_load_x.", "NAME"),
+    arrows=frame.option("--arrows", "Arrows on zone maps: shear traction, or slip in the step."),
+    output=frame.option(
+        "--output -o", "Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
+    ),
+    format=frame.option("--format -f", "Format where --output names none."),
 )
 def plot(
-    files: Annotated[
-        list[Path] | None,
-        frame.argument(
-            "FILE",
-            "The result or a table of it, a netCDF file; several for zones, outlines, compliance; or a deck.",
-        ),
-    ] = None,
-    what: Annotated[str, frame.option("--what", "-w", help="Which picture; see above.")] = "overview",
-    step: Annotated[
-        str | None,
-        frame.steps_option(
-            "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
-            "10,20,30 or 10-30 or all. The label of a segment is its last step."
-        ),
-    ] = None,
-    angle: Annotated[
-        str | None,
-        frame.option(
-            "--angle", metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."
-        ),
-    ] = None,
-    through: Annotated[
-        str | None,
-        frame.option(
-            "--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."
-        ),
-    ] = None,
-    cycle: Annotated[
-        str | None,
-        frame.option(
-            "--cycle", metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."
-        ),
-    ] = None,
-    over: Annotated[
-        str | None,
-        frame.option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
-    ] = None,
-    arrows: Annotated[
-        Arrows | None,
-        frame.option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step."),
-    ] = None,
-    source: frame.Shown = None,
-    output: Annotated[
-        Path | None,
-        frame.output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."),
-    ] = None,
-    format: Annotated[
-        Format | None, frame.option("--format", "-f", help="Format where --output names none.")
-    ] = None,
+    files: list[Path] | None = None,
+    what: str = "overview",
+    step: str | None = None,
+    angle: str | None = None,
+    through: str | None = None,
+    cycle: str | None = None,
+    over: str | None = None,
+    arrows: Arrows | None = None,
+    source: frame.Source | None = None,
+    output: Path | None = None,
+    format: Format | None = None,
 ) -> None:
     """Draw a result, a study or a table; `_help` makes the help from the figures."""
-    from ..interior.files import read_table
     from ..plotting.registry import entries
     from ..result.store import open_result
-    from ..study.dataset import read_study, study_of
 
     figures = entries()
     if what not in (known := [*figures, _ALL]):
@@ -127,17 +107,18 @@ def plot(
         raise DeckError(f"--what {what}: expected the FILE of a result")
     if output and format:
         raise DeckError(f"--format {format}: the name of --output {output} has a format already")
+    options = {"step": step, "cycle": cycle, "angle": angle, "through": through, "over": over}
+    options |= {"arrows": arrows, "source": source}
+    given = {name: text for name, text in options.items() if text is not None}
+    suffix = f".{format or 'png'}"
     if what in figures and figures[what].shows == "deck":
-        options = (step, angle, through, cycle, over, arrows, source)
-        if len(files) > 1 or any(one is not None for one in options):
+        if len(files) > 1 or given:
             raise DeckError(f"--what {what}: expected one deck, and no other options but --output, --format")
-        picture = output or frame.beside(files[0], f"_{what}.{format or 'png'}")
+        picture = output or frame.beside(files[0], f"_{what}{suffix}")
         figure = figures[what].draw(frame.case_of(files[0], None))
         frame.print_output(f"written: {_save(figure, f'{what} of {files[0]}', picture)}")
         return
-    study = study_of(files[0]) if len(files) == 1 else None
-    table = read_table(files[0]) if len(files) == 1 and study is None else None
-    holds = "study" if study is not None else "table" if table is not None else "result"
+    holds, path, data = frame.opened(files[0]) if len(files) == 1 else ("result", files[0], None)
     if holds != "result" and what == "overview":
         what = holds
     shows = "result" if what == _ALL else figures[what].shows
@@ -146,32 +127,21 @@ def plot(
         kind = f"{words[holds]}; expected --what {holds}" if holds in words else f"not {words[shows]}"
         raise DeckError(f"--what {what}: {files[0]} is {kind}")
     results: list[Any] = [open_result(file) for file in files] if holds == "result" else []
-    cycles = len(results[0].cycles) if cycle is not None and results else 0
-    given = {
-        "step": None
-        if step is None
-        else frame.steps_of(step, frame.labels_of(results[0]) if results else [""]),
-        "cycle": None if cycle is None else frame.steps_of(cycle, [""] * cycles, "cycle"),
-        "angle": None if angle is None else angle_of(angle),
-        "through": None if through is None else point_of(through),
-        "over": over,
-        "arrows": None if arrows is None else arrows.value,
-        "source": None if source is None else source.value,
+    parsers = {
+        "step": lambda text: frame.steps_of(text, frame.labels_of(results[0]) if results else [""]),
+        "cycle": lambda text: frame.steps_of(text, [""] * len(results and results[0].cycles), "cycle"),
+        "angle": angle_of,
+        "through": point_of,
     }
-    chosen = {name: value for name, value in given.items() if value is not None}
-    suffix = f".{format or 'png'}"
+    chosen = {name: parsers.get(name, str)(text) for name, text in given.items()}
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
         first = output or frame.beside(files[0], suffix)
         frame.print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
-    if study is not None:
-        files, results = [study], [read_study(study)]
-    elif table is not None:
-        results = [table]
-    picture = output or frame.beside(files[0], f"_{what}{suffix}")
-    frame.print_output(f"written: {picture_of(results, what, picture, chosen)}")
+    picture = output or frame.beside(path, f"_{what}{suffix}")
+    frame.print_output(f"written: {picture_of(results or [data], what, picture, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------
@@ -180,8 +150,7 @@ def plot(
 def angle_of(text: str) -> float:
     """Return an angle (rad) from text; a bare number is in degrees."""
     try:
-        number = _number_or_text(text)
-        return to_si(number, ANGLE) if isinstance(number, str) else math.radians(number)
+        return _quantity_of(text, ANGLE, math.radians(1.0))
     except UnitError as error:
         raise DeckError(f"--angle {text}: expected an angle such as 30 or 0.5rad{_because(error)}") from None
 
@@ -189,17 +158,18 @@ def angle_of(text: str) -> float:
 def point_of(text: str) -> tuple[float, float]:
     """Return a point (m) from text such as "10um,0um"."""
     try:
-        x, y = (to_si(_number_or_text(part), LENGTH) for part in text.split(","))
+        x, y = (_quantity_of(part, LENGTH, 1.0) for part in text.split(","))
     except ValueError as error:
         raise DeckError(f"--through {text}: expected two lengths such as 10um,0um{_because(error)}") from None
     return x, y
 
 
-def _number_or_text(text: str) -> float | str:
+def _quantity_of(text: str, dimension: Dimension, bare: float) -> float:
+    """Return a quantity in SI from text; `bare` is the unit of a number without one."""
     try:
-        return float(text)
+        return bare * float(text)
     except ValueError:
-        return text
+        return to_si(text, dimension)
 
 
 def _because(error: ValueError) -> str:

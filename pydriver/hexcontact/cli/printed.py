@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.measures import half_axes
 from ..errors import DeckError
 from ..result import history_words as words
-from ..text import TextTable, percent, quantity
+from ..text import Row, Table, percent, quantity
 from ..variables import VARIABLES, label_of, spelled
 
 if TYPE_CHECKING:
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from ..result.result import Result
 
 History = Mapping[str, Any]
-Row = tuple[str, ...]
-
-Table = tuple[Sequence[str], Sequence[Row]]  # headers and rows
 
 _LAST = "Last load step"
 _TRIALS = ("", "first lattice", "last but one", "last", "largest error")
@@ -37,11 +34,6 @@ def console() -> Console:
 
     width = None if sys.stdout.isatty() else _PIPE
     return Console(highlight=False, markup=False, emoji=False, width=width)
-
-
-def pairs(title: str, rows: Iterable[Row]) -> TextTable:
-    """Return a table of names and values."""
-    return TextTable(title, ("", ""), list(rows))
 
 
 # --- the load steps of a run or a file ------------------------------------------------------------
@@ -90,14 +82,14 @@ class Summary(NamedTuple):
         """Print the history, the last step, its comparison with Hertz, lattices; origin of a file."""
         shown, named = console(), ""
         if whole_file and self.result is not None:
-            shown.print(pairs(self.title, file_rows(self.result)))
+            shown.print(Table(("", ""), file_rows(self.result), self.title))
         elif self.title:
             named = f" of {self.title!r}"
         if whole_file or len(self.histories) > 1:
             shown.print(history_table(self.histories, shown))
-        for title, (headers, rows) in self.tables(_MOST_ROWS).items():
-            if rows:
-                shown.print(TextTable(title + named * (title == _LAST), headers, rows))
+        for title, table in self.tables(_MOST_ROWS).items():
+            if table.rows:
+                shown.print(table._replace(title=title + named * (title == _LAST)))
         before = () if whole_file else ("warnings", "notes")  # printed before the run
         printed = [line for name in before for line in str(self.parameters.get(name, "")).splitlines()]
         for remark in self.remarks:
@@ -109,9 +101,9 @@ class Summary(NamedTuple):
         last = self.histories[-1]
         return {
             "Dissipated energy": words.energy_table(self.histories, most),
-            _LAST: (("", ""), words.step_rows(last, self.extent)),
-            "Against Hertz": (("", "Hertz", "computed", "difference"), hertz_rows(self.hertz, last)),
-            "Accuracy": (_TRIALS, [] if self.result is None else trial_rows(self.result)),
+            _LAST: Table(("", ""), words.step_rows(last, self.extent)),
+            "Against Hertz": Table(("", "Hertz", "computed", "difference"), hertz_rows(self.hertz, last)),
+            "Accuracy": Table(_TRIALS, [] if self.result is None else trial_rows(self.result)),
         }
 
     def steps(self) -> list[dict[str, Any]]:
@@ -167,7 +159,7 @@ def fields_of(result: Result) -> list[str]:
 # --- the history ----------------------------------------------------------------------------------
 
 
-def history_table(histories: Sequence[History], console: Console) -> TextTable:
+def history_table(histories: Sequence[History], console: Console) -> Table:
     """Return a table of the load steps; of a long history only ends of segments, peaks and the last step.
 
     The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
@@ -180,7 +172,7 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-            shown = TextTable(title, ("step", *columns), rows, tight=True)
+            shown = Table(("step", *columns), rows, title, tight=True)
             needed = console.measure(shown, options=console.options.update_width(1000))
             if needed.maximum <= console.width:
                 return shown
@@ -189,25 +181,19 @@ def history_table(histories: Sequence[History], console: Console) -> TextTable:
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:
     """Return the columns of a table of load steps by their headers, with or without estimated errors."""
-
-    def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
-        return lambda history: entry(history) + (words.error_of(name, history) if with_errors else "")
-
+    write = words.with_error if with_errors else words.value_of
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
-    for name in words.worth_showing(histories):
-        columns[label_of(name)] = column(functools.partial(words.load_or_motion, name), name)
+    columns |= {label_of(name): partial(write, name) for name in words.worth_showing(histories)}
     if words.is_frictional(histories[-1]):
-        columns["stick"] = column(words.stick_share, "stick_area")
+        columns["stick"] = partial(words.stick_share, with_error=with_errors)
     else:
-        columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
+        columns["p_max"] = partial(write, "max_pressure")
         if any(words.repeats(history) for history in histories):
             columns["contact area"] = lambda h: words.contact_size(h)[1]
         elif any(half_axes(history) for history in histories):
             columns["half-axes"] = lambda h: words.contact_size(h)[1]
         else:
-            columns["radius"] = column(
-                lambda h: quantity(words.fitted("contact_radius", h), "m"), "contact_radius"
-            )
+            columns["radius"] = partial(write, "contact_radius")
     columns["residual"] = lambda h: f"{max(words.residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
     return columns

@@ -4,36 +4,35 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DeckError
 from ..solve.interruption import signal_pipe
 from . import frame
 
 if TYPE_CHECKING:
-    from ..problem.problem import Problem
     from .solving import Messages
 
 
-@frame.command("hexcontact run cases/hertz_spheres.toml --plot")
+@frame.command(
+    "hexcontact run cases/hertz_spheres.toml --plot",
+    output=frame.option("--output -o", "File to write; default: the deck's output.file, or DECK.nc here."),
+    overwrite=frame.option("--overwrite", "Replace an existing output."),
+    again=frame.option("--resume", "Resume an interrupted run of this deck; keep a finished result."),
+)
 def run(
-    deck: frame.DeckFile,
-    output: Annotated[
-        Path | None, frame.output_to("File to write; default: the deck's output.file, or DECK.nc here.")
-    ] = None,
-    overwrite: Annotated[bool, frame.flag("overwrite", "Replace an existing output.")] = False,
-    again: Annotated[
-        bool, frame.flag("resume", "Resume an interrupted run of this deck; keep a finished result.")
-    ] = False,
-    plot: frame.Plot = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
-    settings: frame.Settings = None,
+    deck: Path,
+    output: Path | None = None,
+    overwrite: bool = False,
+    again: bool = False,
+    plot: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
+    settings: list[str] | None = None,
 ) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
-    from ..core import ranks
     from ..result.store import Store
     from ..solve import log
     from ..solve.run import metadata_of
@@ -42,56 +41,49 @@ def run(
     if again and overwrite:
         raise DeckError("--resume: expected no --overwrite with it")
     messages = Messages("run", quiet, as_json, log_file, log_level)
-    with ranks.together() as first:
-        if not first:
-            raise SystemExit  # the first one prints
-        with messages.logging(deck, *([output] if output else [])):
-            case = frame.case_of(deck, settings)
-            target = frame.target_of(case, deck, output)
-            log.refuse_same(log_file, [target])
-            if plot:  # refuses before the run
-                picture_beside(target)
-            if again and _was_begun(target, case):
+    with messages.of_all_ranks(deck, *([output] if output else [])):
+        case = frame.case_of(deck, settings)
+        target = frame.target_of(case, deck, output)
+        log.refuse_same(log_file, [target])
+        if plot:  # refuses before the run
+            picture_beside(target)
+        if again:
+            from ..solve.restart import was_begun
+
+            if was_begun(target, case):
                 return _resumed(target, plot, messages, case=case)
-            with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
-                extent = solved(case, store, pipe, deck.stem, messages)
-            picture = overview(target) if plot else None
-        return messages.conclude(case, store, extent, target, picture)
+        with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
+            extent = solved(case, store, pipe, deck.stem, messages)
+        return messages.conclude(case, store, extent, target, overview(target) if plot else None)
 
 
-@frame.command("hexcontact resume fretting.nc")
+@frame.command(
+    "hexcontact resume fretting.nc",
+    file=frame.argument("FILE", "The output of the run."),
+    settings=frame.option(
+        "--set",
+        "Change the solver for the further steps, as solver.tolerance=1e-7. Repeatable.",
+        "KEY=VALUE",
+    ),
+)
 def resume(
-    file: Annotated[Path, frame.argument("FILE", "The output of the run.")],
-    plot: frame.Plot = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
-    settings: Annotated[
-        list[str] | None,
-        frame.settings_option("Change the solver for the further steps, as solver.tolerance=1e-7"),
-    ] = None,
+    file: Path,
+    plot: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
+    settings: list[str] | None = None,
 ) -> frame.Content:
     """Resume a run that was interrupted or killed, ran out of disk or did not converge.
 
     The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
-    from ..core import ranks
     from .solving import Messages
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
-    with ranks.together() as first:
-        if not first:
-            raise SystemExit  # the first one prints
-        with messages.logging(file):
-            return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
-
-
-def _was_begun(target: Path, case: Problem) -> bool:
-    """Return whether a run left finished steps or a result."""
-    from ..solve.restart import was_begun
-
-    return was_begun(target, case)
+    with messages.of_all_ranks(file):
+        return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
 
 
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
@@ -100,18 +92,17 @@ def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> fram
     from .solving import overview, picture_beside, solved, with_tables
 
     with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
-        if again is not None:
+        if again is None:
+            with_tables(restart.output_of(file), pipe, messages)
+        else:
             if plot:
                 picture_beside(again.store.path)
             if again.warning:
                 frame.print_error(f"warning: {again.warning}")
             extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
-        else:
-            with_tables(restart.output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
     path = path if file.is_absolute() else Path(os.path.relpath(path))
     picture = overview(path) if plot else None
     if again is None:
         return messages.was_finished(file, picture)
-    notes = [again.warning] * bool(again.warning)
-    return messages.conclude(again.case, again.store, extent, path, picture, notes)
+    return messages.conclude(again.case, again.store, extent, path, picture, again.warning)

@@ -3,43 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 from ..errors import DeckError
 from . import frame
 
 
 @frame.command("hexcontact info hertz_spheres.nc")
-def info(file: frame.ResultFile, as_json: frame.AsJson = False) -> frame.Content:
+def info(file: Path, as_json: bool = False) -> frame.Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz; or a study."""
-    from ..interior.files import content_of, description
+    from ..interior import files
     from ..result.store import open_result
-    from ..study import dataset as shown
+    from ..study import dataset
     from . import printed
 
-    if (path := shown.study_of(file)) is not None:
-        study = shown.read_study(path)
+    kind, path, data = frame.opened(file)
+    if kind == "result":
+        result = open_result(file)
         if as_json:
-            return shown.content_of(study, path)
-        frame.print_output(shown.lines_of(study))
+            return printed.file_content(result)
+        printed.Summary.of_result(result).print(whole_file=True)
         return None
-    if as_json and (content := content_of(file)):
-        return content
-    if lines := description(file):
-        frame.print_output("\n".join(lines))
-        return None
-    result = open_result(file)
+    content, lines = (
+        (dataset.content_of, dataset.lines_of) if kind == "study" else (files.content_of, files.lines_of)
+    )
     if as_json:
-        return printed.file_content(result)
-    printed.Summary.of_result(result).print(whole_file=True)
+        return content(data, path)
+    frame.print_output(lines(data))
     return None
 
 
-@frame.command("hexcontact report fretting.nc")
-def report(
-    file: frame.ResultFile,
-    output: Annotated[Path | None, frame.output_to("Page to write (.html); default: FILE.html.")] = None,
-) -> None:
+@frame.command(
+    "hexcontact report fretting.nc",
+    output=frame.option("--output -o", "Page to write (.html); default: FILE.html."),
+)
+def report(file: Path, output: Path | None = None) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
     from ..result.store import open_result
     from .report import write_report
@@ -47,53 +44,53 @@ def report(
     frame.print_output(f"written: {write_report(open_result(file), output or frame.beside(file, '.html'))}")
 
 
-@frame.command("hexcontact export fretting.nc --vtk")
+@frame.command(
+    "hexcontact export fretting.nc --vtk",
+    vtk=frame.option(
+        "--vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
+    ),
+    ugrid=frame.option("--ugrid", "A netCDF file with the fields on a mesh."),
+    csv=frame.option("--csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields."),
+    histories=frame.option(
+        "--histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue."
+    ),
+    step=frame.option(
+        "--step -s", "Only these load steps, as 10,20 or 10-30 or a label; -1: the last.", "N,..."
+    ),
+    output=frame.option("--output -o", "Folder to write into; default: FILE_export beside FILE."),
+)
 def export(
-    file: frame.ResultFile,
-    vtk: Annotated[
-        bool,
-        frame.flag(
-            "vtk", "A .vtu file for each load step, a .pvd for ParaView; [[stress]] and [[fatigue]], too."
-        ),
-    ] = False,
-    ugrid: Annotated[bool, frame.flag("ugrid", "A netCDF file with the fields on a mesh.")] = False,
-    csv: Annotated[
-        bool, frame.flag("csv", "The history, [[stress]] and [[fatigue]] as tables; with --step the fields.")
-    ] = False,
-    histories: Annotated[
-        bool, frame.flag("histories", "Stress histories of [[fatigue]] as tables for pyLife, py-fatigue.")
-    ] = False,
-    step: Annotated[
-        str | None, frame.steps_option("Only these load steps, as 10,20 or 10-30 or a label; -1: the last.")
-    ] = None,
-    source: frame.Shown = None,
-    output: Annotated[
-        Path | None, frame.output_to("Folder to write into; default: FILE_export beside FILE.")
-    ] = None,
+    file: Path,
+    vtk: bool = False,
+    ugrid: bool = False,
+    csv: bool = False,
+    histories: bool = False,
+    step: str | None = None,
+    source: frame.Source | None = None,
+    output: Path | None = None,
 ) -> None:
     """Write a result for other programs; of a study the table of its cases, of a table its values."""
     if not (vtk or ugrid or csv or histories):
         raise DeckError("expected --vtk, --ugrid, --csv or --histories")
-    from ..interior.files import read_table
     from ..result import export as write
     from ..result.store import open_result
-    from ..study import dataset as shown
+    from ..study.dataset import table_of, with_units
 
-    more = vtk or ugrid or histories or step is not None or source is not None
-    stem = frame.beside(file, "").name
-    if (path := shown.study_of(file)) is not None:
-        if more:
-            raise DeckError(f"{path} is the result of a study, which has no fields; expected --csv alone")
-        study, stem = shown.read_study(path), frame.beside(path, "").name
-        target = (output or frame.beside(path, "_export")) / f"{stem}_cases.csv"
-        table = shown.table_of(study).rename(columns=shown.with_units(study))
-        frame.print_output(f"written: {write.write_table(table, target)}")
-        return
-    folder = output or frame.beside(file, "_export")
-    if (found := read_table(file)) is not None:
-        if more:
-            raise DeckError(f"{file} holds {found.attrs['content']}, a table; expected --csv alone")
-        frame.print_output(f"written: {write.write_table(write.flat(found), folder / f'{stem}.csv')}")
+    kind, path, data = frame.opened(file)
+    folder, stem = output or frame.beside(path, "_export"), frame.beside(path, "").name
+    if kind != "result":
+        if vtk or ugrid or histories or step is not None or source is not None:
+            held = (
+                "is the result of a study, which has no fields"
+                if kind == "study"
+                else f"holds {data.attrs['content']}, a table"
+            )
+            raise DeckError(f"{path} {held}; expected --csv alone")
+        if kind == "study":
+            table, name = table_of(data).rename(columns=with_units(data)), f"{stem}_cases.csv"
+        else:
+            table, name = write.flat(data), f"{stem}.csv"
+        frame.print_output(f"written: {write.write_table(table, folder / name)}")
         return
     result = open_result(file)
     steps = None if step is None else frame.steps_of(step, frame.labels_of(result))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -46,6 +46,15 @@ class Messages:
         """Write the log, but not into the files `spare` that the command reads or writes."""
         return log.kept(self.log_file, self.log_level, spare)
 
+    @contextlib.contextmanager
+    def of_all_ranks(self, *spare: Path) -> Iterator[None]:
+        """Write the log as `logging`, on the first process of a launcher; the others serve it."""
+        with ranks.together() as first:
+            if not first:
+                raise SystemExit  # the first one prints
+            with self.logging(*spare):
+                yield
+
     @property
     def silent(self) -> bool:
         """Whether no progress is shown: if quiet, or if the log is shown instead."""
@@ -71,7 +80,7 @@ class Messages:
         extent: Extent | None,
         target: Path,
         picture: Path | None,
-        warnings: Sequence[str] = (),
+        warning: str = "",
     ) -> dict[str, Any] | None:
         """Print or return the result of a run, with a message on an accuracy that was not reached.
 
@@ -86,7 +95,7 @@ class Messages:
             print_error(shortfall)
         if self.as_json:
             code = AccuracyWarning.exit_code if shortfall else 0
-            notes = [*warnings, *summary.remarks, *([shortfall] if shortfall else [])]
+            notes = list(filter(None, (warning, *summary.remarks, shortfall)))
             written = {"output": target, "picture": picture, "warnings": notes, "exit_code": code}
             return written | summary.as_run()
         if not self.quiet:

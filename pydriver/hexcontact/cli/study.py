@@ -5,63 +5,64 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from .. import launcher
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
-from ..text import counted, text_table
+from ..text import Table, counted
 from . import frame
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
-    from ..study.study import Outcome, PlannedCase, Study
+    from ..study.study import Outcome, Study
     from .solving import Messages
 
 _SOME_FAILED = 3  # exit code of a study with failed or missing cases
 _MOST_NAMED = 20  # failures listed at the end
 
 
-@frame.command("hexcontact study cases/study_friction.toml --jobs 4")
+@frame.command(
+    "hexcontact study cases/study_friction.toml --jobs 4",
+    file=frame.argument("STUDY", "The study, a TOML file."),
+    output=frame.option(
+        "--output -o", "Result; default: the study's output, or STUDY.nc here. Cases go beside it."
+    ),
+    jobs=frame.option("--jobs -j", "Cases at a time on this machine; default: the cores."),
+    dask=frame.option("--dask", "Run on a Dask cluster, as tcp://host:8786.", "ADDRESS"),
+    slurm=frame.option("--slurm", "Run nothing; print a job array for sbatch."),
+    case=frame.option("--case", "Run only these cases, as a task does: 3, or 1,4-6.", "N,..."),
+    collect=frame.option("--collect", "Run nothing; combine the finished cases."),
+    plan=frame.option("--plan --dry-run", "Run nothing; print all cases and their states."),
+    skip_invalid=frame.option("--skip-invalid", "Leave out invalid cases, and name each."),
+    retry=frame.option("--retry", "Repeat cases that failed."),
+)
 def study(
-    file: Annotated[Path, frame.argument("STUDY", "The study, a TOML file.")],
-    output: Annotated[
-        Path | None,
-        frame.output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it."),
-    ] = None,
-    jobs: Annotated[
-        int | None, frame.option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
-    ] = None,
-    dask: Annotated[
-        str | None,
-        frame.option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786."),
-    ] = None,
-    slurm: Annotated[bool, frame.flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
-    case: Annotated[
-        str | None,
-        frame.option("--case", metavar="N,...", help="Run only these cases, as a task does: 3, or 1,4-6."),
-    ] = None,
-    collect: Annotated[bool, frame.flag("collect", "Run nothing; combine the finished cases.")] = False,
-    plan: Annotated[
-        bool, frame.option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
-    ] = False,
-    skip_invalid: Annotated[
-        bool, frame.option("--skip-invalid", help="Leave out invalid cases, and name each.")
-    ] = False,
-    retry: Annotated[bool, frame.flag("retry", "Repeat cases that failed.")] = False,
-    quiet: frame.Quiet = False,
-    as_json: frame.AsJson = False,
-    log_file: frame.LogFile = None,
-    log_level: frame.Level = None,
+    file: Path,
+    output: Path | None = None,
+    jobs: int | None = None,
+    dask: str | None = None,
+    slurm: bool = False,
+    case: str | None = None,
+    collect: bool = False,
+    plan: bool = False,
+    skip_invalid: bool = False,
+    retry: bool = False,
+    quiet: bool = False,
+    as_json: bool = False,
+    log_file: Path | None = None,
+    log_level: frame.LogLevel | None = None,
 ) -> frame.Content:
     """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
     from ..deck.toml import read_toml
     from ..study.study import Study, study_reporter
     from .solving import Messages
 
-    if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
+    options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}
+    options["--plan"] = plan
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    if len(given) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
@@ -71,9 +72,8 @@ def study(
         launcher.refuse_copies("study does not use MPI", "and set OMP_NUM_THREADS to use more cores")
     messages = Messages("study", quiet, as_json, log_file, log_level)
     if "creep_table" in read_toml(file, "a study")[0]:
-        options = {"--jobs": jobs, "--dask": dask, "--slurm": slurm, "--case": case, "--collect": collect}
-        options |= {"--plan": plan, "--skip-invalid": skip_invalid, "--retry": retry}
-        if given := [name for name, value in options.items() if value not in (None, False)]:
+        given += ["--skip-invalid"] * skip_invalid + ["--retry"] * retry
+        if given:
             raise DeckError(f"{given[0]}: expected no such option with a creep table, which is one case")
         return _creep_table(file, output, messages)
     unchecked = case is not None or (collect and not skip_invalid)
@@ -105,7 +105,7 @@ def study(
         else:
             listener = study_reporter(messages.silent)
             _run_missing(planned, jobs=jobs, dask=dask, retry=retry, listener=listener)
-    state = _State.of(planned)
+    state = _State(planned)
     state.report(quiet or as_json)
     if as_json:
         return {"exit_code": state.exit_code, **state.content()}
@@ -151,31 +151,20 @@ def _plan(study: Study, as_json: bool) -> frame.Content:
         (str(number), *(in_short(case.settings.get(axis.key, "-")) for axis in study.plan.axes), state)
         for number, case, state in cases
     ]
-    print(text_table(headers, rows))
+    print(Table(headers, rows))
     counts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
     frame.print_output(f"{study.title}: {counted(len(study), 'case')}, {', '.join(counts)}")
     return None
 
 
-@dataclass(frozen=True)
 class _State:
-    """State of a study: numbers of finished and of missing cases, and the failed cases."""
+    """State of a study from the files of its cases, with the exit code of the command."""
 
-    study: Study
-    done: int
-    failures: Sequence[tuple[PlannedCase, Outcome]]
-    missing: int
-
-    @classmethod
-    def of(cls, study: Study) -> _State:
-        """Return the state from the files of the cases."""
-        done, failures = sum(study.folder.done(case) for case in study.cases), study.failures()
-        return cls(study, done, failures, len(study) - done - len(failures) - len(study.invalid))
-
-    @property
-    def exit_code(self) -> int:
-        """Exit code of the command."""
-        return _SOME_FAILED if self.failures or self.missing else 0
+    def __init__(self, study: Study) -> None:
+        self.study, self.failures = study, study.failures()
+        self.done = sum(study.folder.done(case) for case in study.cases)
+        self.missing = len(study) - self.done - len(self.failures) - len(study.invalid)
+        self.exit_code = _SOME_FAILED if self.failures or self.missing else 0
 
     def report(self, quiet: bool) -> None:
         """Print the number of finished cases, and why cases failed."""
@@ -249,7 +238,7 @@ def _run_missing(study: Study, **options: Any) -> None:
     def work() -> None:
         try:
             study.run(cancel=cancel, **options)
-            if not _State.of(study).missing:
+            if not _State(study).missing:
                 complete.set()
         finally:
             over.set()
@@ -263,9 +252,7 @@ def _run_missing(study: Study, **options: Any) -> None:
         with signal_pipe() as pipe:
             in_background(work, pipe, ends)
     except Interrupted as signaled:
-        saved = (
-            f"{_State.of(study).done} of {counted(len(study), 'case is', 'cases are')} finished and recorded"
-        )
+        saved = f"{_State(study).done} of {counted(len(study), 'case is', 'cases are')} finished and recorded"
         message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"
         raise frame.Failure(message, signaled.exit_code) from None
 

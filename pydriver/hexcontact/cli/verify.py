@@ -12,12 +12,12 @@ import math
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Any
 
 from ..errors import DeckError, PlausibilityWarning
-from ..text import TextTable, counted, quantity
+from ..text import Table, counted, quantity
 from ..variables import VARIABLES
-from .frame import AsJson, Content, argument, command, flag, print_error
+from .frame import Content, argument, command, option, print_error
 
 Check = Mapping[str, Any]
 """An entry of the self-test: name, title, note, deck, values."""
@@ -25,12 +25,12 @@ Check = Mapping[str, Any]
 _WIDE = 150  # a narrow terminal wraps lines, it does not lose digits
 
 
-@command("hexcontact verify")
-def verify(
-    names: Annotated[list[str] | None, argument("[NAME]...", "Which comparisons; default: all.")] = None,
-    listing: Annotated[bool, flag("list", "List the comparisons.")] = False,
-    as_json: AsJson = False,
-) -> Content:
+@command(
+    "hexcontact verify",
+    names=argument("[NAME]...", "Which comparisons; default: all."),
+    listing=option("--list", "List the comparisons."),
+)
+def verify(names: list[str] | None = None, listing: bool = False, as_json: bool = False) -> Content:
     """Test the installation: solve a few contacts and compare them with known solutions.
 
     Exit code 1 if a comparison fails.
@@ -114,7 +114,7 @@ def _print(check: Check, rows: Sequence[Mapping[str, Any]]) -> None:
     ]
     screen = console()
     screen.width = max(screen.width, _WIDE)
-    screen.print(TextTable(check["title"], headers, cells))
+    screen.print(Table(headers, cells, check["title"]))
     screen.print(check["note"], soft_wrap=True)
     passed = sum(row["passed"] for row in rows)
     screen.print(f"{check['name']}: {passed} of {counted(len(rows), 'comparison')} passed\n", soft_wrap=True)

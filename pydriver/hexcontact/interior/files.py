@@ -51,10 +51,8 @@ def readable_table(path: Path) -> Dataset | None:
     return None
 
 
-def content_of(path: Path) -> dict[str, Any]:
-    """Return the content of a file of stresses or fatigue parameters as one object; nothing if it is none."""
-    if (found := read_table(path)) is None:
-        return {}
+def content_of(found: Dataset, path: Path) -> dict[str, Any]:
+    """Return the stresses or fatigue parameters of a file as the object that ``info --json`` prints."""
     quantities = {
         str(name): {
             "units": field.attrs.get("units", ""),
@@ -67,10 +65,8 @@ def content_of(path: Path) -> dict[str, Any]:
     return {"file": path, **found.attrs, "quantities": quantities}
 
 
-def description(path: Path) -> list[str]:
-    """Return lines about a file of stresses or fatigue parameters; none if it is not one."""
-    if (found := read_table(path)) is None:
-        return []
+def lines_of(found: Dataset) -> str:
+    """Return lines about a dataset of stresses or fatigue parameters for a terminal."""
     about = found.attrs
     steps = np.atleast_1d(about["steps"] if "steps" in about else found["step"].values).tolist()
     sizes = " x ".join(str(n) for name, n in found.sizes.items() if name != "step") or "1"
@@ -89,7 +85,7 @@ def description(path: Path) -> list[str]:
         lines.append(f"  {name:<22} {extent}".rstrip())
         if place := place_of(values):
             lines.append(f"  {'':<22} {place}")
-    return [*lines, str(about["source"])]
+    return "\n".join([*lines, str(about["source"])])
 
 
 def write_netcdf(found: Dataset, target: Path) -> Path:

@@ -19,13 +19,12 @@ from ..interior.files import tables_of
 from ..interior.stress import bodies_of
 from ..result.export import kept_steps
 from ..result.result import Result, as_result, at_hand
-from ..result.view import StepView, dataset_of, title_of
+from ..result.view import StepView, dataset_of, mapped_steps, title_of
 from ..text import scaled, visible, worded
 from ..variables import spelled
 from . import style
 from .maps import Part, mesh_of
 from .registry import figure
-from .report_data import mapped_steps
 from .sections import Cut, Point
 from .zones import draw_zone_bars
 

@@ -70,7 +70,7 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
     Loads and motions below the noise, and quantities that stay 0, are left out. Areas extend to the edge
     between the nodes, where the histories have them.
     """
-    noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
+    noise = {*LOADS_AND_MOTIONS} - {*worth_showing(histories)}
     panels: dict[str, dict[str, str]] = {}
     for title, names in PANELS.items():
         known = tuple(name for name in names if name in histories[0])

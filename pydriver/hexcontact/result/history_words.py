@@ -14,7 +14,7 @@ from ..arrays import Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import half_axes, line_of, turning_points
 from ..deck.below import Stage
-from ..text import Row, counted, cycle_count, listed, percent, quantity
+from ..text import Row, Table, counted, cycle_count, listed, percent, quantity
 from ..variables import (
     BULK_STRESS,
     CREEPAGES,
@@ -31,10 +31,8 @@ from ..variables import (
 History = Mapping[str, Any]
 Extent = tuple[float, float]
 
-LOADS_AND_MOTIONS = {
-    name: (label_of(name), VARIABLES[name].units) for name in (*names_where(lambda v: v.motion), *CREEPAGES)
-}
-"""Short name and unit of each load and motion, and of creepages and spin."""
+LOADS_AND_MOTIONS = (*names_where(lambda v: v.motion), *CREEPAGES)
+"""Loads and motions, creepages and spin."""
 
 WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
 """Fields of the steps of a cycle from which its wear follows."""
@@ -47,6 +45,7 @@ _NOISE = 1e-9  # ... below which they are written as zero
 _ELLIPTIC = 0.005  # share by which the area of a contact may differ from that of the ellipse with its moments
 _BEYOND_CIRCLE = 1.1  # extent of a contact over the diameter of a circle from which it is another figure
 _WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
+_ACROSS = "load across"  # the largest tangential load
 _UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
 
@@ -73,37 +72,34 @@ def rolled_steps(histories: Iterable[History]) -> list[History]:
 def worth_showing(histories: Iterable[History]) -> list[str]:
     """Return the normal ones of `LOADS_AND_MOTIONS`, and others above the noise; no shifts while rolling."""
     histories = list(histories)
-
     hidden = _UNROLLED if rolls(histories[-1]) else ()
-
-    def shown(name: str) -> bool:
-        if name in hidden:
-            return False
-        normal = VARIABLES[name].motion == "z"
-        return normal or any(abs(h.get(name, 0.0)) > _NOTICED * _scale(name, h) for h in histories)
-
-    return list(filter(shown, LOADS_AND_MOTIONS))
-
-
-def load_or_motion(name: str, history: History) -> str:
-    """Write one of `LOADS_AND_MOTIONS`; noise is written as zero."""
-    return quantity(_above_noise(float(history[name]), name, history), VARIABLES[name].unit)
-
-
-def _above_noise(value: float, name: str, history: History) -> float:
-    """Return a value of a step, 0 for noise."""
-    return 0.0 if abs(value) < _NOISE * _scale(name, history) else value
+    return [
+        name
+        for name in LOADS_AND_MOTIONS
+        if name not in hidden
+        and (
+            VARIABLES[name].motion == "z"
+            or any(abs(h.get(name, 0.0)) > _NOTICED * _scale(name, h) for h in histories)
+        )
+    ]
 
 
 def fitted(name: str, history: History) -> float:
-    """Return an area or radius to the edge between the nodes; without a fit, that of the nodes."""
+    """Return a quantity of a step, an area or radius to the edge between the nodes if there is a fit."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
 
 
-def _measured(name: str, history: History) -> str:
-    """Write a measure of a step; noise is written as zero."""
-    return quantity(_above_noise(fitted(name, history), name, history), VARIABLES[name].units)
+def value_of(name: str, history: History) -> str:
+    """Write `fitted`; noise is written as zero."""
+    value = fitted(name, history)
+    noise = abs(value) < _NOISE * _scale(name, history)
+    return quantity(0.0 if noise else value, VARIABLES[name].unit)
+
+
+def with_error(name: str, history: History) -> str:
+    """Write `fitted` with its estimated error, if there is one."""
+    return value_of(name, history) + error_of(name, history)
 
 
 def contact_size(history: History) -> tuple[str, str]:
@@ -116,8 +112,7 @@ def contact_size(history: History) -> tuple[str, str]:
         share, bar = (100 * float(history[name]) / window for name in ("contact_area", "contact_area_error"))
         return "contact area", f"{share:.1f} ± {bar:.1g} % of the window"
     if (axes := half_axes(history)) is None:
-        error = error_of("contact_radius", history)
-        return "contact radius", quantity(fitted("contact_radius", history), "m") + error
+        return "contact radius", with_error("contact_radius", history)
     words = " by ".join(quantity(axis, "m") for axis in axes)
     return "contact half-axes", words + error_of("contact_semi_major", history)
 
@@ -136,18 +131,15 @@ def extent_of(step: Any) -> Extent | None:
         zones = step.bands("zone") if "zone" in step.fields else ()
     else:
         zones = [] if (zone := getattr(step, "zone", None)) is None else [(step, np.asarray(zone))]
-    if not (bounds := [*_bounds(zones)]):
-        return None
-    low, high = np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]
-    return float(high[0] - low[0]), float(high[1] - low[1])
-
-
-def _bounds(zones: Iterable[tuple[Any, NDArray[Any]]]) -> Iterator[NDArray[Any]]:
-    """Yield the smallest and largest x and y of the nodes in contact, by bands of zones that have some."""
+    corners = []  # of the nodes in contact of each band
     for nodes, zone in zones:
         if (inside := zone > 0).any():
             x, y = np.asarray(nodes.x)[inside], np.asarray(nodes.y)[inside]
-            yield np.array([[x.min(), y.min()], [x.max(), y.max()]])
+            corners.append([[x.min(), y.min()], [x.max(), y.max()]])
+    if not corners:
+        return None
+    low, high = np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]
+    return float(high[0] - low[0]), float(high[1] - low[1])
 
 
 def _moments(history: History, extent: Extent | None) -> str:
@@ -171,17 +163,17 @@ def _moments(history: History, extent: Extent | None) -> str:
 
 
 def error_of(name: str, history: History) -> str:
-    """Write the estimated error of `fitted` or `load_or_motion`, as " ± 0.05 %"; empty if there is none."""
+    """Write the estimated error of `fitted`, as " ± 0.05 %"; empty if there is none."""
     own = name if math.isnan(float(history.get(f"{name}_fit", math.nan))) else f"{name}_fit"
     value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
     least = _NOISE * _scale(name, history)
     return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
 
 
-def stick_share(history: History) -> str:
-    """Write the sticking share of the contact area."""
-    area = fitted("contact_area", history)
-    return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
+def stick_share(history: History, with_error: bool = False) -> str:
+    """Write the sticking share of the contact area, with the estimated error of the stick area."""
+    area, error = fitted("contact_area", history), error_of("stick_area", history) if with_error else ""
+    return (f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-") + error
 
 
 def step_error_share(history: History) -> float | None:
@@ -231,18 +223,18 @@ def describe(history: History, short: bool = False) -> str:
     """Return a line of text about a step from its history."""
     parts = [str(history.get("label", ""))]
     for name in worth_showing([history]):
-        parts.append(f"{label_of(name)} {load_or_motion(name, history)}")
+        parts.append(f"{label_of(name)} {value_of(name, history)}")
     if is_frictional(history):
         error = step_error_share(history)
         around = "" if error is None or short else f" ± {100 * error:.1f} %"
         parts += [f"stick {stick_share(history)}{around}", f"R {max(residuals(history).values()):.1e}"]
     else:
-        parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
+        parts.append(f"p_max {value_of('max_pressure', history)}")
         if not short:
             parts.append(" ".join(contact_size(history)).removeprefix("contact "))
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
     if _of_wear(history):
-        worn = quantity(history["max_worn_depth"], "m")
+        worn = value_of("max_worn_depth", history)
         parts.append(f"cycles {cycle_count(history['wear_cycles'])}  worn {worn}")
     parts.append(parts_of(history))
     if not short:
@@ -252,29 +244,28 @@ def describe(history: History, short: bool = False) -> str:
 
 def step_rows(history: History, extent: Extent | None = None) -> list[Row]:
     """Return rows of a table of a load step, with errors, residuals and the extent of the contact."""
-    rows = [
-        (spelled(name), load_or_motion(name, history) + error_of(name, history))
-        for name in worth_showing([history])
-    ]
     name_of_size, size = contact_size(history)
     summary = SUMMARY
     if half_axes(history):  # the stick area of a long contact is no disc
         summary = tuple("stick_area" if name == "stick_radius" else name for name in SUMMARY)
-    rows += [
-        (name_of_size, size + _moments(history, extent))
-        if name == "contact_radius"
-        else (spelled(name), _measured(name, history) + error_of(name, history))
+    shown = [
+        name
         for name in summary
         if name in history
         and not (name == "dissipated_energy" and rolls(history) and not history[name])
         and not (name == "stick_radius" and repeats(history))
     ]
+    rows = [
+        (name_of_size, size + _moments(history, extent))
+        if name == "contact_radius"
+        else (spelled(name), with_error(name, history))
+        for name in (*worth_showing([history]), *shown)
+    ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
     if _of_wear(history):
         rows.append(("cycles of wear", cycle_count(history["wear_cycles"])))
-        names = "wear_volume", "max_worn_depth"
-        rows += [(spelled(name), quantity(history[name], VARIABLES[name].units)) for name in names]
+        rows += [(spelled(name), value_of(name, history)) for name in ("wear_volume", "max_worn_depth")]
     if (error := step_error_share(history)) is not None:
         change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
         words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
@@ -333,52 +324,39 @@ def some_steps(histories: Sequence[History], most: int) -> list[int]:
 def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return the histories of motion and load of each kind of loading above the noise, shear first.
 
-    Shear is along the direction of the largest tangential load.
+    Shear is along the direction of the largest tangential load; the load across it, no loop, is last.
     """
     if rolls(histories[-1]):
         return {}  # creepages are velocities
-    names, found = worth_showing(histories), {}
-    if (along := _loop_along(histories)) is not None:
-        found["shear"] = along
-    if "torque" in names:
-        found["torsion"] = _column(histories, "twist"), _column(histories, "torque")
-    return {**found, "normal": (_column(histories, "approach"), _column(histories, "normal_load"))}
-
-
-def _loop_along(
-    histories: Sequence[History], across: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return shift and load along the largest tangential load, or across it; None without one."""
+    found = {"normal": (_column(histories, "approach"), _column(histories, "normal_load"))}
+    if "torque" in worth_showing(histories):
+        found = {"torsion": (_column(histories, "twist"), _column(histories, "torque")), **found}
     if "tangential_load_x" not in histories[0]:
-        return None
+        return found
     load, shift = (
         np.stack([_column(histories, f"{name}_{axis}") for axis in "xy"])
         for name in ("tangential_load", "shift")
     )
-    direction = line_of(load, _NOTICED * float(_column(histories, "normal_load").max()), np.inf)
+    direction = line_of(load, _NOTICED * float(found["normal"][1].max()), np.inf)
     if direction is None:
-        return None
-    along = np.array([-direction[1], direction[0]] if across else direction)
-    return along @ shift, along @ load
+        return found
+    along, across = np.array(direction), np.array([-direction[1], direction[0]])
+    shear = along @ shift, along @ load
+    return {"shear": shear, **found, _ACROSS: (across @ shift, across @ load)}
 
 
 def _other_work(histories: Sequence[History], kind: str, first: int, last: int) -> list[str]:
     """Return the other loads, and the bulk stress, that do work between two steps of a loop."""
-    words = {
-        "shear": "tangential load",
-        "torsion": "torque",
-        "normal": "normal load",
-        "across": "load across",
-    }
+    words = {"shear": "tangential load", "torsion": "torque", "normal": "normal load", _ACROSS: _ACROSS}
     pairs = loops(histories)
     scales = {name: [float(np.abs(values).max()) for values in pair] for name, pair in pairs.items()}
-    if across := _loop_along(histories, across=True) if kind == "shear" else None:
-        pairs["across"], scales["across"] = across, scales[kind]
+    scales[_ACROSS] = scales.get("shear", [])
     span = slice(first, last + 1)
     found = [
         words[name]
         for name, pair in pairs.items()
         if name != kind
+        and (name != _ACROSS or kind == "shear")
         and all(np.ptp(v[span]) > _NOTICED * scale for v, scale in zip(pair, scales[name], strict=True))
     ]
     bulk = [_column(histories, name) for name in BULK_STRESS if name in histories[0]]
@@ -413,7 +391,7 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     """
     histories = [history for history in histories if not _of_wear(history)]
     for kind, (motion, load) in loops(histories).items() if is_frictional(histories[-1]) else ():
-        if found := cycles_of(motion, load):
+        if kind != _ACROSS and (found := cycles_of(motion, load)):
             return [
                 {
                     **{"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area},
@@ -426,12 +404,12 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     return []
 
 
-def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row]]:
+def energy_table(histories: Sequence[History], most: int) -> Table:
     """Return headers and rows of the dissipated energy of segments and cycles; no rows for one segment."""
     headers = ("", "label", "steps", "dissipated energy", "area of the loop")
     parts, loops = segments(histories), cycles(histories)
     if len(parts) < 2 or not is_frictional(histories[-1]):
-        return headers, []
+        return Table(headers, [])
     if rolls(histories[-1]):
         return _power_table(histories, parts[-most:])
     for row in parts:
@@ -445,10 +423,10 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
         area += f", without {row['other_work']}" if row.get("other_work") else ""
         steps = f"{row['first_step']} to {row['last_step']}"
         rows.append((name, words, steps, quantity(row["dissipated_energy"], "J"), area)[:shown])
-    return headers[:shown], rows
+    return Table(headers[:shown], rows)
 
 
-def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]]) -> tuple[Row, list[Row]]:
+def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]]) -> Table:
     """Return headers and rows of segments of rolling bodies: energy, way, and power at their ends."""
     rows: list[Row] = []
     for row in parts:
@@ -457,11 +435,11 @@ def _power_table(histories: Sequence[History], parts: Sequence[Mapping[str, Any]
         end, start = (float(one.get("rolled_distance", math.nan)) for one in (last, before))
         way = end - (0.0 if math.isnan(start) else start)
         rolled, energy = quantity(way, "m") if way else "steady", quantity(row["dissipated_energy"], "J")
-        power = quantity(last[name], VARIABLES[name].units) + error_of(name, last)
+        power = with_error(name, last)
         steps = f"{row['first_step']} to {row['last_step']}"
         shown = ("", energy, "") if math.isnan(way) else (rolled, energy if way else "", power)
         rows.append((f"segment {row['segment']}", str(row["label"]), steps, *shown))
-    return ("", "label", "steps", "rolled", "dissipated energy", "frictional power"), rows
+    return Table(("", "label", "steps", "rolled", "dissipated energy", "frictional power"), rows)
 
 
 def _of_wear(history: History) -> bool:
@@ -493,20 +471,17 @@ def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def remarks(histories: Sequence[History], parameters: History) -> list[str]:
     """Return sentences on the load steps of a run; `parameters` are attributes of its result."""
-    tolerance = float(parameters.get("tolerance", 0.0))
+    tolerance, before = float(parameters.get("tolerance", 0.0)), [{}, *histories]
     static = parameters.get("algorithm") == "static"
-    cold = [
-        number
-        for number, (before, history) in enumerate(zip([{}, *histories], histories, strict=False), start=1)
-        if history.get("cuts") and (static or not before.get("contact_area"))
-    ]
-    in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
+    cold = {
+        number: history["residual_tangential"] > tolerance
+        for number, history in enumerate(histories, start=1)
+        if history.get("cuts") and (static or not before[number - 1].get("contact_area"))
+    }
     sentences = [
         *(line for name in ("warnings", "notes") for line in str(parameters.get(name, "")).splitlines()),
-        unasked_path(in_parts, in_parts=True),
-        unasked_path([k for k in cold if k not in in_parts], in_parts=False),
-        halved_steps(histories, tolerance),
-        adaptive_steps(histories, tolerance),
+        *(unasked_path([n for n, own in cold.items() if own is there], there) for there in (True, False)),
+        *_solved_in_parts(histories, tolerance),
         limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
         uncertain_energy(histories),
         unclosed_cycle(histories[-1], float(parameters.get("wear_tolerance", math.inf))),
@@ -531,31 +506,25 @@ def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:
     )
 
 
-def halved_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Describe halved load steps and their records; empty without any."""
-    cut = {number: history for number, history in enumerate(histories, start=1) if history.get("cuts")}
-    if not cut:
-        return ""
-    named = _steps([f"{number} ({halved(history)})" for number, history in cut.items()])
-    record = _of_whole_steps(cut.values(), tolerance)
-    record = record or "as they are recorded they fulfil the conditions all the same"
-    return f"{len(cut)} of {counted(len(histories), 'load step')} did not converge at once: {named}; {record}"
+def _solved_in_parts(histories: Sequence[History], tolerance: float) -> Iterator[str]:
+    """Describe halved load steps, and adaptive ones in two halves, with R_t of their records."""
 
+    def record_of(steps: Iterable[History]) -> str:
+        largest = max((float(history["residual_tangential"]) for history in steps), default=0.0)
+        words = (
+            f"each part met solver.tolerance; R_t is of whole steps as they are recorded, up to {largest:.1e}"
+        )
+        return words if largest > tolerance else ""
 
-def adaptive_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Describe the records of adaptive load steps; empty if these meet the conditions."""
+    if cut := {number: history for number, history in enumerate(histories, start=1) if history.get("cuts")}:
+        named = _steps([f"{number} ({halved(history)})" for number, history in cut.items()])
+        record = record_of(cut.values()) or "as they are recorded they fulfil the conditions all the same"
+        steps = counted(len(histories), "load step")
+        yield f"{len(cut)} of {steps} did not converge at once: {named}; {record}"
     in_two = [history for history in histories if in_halves(history)]
-    record = _of_whole_steps(in_two, tolerance)
-    steps = counted(len(histories), "load step was", "load steps were")
-    return record and f"{len(in_two)} of {steps} solved in two halves; {record}"
-
-
-def _of_whole_steps(histories: Iterable[History], tolerance: float) -> str:
-    """Describe R_t of steps that were solved in parts; empty within the tolerance."""
-    largest = max((float(history["residual_tangential"]) for history in histories), default=0.0)
-    if largest <= tolerance:
-        return ""
-    return f"each part met solver.tolerance; R_t is of whole steps as they are recorded, up to {largest:.1e}"
+    if record := record_of(in_two):
+        steps = counted(len(histories), "load step was", "load steps were")
+        yield f"{len(in_two)} of {steps} solved in two halves; {record}"
 
 
 def limited_steps(histories: Sequence[History], tolerance: float) -> str:

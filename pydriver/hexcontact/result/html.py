@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Dataset
 from ..errors import NotInResult
-from ..text import Row, counted, html_table, quantity, visible
+from ..text import Row, Table, counted, quantity, visible
 from ..variables import spelled
 from .history_words import extent_of, step_rows
 from .layout import history_of
@@ -101,7 +101,7 @@ def result_html(dataset: Dataset, path: str, quantities: str) -> str:
     title, _, about = result_header(dataset, path).partition("\n")
     last, stopped = f"Load step {int(dataset['step'][-1])}", dataset.attrs.get("stopped")
     note = "; ".join([about.strip(), *([stopped] if stopped else []), *doubts(dataset)])
-    table = html_table(f"{title}: {last}", ("", ""), result_rows(dataset), note)
+    table = Table(("", ""), result_rows(dataset), f"{title}: {last}", note)._repr_html_()
     below = f"<details><summary>all quantities</summary>{quantities}</details>"
     row = "display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start"
     return f'<div><div style="{row}"><div>{table}</div>{"".join(_pictures(dataset))}</div>{below}</div>'

@@ -24,7 +24,7 @@ from ..core.calls import integer
 from ..core.lattice import Lattice, Pattern
 from ..errors import NoSuchStep
 from ..files import made
-from ..text import did_you_mean, html_table, text_table
+from ..text import Table, did_you_mean
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step, bands_of, in_bands
 
@@ -265,7 +265,6 @@ def assemble(
 
 # --- list of quantities ----------------------------------------------------------------------------------
 
-_HEADERS = ("quantity", "unit", "given", "meaning")
 _GIVEN = {
     ("step", "row", "col"): "at each node, by step",
     ("row", "col"): "at each node",
@@ -279,16 +278,18 @@ class Quantities(dict[str, Variable]):
     def __missing__(self, name: str) -> Variable:
         raise KeyError(f"the result has no {name}{did_you_mean(name, self)}")
 
-    def _rows(self) -> list[tuple[str, str, str, str]]:
-        return [
+    @property
+    def _table(self) -> Table:
+        rows = [
             (name, v.unit.replace("m2", "m²"), _GIVEN[v.dims], v.long_name)
             for name, v in self.items()
             if v.dims in _GIVEN
         ]
+        return Table(("quantity", "unit", "given", "meaning"), rows)
 
     def __repr__(self) -> str:
         """Return the table as text."""
-        return text_table(_HEADERS, self._rows())
+        return str(self._table)
 
     def _repr_html_(self) -> str:
-        return html_table("", _HEADERS, self._rows())
+        return self._table._repr_html_()

@@ -20,7 +20,7 @@ from ..interior.fatigue import SLIPS, histories, parameters_below, tabulated
 from ..interior.fields import region
 from ..interior.files import FATIGUE, STRESS, files_of, readable_table, tables_of
 from ..interior.stress import Loaded, below, bodies_of, nodal_tractions, with_places
-from ..text import counted, did_you_mean, text_table
+from ..text import Table, counted, did_you_mean
 from ..variables import CREEPAGES, FIELDS, SHEAR_LIMIT, VARIABLES
 from .history_words import WEARING, cycles, segments, stages, worn_by_cycle
 from .layout import Quantities, history_of, lattice_of, step_of
@@ -500,7 +500,7 @@ class Result:
         from . import html  # with pictures
 
         fields = [name for name in FIELDS if name in self.dataset]
-        table = text_table(("", ""), html.result_rows(self.dataset))
+        table = str(Table(("", ""), html.result_rows(self.dataset)))
         header = html.result_header(self.dataset, self.path)
         lines = [header, *table.splitlines(), f"fields: {', '.join(fields)}"]
         return "\n  ".join([*lines, *html.doubts(self.dataset), *([self.stopped] if self.stopped else [])])

@@ -302,10 +302,11 @@ class Step:
         return f"Step {self.number}: {about}"
 
     def _repr_html_(self) -> str:
-        from ..text import html_table
+        from ..text import Table
         from .history_words import extent_of, step_rows
 
-        return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history, extent_of(self)))
+        rows = step_rows(self.history, extent_of(self))
+        return Table(("", ""), rows, f"Load step {self.number}")._repr_html_()
 
 
 def _read_only(values: NDArray[Any]) -> NDArray[Any]:

@@ -29,6 +29,7 @@ from .step import is_kept, nodal
 _Field = TypeVar("_Field", Array, Mask)
 
 STICK = 1  # value of zone at a sticking node
+MOST_STEPS = 120  # steps with maps; evenly chosen from longer histories
 _AROUND = 2  # nodes beyond the ends of a window that repeats, on which edges in it depend
 
 
@@ -247,6 +248,18 @@ def as_list(results: Results) -> list[AnyResult]:
 def dataset_of(result: AnyResult) -> Dataset:
     """Return the dataset of a result, or the dataset itself."""
     return cast(Dataset, getattr(result, "dataset", result))
+
+
+def mapped_steps(result: AnyResult) -> list[int]:
+    """Return the numbers of the steps with maps, the last among them."""
+    data = dataset_of(result)
+    if "pressure" not in data:
+        return []
+    numbers = data["step"].values.tolist()
+    every = int(data.attrs.get("output_every", 1))
+    kept = [n for n in numbers if n % every == 0 or n == numbers[-1]]
+    stride = math.ceil(len(kept) / MOST_STEPS)
+    return kept[::-1][::stride][::-1]
 
 
 def parameters_of(study: Dataset) -> list[str]:

@@ -26,7 +26,7 @@ from ..files import Lock, reading, replacing, require_ordinary, require_utf8, te
 from ..netcdf_library import attributes
 from ..result.netcdf import check_seal, missing_stresses, stress_files
 from ..result.view import last_steps, parameters_of
-from ..text import counted, quantity, text_table, visible
+from ..text import Table, counted, quantity, visible
 from ..variables import CONVENTIONS, SUMMARY, VARIABLES
 from .backend import Outcome, holds
 from .plan import Axis, Plan, PlannedCase
@@ -335,7 +335,7 @@ def lines_of(study: Dataset) -> str:
         *([study.attrs["title"]] if study.attrs["title"] else []),
         f"study of {counted(len(table), 'case')}{f' ({sizes})' if sizes else ''}: {counts}"
         + ("; the last load step of each" if "step" in study.dims else ""),
-        text_table(("case", *columns[1:]), rows),
+        str(Table(("case", *columns[1:]), rows)),
     ]
     if len(table) > _MOST_ROWS:
         lines.append(

@@ -85,6 +85,8 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     if not views:
         raise NotInResult("the pressure was not kept (output.fields)")
     largest = max(views, key=lambda view: int(view.contact.sum()))
+    if not largest.contact.any():
+        raise NotInResult("no node is in contact")
     cut = Cut.of([largest], angle, None)
     place = np.linspace(0.0, cut.line.length, 16 * _POINTS)
     inside = place[largest.touches(*cut.line.points(place))]

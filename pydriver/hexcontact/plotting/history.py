@@ -130,7 +130,8 @@ def history(
     wanted = [*(name for names in panels for name in names), *([over] if over != "step" else [])]
     if unknown := [name for name in wanted if name not in known]:
         raise DeckError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
-    panels = [names for names in panels if names != (over,)]
+    if not (panels := [names for names in panels if names != (over,)]):
+        raise DeckError(f"quantities: expected some besides over = {over!r}")
     if ax is not None:
         if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
             raise DeckError("ax holds quantities of one unit; expected some in quantities")
@@ -161,10 +162,10 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
     zero = names_where(lambda v: not v.is_field and (v.title or v.summary) and v.before == 0.0)
     begun = {name.removesuffix("_fit") for name in (*names, over)} <= {"step", *zero}
     place = np.insert(place, 0, 0.0) if begun else place
-    marker = "o" if place.size <= _MANY else ""
-    lines = (style.COMPUTED, "-", marker), (style.EXACT, "--", "s" if marker else "")
-    for name, (color, dash, mark) in zip(names, lines, strict=False):
+    for number, name in enumerate(names):
         values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
+        color, dash = style.PALETTE[number % len(style.PALETTE)], ("-", "--")[number % 2]
+        mark = ("o", "s")[number % 2] if place.size <= _MANY else ""
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, f"{name}_error")) in dataset:
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
@@ -402,6 +403,8 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
+    if not shares:
+        raise DeckError("expected one result at least")
     canvas, axes = style.drawing(ax, 4.6, 3.6)
     axes.axhline(1.0, color=style.GUIDE, lw=0.8, ls=":", label="Mindlin")
     colors = dict(

@@ -205,6 +205,8 @@ def views_of(
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
     views = [StepView(result, step, source) for result in several for step in chosen]
+    if not views:
+        raise DeckError("expected one result and one load step at least")
     titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]

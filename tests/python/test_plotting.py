@@ -443,18 +443,38 @@ def test_history_chooses_what_is_there() -> None:
     assert len(plotting.history(sphere(), ["approach"]).axes) == 1
 
 
+def test_axes_hold_any_number_of_quantities() -> None:
+    names, result, axes = (
+        ["contact_radius", "contact_radius_fit", "approach"],
+        sphere(),
+        Figure().add_subplot(),
+    )
+    result["contact_radius_fit"] = result["contact_radius"].copy()
+    plotting.history(result, names, ax=axes)
+    assert [line.get_label() for line in axes.lines] == names
+    assert len({line.get_color() for line in axes.lines}) == 3
+
+
 def test_what_cannot_be_drawn_is_said() -> None:
     result = sphere()
     with pytest.raises(IndexError, match="there is no step 3; the result has steps 1 to 2"):
         plotting.overview(result, 3)
     with pytest.raises(ValueError, match="no history of label"):
         plotting.history(result, ["label"])
+    with pytest.raises(ValueError, match="expected one result and one load step at least"):
+        plotting.pressure_field(result, [])
+    with pytest.raises(ValueError, match="expected one result at least"):
+        plotting.compliance([])
+    with pytest.raises(ValueError, match="expected some besides over = 'approach'"):
+        plotting.history(result, ["approach"], "approach")
     result["pressure"][0] = np.nan
     with pytest.raises(ValueError, match="step 1 was not kept"):
         plotting.section(result, 1)
     result["pressure"][1] = 0.0
     with pytest.raises(ValueError, match="no node is in contact"):
         plotting.contact_boundary(result, 2)
+    with pytest.raises(ValueError, match="no node is in contact"):
+        plotting.trailing_edge(result.isel(step=[1]))
     assert isinstance(plotting.overview(result, 2), Figure)  # an empty field is still a picture
     with pytest.raises(ValueError, match="the pressure was not kept"):
         plotting.overview(result.drop_vars("pressure"))

@@ -7,7 +7,7 @@ import pytest
 from validation import repeating
 
 from hexcontact import Case, DeckError
-from hexcontact.plotting.surface import surface as picture
+from hexcontact.plotting.maps import surface as picture
 from hexcontact.problem import plausibility
 from hexcontact.surfaces import Rough
 

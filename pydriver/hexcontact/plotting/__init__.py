@@ -14,13 +14,12 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from .maps import field_map, pressure_field
+from .maps import field_map, pressure_field, surface
 from .sections import section, tractions, wear
 from .zones import contact_boundary, outlines, zones
 from .history import compliance, creep, history, loop, torsion
 from .below import fatigue, lines, stress, trailing_edge
 from .overview import overview
-from .surface import surface
 from .registry import entries
 
 __all__ = [

@@ -61,8 +61,7 @@ def stress(
     cut.show(axes)
     axes.set(ylabel=f"depth ({cut.lengths[1]})", aspect="equal", xlim=cut.along(along)[[0, -1]])
     axes.set_ylim(depth[-1] * length, -0.05 * depth[-1] * length)
-    style.set_title(canvas, view.title)
-    return canvas
+    return style.set_title(canvas, view.title)
 
 
 @figure("trailing_edge", "stress at both ends of the contact, over the load history")
@@ -85,6 +84,8 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     if not views:
         raise NotInResult("the pressure was not kept (output.fields)")
     largest = max(views, key=lambda view: int(view.contact.sum()))
+    if not largest.contact.any():
+        raise NotInResult("no node is in contact")
     cut = Cut.of([largest], angle, None)
     place = np.linspace(0.0, cut.line.length, 16 * _POINTS)
     inside = place[largest.touches(*cut.line.points(place))]
@@ -110,8 +111,7 @@ def trailing_edge(result: Result, depth: float = 0.0, angle: float = 0.0) -> Fig
     axes.set(xlabel="load step", ylabel=f"{symbol} in body {found[0].attrs['body']} ({unit})")
     style.legend_below(axes, ncols=2, fontsize=8)
     deep = f"{worded(depth, 'm')} deep" if depth else "at the surface"
-    style.set_title(canvas, ", ".join(filter(None, (title_of(dataset_of(result)), deep))))
-    return canvas
+    return style.set_title(canvas, ", ".join(filter(None, (title_of(dataset_of(result)), deep))))
 
 
 def _below(result: Result | Dataset, step: int, points: Array, *names: str) -> Dataset:
@@ -162,8 +162,7 @@ def fatigue(result: Result | Dataset, step: int | None = None) -> Figure:
         draw(axes, view, field, limits)
         axes.set_title(f"{'surface' if table == surface else 'section'} of body {tables[table].body}")
     style.legend_under(canvas, style.handles_of(*panels))
-    style.set_title(canvas, title_of(result.dataset))
-    return canvas
+    return style.set_title(canvas, title_of(result.dataset))
 
 
 def _first_of(found: Dataset, name: str) -> DataArray:
@@ -224,7 +223,7 @@ def _draw_surface(axes: Axes, view: StepView, field: DataArray, limits: Any) -> 
 def _draw_section(axes: Axes, view: StepView, field: DataArray, limits: Any) -> None:
     """Draw a section, with contact and stick as bars above the surface."""
     x, y = field["x"].values, field["y"].values
-    along, depth, words = section_of(field)
+    along, depth, words = _places(field)
     mark = _color(axes, along, depth, field, limits)
     draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
     mark()
@@ -232,14 +231,19 @@ def _draw_section(axes: Axes, view: StepView, field: DataArray, limits: Any) -> 
     axes.set(**words, aspect="equal")
 
 
-def section_of(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
-    """Return places along a section and depths in a unit, with the labels of the axes."""
-    x, y = field["x"].values, field["y"].values
-    along = x if np.ptp(y) == 0.0 else y if np.ptp(x) == 0.0 else np.hypot(x - x[0, 0], y - y[0, 0])
-    factor, unit = scaled(float(abs(along).max()), "m")
-    word = "x" if np.ptp(y) == 0.0 else "y" if np.ptp(x) == 0.0 else "distance"
-    words = {"xlabel": f"{word} ({unit})", "ylabel": f"depth ({unit})"}
-    return along * factor, field["depth"].values * factor, words
+def _places(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
+    """Return the coordinates of a map or of a section in a unit, with the labels of the axes."""
+    x, y, depth = (field[name].values for name in ("x", "y", "depth"))
+    flat = not np.ptp(depth) > 0.0
+    if flat or np.ptp(y) == 0.0:
+        word, across = "x", x
+    elif np.ptp(x) == 0.0:
+        word, across = "y", y
+    else:
+        word, across = "distance", np.hypot(x - x[0, 0], y - y[0, 0])
+    other, up = ("y", y) if flat else ("depth", depth)
+    factor, unit = scaled(style.largest(across, *([y] if flat else [])), "m")
+    return across * factor, up * factor, {"xlabel": f"{word} ({unit})", "ylabel": f"{other} ({unit})"}
 
 
 _COLUMNS = 3  # panels, or maps, beside each other
@@ -256,8 +260,6 @@ _NAMES = {
     "ruiz_f1": "Ruiz $F_1$",
     "ruiz_f2": "Ruiz $F_2$",
 }
-# the Okabe-Ito palette; curves beyond it are dashed
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "black")
 
 
 @figure("lines", "tables along a line, or at points by step", needs="[[stress]] or [[fatigue]]")
@@ -273,15 +275,13 @@ def lines(result: Result | Dataset) -> Figure:
 def draw_tables(shown: Sequence[tuple[str, Dataset]], title: str) -> Figure:
     """Draw tables of a line or of points, below each other."""
     panels = [_panels(found) for _, found in shown]
-    rows = [-(-len(of_table) // _COLUMNS) for of_table in panels]
+    heights = [2.5 * -(-len(of_table) // _COLUMNS) + 0.35 for of_table in panels]
     columns = min(_COLUMNS, max(map(len, panels)))
-    canvas = style.new_figure(3.7 * columns + 0.6, sum(2.5 * n + 0.35 for n in rows) + 0.4)
-    heights = [2.5 * n + 0.35 for n in rows]
+    canvas = style.new_figure(3.7 * columns + 0.6, sum(heights) + 0.4)
     parts = canvas.subfigures(len(shown), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (name, found), of_table in zip(parts, shown, panels, strict=True):
         _draw_table(part, name, found, of_table, columns)
-    style.set_title(canvas, title)
-    return canvas
+    return style.set_title(canvas, title)
 
 
 def _panels(found: Dataset) -> list[list[str]]:
@@ -329,18 +329,16 @@ def _draw_table(
 
 def _draw_curves(axes: Axes, place: Array, curves: Array, field: DataArray, quantities: int) -> None:
     """Draw curves of a quantity in its unit; life on a logarithmic scale."""
-    finite = curves[np.isfinite(curves)]
     units = str(field.attrs["units"])
-    largest = float(abs(finite).max()) if finite.size else 0.0
-    factor, unit = scaled(largest, units) if " " not in units else (1.0, units)
-    colors = _COLORS if len(curves) in (1, quantities) else style.shades(len(curves))
+    factor, unit = scaled(style.largest(curves), units) if " " not in units else (1.0, units)
+    colors = style.PALETTE if len(curves) in (1, quantities) else style.shades(len(curves))
     look: dict[str, Any] = {"lw": 1.2}
     if "distance" not in field.dims:
         look |= {"marker": "o" if place.size <= 60 else "", "ms": 3.0}
         look |= {} if "step" in field.dims else {"marker": "o", "ls": ""}
     for number, values in enumerate(curves):
         shown = np.where(np.isfinite(values), values * factor, np.nan)  # endless life has no place
-        dash = {"ls": "--"} if colors is _COLORS and number >= len(colors) else {}
+        dash = {"ls": "--"} if number >= len(colors) else {}  # beyond the palette
         axes.plot(place, shown, color=colors[number % len(colors)], **look | dash)
     named = _named(str(field.name)) if quantities == 1 else {"Pa": "stress", "m": "displacement"}[units]
     if field.name == "life":
@@ -402,8 +400,7 @@ def table(table: Dataset) -> Figure:
         axes.set(**words, aspect="equal", title=_place(field))
         if words["ylabel"].startswith("depth"):
             axes.invert_yaxis()
-    style.set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
-    return canvas
+    return style.set_title(canvas, f"{title}: {name}, body {table.attrs['body']}")
 
 
 def _worst(field: DataArray) -> DataArray:
@@ -412,15 +409,6 @@ def _worst(field: DataArray) -> DataArray:
     worst = np.nanargmin(values) if field.name == "life" else np.nanargmax(values)
     at = dict(zip(field.dims, np.unravel_index(worst, values.shape), strict=True))
     return field.isel({name: int(at[name]) for name in ("step", "depth") if name in at})
-
-
-def _places(field: DataArray) -> tuple[Array, Array, dict[str, str]]:
-    """Return the coordinates of a map in a unit, with the labels of the axes."""
-    if np.ptp(field["depth"].values) > 0.0:
-        return section_of(field)
-    x, y = field["x"].values, field["y"].values
-    factor, unit = scaled(float(max(abs(x).max(), abs(y).max())), "m")
-    return x * factor, y * factor, {"xlabel": f"x ({unit})", "ylabel": f"y ({unit})"}
 
 
 def _place(field: DataArray) -> str:

@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..analytic.compare import CIRCULAR, ClosedForms
+from ..analytic.compare import ClosedForms, is_circular
 from ..analytic.friction import MindlinContact
-from ..analytic.hertz_gap import QuadraticGap
 from ..arrays import Array, Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
@@ -36,9 +35,8 @@ _CONSTANT = 1e-6  # spread over value of a quantity that does not change
 
 
 def _known(dataset: Dataset) -> list[str]:
-    return [
-        str(n) for n in dataset.data_vars if dataset[n].dims == ("step",) and dataset[n].dtype.kind in "fi"
-    ]
+    histories = dataset.data_vars.items()
+    return [str(name) for name, one in histories if one.dims == ("step",) and one.dtype.kind in "fi"]
 
 
 def values_of(dataset: Dataset, name: str) -> Array:
@@ -51,17 +49,13 @@ def vectors_of(dataset: Dataset, name: str) -> Array:
     return np.stack([values_of(dataset, f"{name}_{axis}") for axis in "xy"])
 
 
-def _largest(dataset: Dataset, names: Sequence[str]) -> float:
-    values = np.concatenate([np.ravel(values_of(dataset, name)) for name in names])
-    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-
-
 def _scaled(dataset: Dataset, names: Sequence[str]) -> tuple[float, str]:
     """Return factor and unit for an axis of one unit; areas are shares of a window that repeats."""
     if dataset.attrs.get("lattice_periodic") and dataset[names[0]].attrs.get("units") == "m2":
         lattice = lattice_of(dataset)
         return 100.0 / (lattice.cell_area * lattice.size), "% of the window"
-    return scaled(_largest(dataset, names), str(dataset[names[0]].attrs.get("units", "")))
+    largest = style.largest(*(values_of(dataset, name) for name in names))
+    return scaled(largest, str(dataset[names[0]].attrs.get("units", "")))
 
 
 def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
@@ -86,16 +80,9 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
     return panels
 
 
-def begins_at_zero(names: Sequence[str]) -> bool:
-    """Return whether quantities are 0 before the first load step, so that curves begin at step 0."""
-    shown = names_where(lambda v: not v.is_field and (v.title or v.summary) and v.before == 0.0)
-    return all(name.removesuffix("_fit") in shown for name in names)
-
-
 def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
     """Return the largest magnitude of a quantity."""
-    values = np.abs([float(history[name]) for history in histories])
-    return float(values[np.isfinite(values)].max(initial=0.0))
+    return style.largest([float(history[name]) for history in histories])
 
 
 def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
@@ -143,7 +130,8 @@ def history(
     wanted = [*(name for names in panels for name in names), *([over] if over != "step" else [])]
     if unknown := [name for name in wanted if name not in known]:
         raise DeckError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
-    panels = [names for names in panels if names != (over,)]
+    if not (panels := [names for names in panels if names != (over,)]):
+        raise DeckError(f"quantities: expected some besides over = {over!r}")
     if ax is not None:
         if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
             raise DeckError("ax holds quantities of one unit; expected some in quantities")
@@ -161,8 +149,7 @@ def history(
         draw_history(axes, dataset, names, over)
     for axes in grid[:-1].flat:
         axes.set_xlabel("")
-    style.set_title(canvas, title_of(dataset))
-    return canvas
+    return style.set_title(canvas, title_of(dataset))
 
 
 def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str = "step") -> None:
@@ -172,12 +159,13 @@ def draw_history(axes: Axes, dataset: Dataset, names: Sequence[str], over: str =
     if over != "step":
         along, length = _scaled(dataset, [over])
         place, label = values_of(dataset, over) * along, style.titled(_spelled(over), length)
-    begun = begins_at_zero([*names, *([over] if over != "step" else [])])
+    zero = names_where(lambda v: not v.is_field and (v.title or v.summary) and v.before == 0.0)
+    begun = {name.removesuffix("_fit") for name in (*names, over)} <= {"step", *zero}
     place = np.insert(place, 0, 0.0) if begun else place
-    marker = "o" if place.size <= _MANY else ""
-    lines = (style.COMPUTED, "-", marker), (style.EXACT, "--", "s" if marker else "")
-    for name, (color, dash, mark) in zip(names, lines, strict=False):
+    for number, name in enumerate(names):
         values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
+        color, dash = style.PALETTE[number % len(style.PALETTE)], ("-", "--")[number % 2]
+        mark = ("o", "s")[number % 2] if place.size <= _MANY else ""
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, f"{name}_error")) in dataset:
             around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
@@ -232,7 +220,7 @@ def loop(
     if CREEPAGES[0] in dataset:
         raise NotInResult("rolling bodies have creepages in place of shifts; expected creep")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
-    direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
+    direction = line_of(load, 1e-6 * style.largest(values_of(dataset, "normal_load")), np.inf)
     if direction is None:
         raise NotInResult("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
@@ -255,8 +243,7 @@ def loop(
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
     axes.legend(handles=style.handles_of(axes))
-    style.set_title(canvas, title_of(dataset), ax)
-    return canvas
+    return style.set_title(canvas, title_of(dataset), ax)
 
 
 @figure("creep", "creep forces against creepage", needs="rolling")
@@ -275,7 +262,7 @@ def creep(result: Result | Dataset, ax: Axes | None = None) -> Figure:
     mu = float(dataset.attrs.get("friction_coefficient", np.nan))
     scale = (mu if np.isfinite(mu) and mu > 0.0 else 1.0) * values_of(dataset, "normal_load")
     canvas, axes = style.drawing(ax, 4.6, 3.6)
-    factor, unit = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
+    factor, unit = _scaled(dataset, [over])
     # a curve ends where another creepage, or the spin, changes
     jumps = [
         np.abs(np.diff(values_of(dataset, name))) * length.get(name, 1.0) > _JUMP * spans[over]
@@ -295,13 +282,11 @@ def creep(result: Result | Dataset, ax: Axes | None = None) -> Figure:
             label = label_of(name) + (" / radius" if name == "torque" else "")
             place = np.insert(values_of(dataset, over) * factor, ends, np.nan)
             axes.plot(place, np.insert(values, ends, np.nan), color=color, marker=mark, ms=3, label=label)
-    for line in (axes.axhline, axes.axvline):
-        line(0.0, color=style.GUIDE, lw=0.5, zorder=0)
+    style.zero_lines(axes)
     axes.set(xlabel=style.titled(spelled(over), unit), ylabel=r"load / $\mu P$")
     axes.legend(handles=style.handles_of(axes))
     axes.grid(color="0.9", lw=0.5)
-    style.set_title(canvas, title_of(dataset), ax)
-    return canvas
+    return style.set_title(canvas, title_of(dataset), ax)
 
 
 @figure("torsion", "torque against twist", needs="torque")
@@ -322,8 +307,7 @@ def torsion(
         cycles,
     )
     axes.legend()
-    style.set_title(canvas, title_of(dataset), ax)
-    return canvas
+    return style.set_title(canvas, title_of(dataset), ax)
 
 
 Axis = tuple[Array, str, str]  # values, name and unit of the quantity on an axis
@@ -346,10 +330,8 @@ def _draw_loop(
 ) -> float:
     """Draw a load against its motion, or some cycles of it; return the factor that scales the load."""
     (x, x_name, x_unit), (y, y_name, y_unit) = motion, load
-    to_x, x_unit = scaled(float(np.abs(x).max()), x_unit)
-    to_y, y_unit = scaled(float(np.abs(y).max()), y_unit)
-    axes.axhline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
-    axes.axvline(0.0, color=style.GUIDE, lw=0.5, zorder=0)
+    (to_x, x_unit), (to_y, y_unit) = scaled(style.largest(x), x_unit), scaled(style.largest(y), y_unit)
+    style.zero_lines(axes)
     size = 3.5 if x.size <= 2 * _MANY else 2.0
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9}
     found = cycles_of(x, y)
@@ -379,24 +361,23 @@ def initial_compliance(dataset: Dataset) -> tuple[float, float]:
 
     Spheres are pressed, then sheared at a constant normal load; another result is an error.
     """
-    gap, attributes = QuadraticGap.of(dataset), dataset.attrs
-    friction = float(attributes.get("friction_coefficient", np.nan))
-    frictional = attributes.get("algorithm") in ("static", "incremental") and 0.0 < friction < np.inf
-    if not frictional or gap is None:
+    closed = ClosedForms(dataset)
+    if closed.gap is None or not 0.0 < closed.friction < np.inf:
         raise NotInResult("the tangential compliance is that of spheres with friction")
     normal = values_of(dataset, "normal_load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
-    step = int(np.argmax(np.hypot(*load) > 1e-6 * friction * normal))  # 0 also without a tangential load
+    step = int(
+        np.argmax(np.hypot(*load) > 1e-6 * closed.friction * normal)
+    )  # 0 also without a tangential load
     if step == 0 or abs(normal[step] - normal[step - 1]) > 1e-6 * normal[step]:
         raise NotInResult(
             "the tangential compliance needs a load step of shear alone after those of pressing"
         )
-    hertz = gap.contact(float(normal[step]))
-    if hertz.semi_minor < CIRCULAR * hertz.semi_major:
+    hertz = closed.gap.contact(float(normal[step]))
+    if not is_circular(hertz):
         raise NotInResult("the tangential compliance is that of spheres with friction")
-    gamma = float(attributes["tangential_compliance_ratio"])
-    compliance = 4.0 / float(attributes["effective_modulus"]) * (1.0 + 0.5 * gamma)
-    mindlin = MindlinContact(friction, float(normal[step]), hertz.semi_major, compliance)
+    compliance = 4.0 / closed.modulus * (1.0 + 0.5 * closed.gamma)
+    mindlin = MindlinContact(closed.friction, float(normal[step]), hertz.semi_major, compliance)
     size = float(np.hypot(*load[:, step]))
     moved = float((shift[:, step] - shift[:, step - 1]) @ load[:, step]) / size
     if not size < mindlin.sliding_load:
@@ -415,14 +396,15 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
     ValueError
         If one of the results is another one.
     """
-    several = [dataset_of(one) for one in as_list(results)]
     series: dict[tuple[float, str], list[tuple[float, float]]] = {}
     shares = []
-    for dataset in several:
+    for dataset in map(dataset_of, as_list(results)):
         ratio, share = initial_compliance(dataset)
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
+    if not shares:
+        raise DeckError("expected one result at least")
     canvas, axes = style.drawing(ax, 4.6, 3.6)
     axes.axhline(1.0, color=style.GUIDE, lw=0.8, ls=":", label="Mindlin")
     colors = dict(
@@ -438,8 +420,7 @@ def compliance(results: Results, ax: Axes | None = None) -> Figure:
     axes.legend()
     low, high = min(shares), max(shares)
     at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-    style.set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
-    return canvas
+    return style.set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
 
 
 # --- studies ------------------------------------------------------------------------------------------------
@@ -451,22 +432,18 @@ def _varying(study: Dataset) -> list[str]:
     """Return the quantities of a summary, or of rolling, that differ between cases and are no parameter."""
     power = "creep_power" if "creep_power_error" in study else "slip_power"
     creep = (*(load for load, _ in ROLLED.values()), *CREEPAGES, power)
-    known, found = ("approach", *SUMMARY), []
+    known: tuple[str, ...] = ("approach", *SUMMARY)
     if "mean_gap" in study:  # of many spots there is no radius
         known = tuple("contact_area" if name == "contact_radius" else name for name in SUMMARY)
-    for name in creep if CREEPAGES[0] in study else known:
-        values = study[name].values if name in study else np.array([])
-        finite = values[np.isfinite(values)]
-        least = 1e-6 * np.abs(finite).max(initial=0.0)
-        if finite.size and np.ptp(finite) > least and not _prescribed(study, name, least):
-            found.append(name)
-    return found
+    parameters = [study[name] for name in parameters_of(study) if study[name].dtype.kind == "f"]
 
+    def varies(name: str) -> bool:
+        values = study[name].values[np.isfinite(study[name].values)]
+        least = 1e-6 * style.largest(values)
+        prescribed = any(bool(abs(study[name] - one).max() <= least) for one in parameters)
+        return bool(values.size and np.ptp(values) > least and not prescribed)
 
-def _prescribed(study: Dataset, name: str, least: float) -> bool:
-    """Test whether a quantity has the values of a parameter."""
-    numbers = [study[one] for one in parameters_of(study) if study[one].dtype.kind == "f"]
-    return any(bool(abs(study[name] - one).max() <= least) for one in numbers)
+    return [name for name in (creep if CREEPAGES[0] in study else known) if name in study and varies(name)]
 
 
 @figure("study", "quantities of the cases over a parameter", needs="a study")
@@ -525,8 +502,7 @@ def study(study: Dataset, quantities: Sequence[str] | None = None, over: str = "
         style.legend_under(canvas, style.handles_of(panels[0]))
     elif others:
         style.color_scale(canvas, panels, labels, colors)
-    style.set_title(canvas, str(study.attrs.get("title", "")))
-    return canvas
+    return style.set_title(canvas, str(study.attrs.get("title", "")))
 
 
 def _set_log(axes: Axes, name: Literal["x", "y"]) -> None:

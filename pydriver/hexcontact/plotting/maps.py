@@ -1,7 +1,8 @@
-"""Maps of the plane: fields of one load step, or of several side by side, with limits, outlines, arrows."""
+"""Maps of the plane: fields of load steps, side by side, and before a run the surfaces of a deck."""
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,14 +22,15 @@ from ..analytic.compare import ClosedForms, PartialSlip
 from ..arrays import Array, Dataset, Mask
 from ..core.edges import ZoneMesh
 from ..core.lattice import linear
+from ..deck.measured import Measured
 from ..errors import DeckError
 from ..result.netcdf import triangles
 from ..result.result import Result
 from ..result.view import Results, StepView, as_list, dataset_of, title_of
-from ..text import scaled
+from ..text import counted, scaled
 from ..variables import MAPS, VARIABLES
 from .registry import figure, styled
-from .style import EXACT, GUIDE, drawing, legend_above, panels_of, set_title
+from .style import EDGED, EXACT, GUIDE, drawing, legend_above, legend_below, new_figure, panels_of, set_title
 
 Limits = tuple[float, float, float, float]
 
@@ -58,15 +60,12 @@ class Part:
         known = [(view.contact.any(), view.window(margin), view.lattice) for view in views]
         touching = [entry for entry in known if entry[0]]
         _, windows, lattices = zip(*(touching or known), strict=True)
-        limits = np.array(windows)
-        x_min, _, y_min, _ = limits.min(axis=0)
-        _, x_max, _, y_max = limits.max(axis=0)
-        more_x = max(0.5 * (least_aspect * (y_max - y_min) - (x_max - x_min)), 0.0)
-        more_y = max(0.5 * (least_aspect * (x_max - x_min) - (y_max - y_min)), 0.0)
-        shown = [float(v) for v in (x_min - more_x, x_max + more_x, y_min - more_y, y_max + more_y)]
-        factor, unit = scaled(max(abs(shown[0]), abs(shown[1]), lattices[0].spacing), "m")
+        low, high = np.min(windows, axis=0)[[0, 2]], np.max(windows, axis=0)[[1, 3]]
+        more = np.maximum(0.5 * (least_aspect * (high - low)[::-1] - (high - low)), 0.0)
+        (x_min, y_min), (x_max, y_max) = (low - more).tolist(), (high + more).tolist()
+        factor, unit = scaled(max(abs(x_min), abs(x_max), lattices[0].spacing), "m")
         cell = lattices[0].outline if lattices[0].periodic else None
-        return cls((shown[0], shown[1], shown[2], shown[3]), factor, unit, cell)
+        return cls((x_min, x_max, y_min, y_max), factor, unit, cell)
 
     @property
     def width(self) -> float:
@@ -147,9 +146,7 @@ class Part:
         look = {"color": EXACT, "linestyle": "--", "zorder": 4, **style}
         axes.plot(x * self.factor, y * self.factor, **look)
 
-    def arrows(
-        self, axes: Axes, view: StepView, vector: tuple[Array, Array], color: str, many: int = ARROWS
-    ) -> None:
+    def arrows(self, axes: Axes, view: StepView, vector: Sequence[Array], color: str, many: int) -> None:
         """Draw a vector field at some nodes in contact; the longest arrow reaches the next one."""
         size = np.hypot(*vector)
         if not size.max() > 0.0:
@@ -208,6 +205,8 @@ def views_of(
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
     views = [StepView(result, step, source) for result in several for step in chosen]
+    if not views:
+        raise DeckError("expected one result and one load step at least")
     titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]
@@ -296,7 +295,7 @@ def _stride(shown: Mask) -> int:
     return int(np.ceil(np.sqrt((1 + int(shown.sum())) / DRAWN_NODES)))
 
 
-def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]) -> ZoneMesh:
+def _finer(mesh: ZoneMesh, view: StepView, field: _Field) -> ZoneMesh:
     """Return a mesh with smaller triangles, and a traction there, which is curved near edges.
 
     Where the contact ends at nodes that can never touch, and in contacts of many nodes, it stays as it is.
@@ -306,7 +305,7 @@ def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]
         return mesh
     coarse = Triangulation(mesh.x, mesh.y, mesh.triangles)
     fine, owner = UniformTriRefiner(coarse).refine_triangulation(return_tri_index=True, subdiv=depth)
-    values = field(fine.x, fine.y)
+    values = field.of(partial(view.at, fine.x, fine.y))
     cannot = 1.0 - np.isfinite(view.field("gap"))
     beside = linear(view.lattice, cannot, fine.x, fine.y, 1.0) > 0.0
     if beside.any():
@@ -328,23 +327,17 @@ def _on_triangles(mesh: ZoneMesh, owner: Array, x: Array, y: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Field:
-    """A field with a map: label, unit, help, and the components if it is the length of a vector."""
+    """A field with a map: label, unit, help, and its components, two if it is the length of a vector."""
 
     label: str
     unit: str
     help: str
-    vector: tuple[str, str] | None = None
+    parts: Sequence[str]
 
-    def values(self, view: StepView, name: str) -> Array:
-        """Return the field at the nodes."""
-        return self._joined([view.shown(part) for part in self.vector or (name,)])
-
-    def at(self, view: StepView, name: str, x: Array, y: Array) -> Array:
-        """Return the field at points (m)."""
-        return self._joined([view.at(x, y, part) for part in self.vector or (name,)])
-
-    def _joined(self, parts: Sequence[Array]) -> Array:
-        return parts[0] if self.vector is None else np.asarray(np.hypot(*parts))
+    def of(self, read: Callable[[str], Array]) -> Array:
+        """Return the field by its components."""
+        parts = [read(part) for part in self.parts]
+        return parts[0] if len(parts) == 1 else np.asarray(np.hypot(*parts))
 
 
 def _fields() -> Iterator[tuple[str, _Field]]:
@@ -354,11 +347,11 @@ def _fields() -> Iterator[tuple[str, _Field]]:
         if len(names) == 2:
             label = f"{words} $|{row.symbol[0]}|$" if row.symbol else words
             about = f"map of the size of the {words}, with arrows"
-            yield names[0].removesuffix("_x"), _Field(label, row.units, about, (names[0], names[1]))
+            yield names[0].removesuffix("_x"), _Field(label, row.units, about, names)
         for name in names if row.symbol or len(names) == 1 else ():
             row = VARIABLES[name]
             label = f"{words} ${row.symbol}$" if row.symbol else words
-            yield name, _Field(label, row.units, f"map of the {row.long_name}")
+            yield name, _Field(label, row.units, f"map of the {row.long_name}", (name,))
 
 
 _FIELDS = dict(_fields())
@@ -379,7 +372,7 @@ def draw_field(
     bar of a single panel is at its side, or below it.
     """
     field = _FIELDS[name]
-    values = [field.values(view, name) for view in views]
+    values = [field.of(view.shown) for view in views]
     largest = max(float(np.abs(v).max()) for v in values)
     if field.unit == "Pa":  # without the colors of rounding
         largest = max(largest, *(_NOISE * float(view.pressure.max()) for view in views))
@@ -391,7 +384,7 @@ def draw_field(
         left = name in _SO_FAR and bool(np.any(field_values[~view.contact]))
         mesh = _whole_mesh(view, field_values) if left else mesh_of(view, field_values, vanishes)
         if field.unit == "Pa":
-            mesh = finer(mesh, view, partial(field.at, view, name))
+            mesh = _finer(mesh, view, field)
         if not mesh.triangles.size:
             axes.text(0.5, 0.5, "no contact", transform=axes.transAxes, ha="center", va="center")
         else:
@@ -403,9 +396,9 @@ def draw_field(
                 cmap="PuOr_r" if signed else "viridis",
             )
             shades.set_clim(-largest * factor if signed else 0.0, (largest or 1.0) * factor)
-        if arrows and field.vector is not None:
-            vector = view.shown(field.vector[0]), view.shown(field.vector[1])
-            part.arrows(axes, view, vector, "white", ARROWS if len(panels) == 1 else FEWER_ARROWS)
+        if arrows and len(field.parts) == 2:
+            many = ARROWS if len(panels) == 1 else FEWER_ARROWS
+            part.arrows(axes, view, [view.shown(one) for one in field.parts], "white", many)
         if view.hertz is not None:
             part.outline(axes, view.hertz, view.center, label="Hertz contact area", lw=1.0)
     if shades is not None:
@@ -447,8 +440,7 @@ def field_map(
     draw_field(canvas, panels, views, name, part, arrows, below=part.is_wide)
     if single and views[0].hertz is not None:
         legend_above(panels[0])
-    set_title(canvas, title, ax)
-    return canvas
+    return set_title(canvas, title, ax)
 
 
 @figure("pressure", _FIELDS["pressure"].help)
@@ -465,3 +457,110 @@ def pressure_field(
 for _name, _field in _FIELDS.items():
     if _name != "pressure":
         figure(_name, _field.help, needs="friction")(partial(field_map, _name))
+
+
+# --- surfaces of a deck --------------------------------------------------------------------------
+
+_SURFACE = 4.8, 4.2  # inches of the panel of a surface
+_POINTS = 201  # along a side of the gap, if no surface was measured
+
+
+@figure("surface", "measured surfaces, or the gap, and the window, of a deck", needs="a deck")
+def surface(case: Any) -> Figure:
+    """Draw the measured surfaces of a case, each as it lies in the plane, or the gap if there are none.
+
+    Parameters
+    ----------
+    case : hexcontact.Case
+        A case.
+    """
+    both = enumerate((case.surfaces.surface_1, case.surfaces.surface_2), 1)
+    maps = [(number, one) for number, part in both for one in part.measured]
+    canvas = new_figure(_SURFACE[0] * max(len(maps), 1), _SURFACE[1])
+    canvas.set_layout_engine("compressed")
+    panels = canvas.subplots(1, max(len(maps), 1), squeeze=False)[0]
+    for axes, (number, one) in zip(panels, maps, strict=False):
+        axes.set_title(f"body {number}: {one}")
+        (_profile if one.extruded else _height_map)(axes, one, case)
+    if not maps:
+        x, y = _sides(case)
+        # of rough surfaces, that over the period of the window
+        gap = case.plane_gap.at(*np.meshgrid(x, y, indexing="ij"))
+        col, row = np.unravel_index(np.nanargmin(gap), gap.shape)
+        _colored(panels[0], x, y, gap, "gap", case, (x[col], y[row]))
+    return set_title(canvas, case.title)
+
+
+def _height_map(axes: Axes, one: Measured, case: Any) -> None:
+    """Draw the heights of a map where it is measured or repeats; points without one are gray, or marked."""
+    found, touch = one.placed("").map, case.surfaces.first_touch[:2]
+    (x, y), gap = (found.x + one.offset[0], found.y + one.offset[1]), found.gap  # type: ignore[operator]
+    u, v, z, _ = one.points
+    row, col = np.nonzero(np.isnan(z) & (one.holes == "fill"))
+    filled = u[row] + one.offset[0], v[col] + one.offset[1]  # type: ignore[operator]
+    if case.period:
+        x, y = _sides(case)
+        gap = one.height(*np.meshgrid(x, y, indexing="ij"))
+        filled, touch = (
+            tuple(at[0] + np.mod(p - at[0], np.ptp(at)) for p, at in zip(point, (x, y), strict=True))
+            for point in (filled, touch)
+        )
+    shown = -gap if one.upwards else gap
+    _colored(axes, x, y, shown, "height" if one.upwards else "gap", case, touch, filled)
+
+
+def _sides(case: Any) -> tuple[Array, ...]:
+    """Return points (m) along x and along y over the rectangle about the window."""
+    return tuple(np.linspace(at.min(), at.max(), _POINTS) for at in case.lattice.outline.T)
+
+
+def _colored(
+    axes: Axes,
+    x: Array,
+    y: Array,
+    values: Array,
+    words: str,
+    case: Any,
+    touch: Sequence[float],
+    filled: tuple[Array, ...] = (),
+) -> None:
+    """Draw values over the plane, with the window, the point of first touch and filled holes."""
+    shown = np.ma.masked_invalid(values)
+    times, unit = scaled(float(shown.max() - shown.min()), "m")
+    u, v = case.lattice.outline.T
+    across, up = np.append(x, u), np.append(y, v)
+    limits = float(across.min()), float(across.max()), float(up.min()), float(up.max())
+    part = Part(limits, *scaled(limits[1] - limits[0], "m"))
+    scale = part.factor
+    part.show(axes)
+    if part.is_tall:
+        cast(Figure, axes.figure).set_figheight(part.size()[1])
+    axes.set_facecolor("0.7")
+    drawn = axes.pcolormesh(x * scale, y * scale, times * shown.T, shading="nearest", rasterized=True)
+    part.bar(axes.figure, drawn, axes, f"{words} ({unit})", below=part.is_wide)
+    axes.plot(u * scale, v * scale, color="w", path_effects=EDGED, label="window")
+    axes.plot(touch[0] * scale, touch[1] * scale, "+", color=EXACT, ms=9, label="first touch")
+    if filled and filled[0].size:
+        holes: dict[str, Any] = {"mfc": "k", "mec": "w", "mew": 0.4, "ms": 3.5}
+        holes["label"] = f"{counted(filled[0].size, 'hole')} filled"
+        axes.plot(filled[0] * scale, filled[1] * scale, "o", **holes)
+    legend_below(axes, ncols=3, fontsize=8)
+
+
+def _profile(axes: Axes, one: Measured, case: Any) -> None:
+    """Draw a profile across its direction, with the width of the window."""
+    placed = one.placed("")
+    _, across = placed.own(*case.lattice.outline.T)
+    y, gap = placed.map.y, placed.map.gap[0]
+    if case.period:
+        y = np.linspace(across.min(), across.max(), _POINTS)
+        gap = one.height(*placed.in_plane(0.0 * y, y))
+    height = -gap if one.upwards else gap
+    scale, length = scaled(float(np.ptp(y)), "m")
+    times, unit = scaled(float(np.ptp(height[np.isfinite(height)])), "m")
+    axes.plot(scale * y, times * height)
+    for end in (across.min(), across.max()):
+        axes.axvline(scale * end, color=EXACT, lw=0.8, ls="--")
+    words = "height" if one.upwards else "gap"
+    angle = math.degrees(one.direction)
+    axes.set(ylabel=f"{words} ({unit})", xlabel=f"across {angle:.3g}° from x ({length}); dashed: window")

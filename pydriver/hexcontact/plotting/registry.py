@@ -75,8 +75,8 @@ _ENTRIES: dict[str, Entry] = {}
 
 
 def entries() -> dict[str, Entry]:
-    """Return the figures by name, in the order of lists."""
-    return dict(sorted(_ENTRIES.items(), key=lambda item: not item[1].first))
+    """Return the figures by name, in the order of lists: those of decks at the end."""
+    return dict(sorted(_ENTRIES.items(), key=lambda item: (not item[1].first, item[1].shows == "deck")))
 
 
 def _documented(draw: Draw[P], needs: str) -> str:

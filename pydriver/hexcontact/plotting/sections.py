@@ -85,8 +85,7 @@ class Cut:
 
     def hertz(self, view: StepView, place: Array) -> Array:
         """Return the pressure of Hertz (Pa) at distances from the start (m)."""
-        if view.hertz is None:
-            raise NotInResult("there is no Hertz solution for this gap")
+        assert view.hertz is not None
         x, y = self.line.points(place)
         return view.hertz.pressure(x - view.center[0], y - view.center[1])
 
@@ -195,22 +194,21 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
         return
     axes, bottom = canvas.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     draw_pressures(axes, [view], cut, always=True)
-    axes.tick_params(labelbottom=False)
-    axes.set_xlabel("")
+    axes.label_outer()
     axes.legend(loc="lower center")
-
-    def draw_difference(p: Array, **look: Any) -> None:
-        difference = 100 * (p - cut.hertz(view, cut.place)) / hertz.max_pressure
-        bottom.plot(cut.along(cut.place), difference, lw=0.7, **look)
-
     bottom.axhline(0.0, color=style.GUIDE, lw=0.7)
-    dots = {"marker": "o" if cut.at_nodes else "", "ms": 2.5}
-    squares: dict[str, Any] = {"marker": "s" if cut.at_nodes else "", "mfc": "none", "ms": 3.5}
     edges = view.tractions.source == "edges"
     color = style.THIRD if edges else style.COMPUTED
-    draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)
+    curves = [
+        (cut.values(view, view.pressure), color, "as solved", {"marker": "s", "mfc": "none", "ms": 3.5})
+    ]
     if edges:
-        draw_difference(cut.values(view), color=style.COMPUTED, label="to the edge", **dots)
+        curves.append((cut.values(view), style.COMPUTED, "to the edge", {"marker": "o", "ms": 2.5}))
+    for p, color, label, dots in curves:
+        difference = 100 * (p - cut.hertz(view, cut.place)) / hertz.max_pressure
+        look: dict[str, Any] = dots if cut.at_nodes else {}
+        bottom.plot(cut.along(cut.place), difference, lw=0.7, color=color, label=label, **look)
+    if edges:
         bottom.legend(fontsize=8, ncols=2, handlelength=1.2)
     bottom.set_ylabel(f"{'error' if view.hertz_holds else 'difference'}\n(% of $p_0$)")
     cut.show(bottom)
@@ -239,8 +237,7 @@ def section(
         return style.drawing(ax, 0.0, 0.0)[0]
     canvas = style.new_figure(4.6, 4.2)
     draw_section(canvas, view, angle, through)
-    style.set_title(canvas, view.title)
-    return canvas
+    return style.set_title(canvas, view.title)
 
 
 # --- shear traction -------------------------------------------------------------------------------
@@ -279,11 +276,9 @@ def tractions(
     upper, lower = canvas.subplots(2, 1, sharex=True, height_ratios=(2, 3))
     draw_pressures(upper, views, cut)
     draw_shear(lower, views[0], exact[0], cut)
-    upper.set_xlabel("")
-    upper.tick_params(labelbottom=False)
+    upper.label_outer()
     upper.legend(loc="lower center")
-    style.set_title(canvas, title)
-    return canvas
+    return style.set_title(canvas, title)
 
 
 def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) -> None:
@@ -356,9 +351,8 @@ def _family(
                 sides.add(sign)
         axes.set_ylabel(f"{cut.names()[k]} ({stress})")
         cut.show(axes)
-    for axes in panels[:-1]:
-        axes.set_xlabel("")
-        axes.tick_params(labelbottom=False)
+    for axes in panels:
+        axes.label_outer()
     style.color_scale(canvas, panels, labels, colors)
     named = ["Hertz"] if any(view.hertz_holds for view in views) else []
     named += sorted({solution.name for solution in exact if solution is not None})
@@ -369,8 +363,7 @@ def _family(
     if named and len(views) <= _COMPARED:
         handles.append(Line2D([], [], label=", ".join(named), **_THIN))
     style.legend_under(canvas, handles)
-    style.set_title(canvas, title)
-    return canvas
+    return style.set_title(canvas, title)
 
 
 _CURVES = 7
@@ -409,5 +402,4 @@ def wear(result: Result | Dataset, angle: float = 0.0, through: Point | None = N
     labels = [f"{float(view.data['wear_cycles']):,.0f}".replace(",", "\u2009") for view in views]
     style.color_scale(canvas, [above, below], labels, colors)
     canvas.axes[-1].set_title("cycles", fontsize=9)
-    style.set_title(canvas, title_of(dataset))
-    return canvas
+    return style.set_title(canvas, title_of(dataset))

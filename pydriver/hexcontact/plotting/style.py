@@ -20,8 +20,9 @@ from matplotlib.transforms import ScaledTranslation
 from ..arrays import Array
 
 # the Okabe-Ito palette, for any color vision
-COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
-IN_CONTACT = "#56B4E9"
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "black")
+COMPUTED, EXACT, THIRD, _, _, IN_CONTACT, _ = PALETTE
+GUIDE = "0.55"
 EDGED = [Stroke(linewidth=2.4, foreground="black"), Normal()]
 _NAMED = 10  # labels of a color scale
 _PASSES = 8  # of the layout at most; three to five are usual
@@ -81,8 +82,8 @@ def settle(figure: Figure) -> None:
             break
 
 
-def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:
-    """Set the title of a figure, on as many lines as needed; axes of the caller have none."""
+def set_title(figure: Figure, title: str, ax: Axes | None = None) -> Figure:
+    """Return a figure with its title, on as many lines as needed; axes of the caller have none."""
     if title and ax is None:
         width = int(13.0 * figure.get_size_inches()[0])  # characters, about
         loads = re.search(r" \(\$.*$", title)  # on one line, or each on one
@@ -91,6 +92,19 @@ def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:
         end = end[:1] + re.sub(" " if len(end) <= width else "(?<!,) ", "\u00a0", end[1:])
         lines = textwrap.wrap(start + end, width, break_long_words=False, break_on_hyphens=False)
         figure.suptitle("\n".join(lines).replace("\u00a0", " "))
+    return figure
+
+
+def largest(*values: Any) -> float:
+    """Return the largest finite magnitude of some values, 0 if there is none."""
+    sizes = np.abs(np.concatenate([np.ravel(one) for one in values]))
+    return float(sizes[np.isfinite(sizes)].max(initial=0.0))
+
+
+def zero_lines(axes: Axes) -> None:
+    """Draw thin lines through the origin."""
+    axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=0)
+    axes.axvline(0.0, color=GUIDE, lw=0.5, zorder=0)
 
 
 def titled(words: str, unit: str) -> str:

@@ -104,8 +104,7 @@ def zones(
             vector = view.field(f"{name}_x"), view.field(f"{name}_y")
             part.arrows(axes, view, vector, "black", FEWER_ARROWS)
     style.legend_under(canvas, zone_legend(views, exact), ax)
-    style.set_title(canvas, title, ax)
-    return canvas
+    return style.set_title(canvas, title, ax)
 
 
 @figure("outlines", "outlines of contact and stick area, of steps or files", needs="friction")
@@ -139,8 +138,7 @@ def outlines(results: Results, steps: int | Sequence[int] = -1, ax: Axes | None 
         canvas.legend(loc="outside right center", **beside)
     else:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **beside)
-    style.set_title(canvas, title, ax)
-    return canvas
+    return style.set_title(canvas, title, ax)
 
 
 _FULL = 0.7  # share of its ellipse that a zone fills
@@ -217,8 +215,7 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     for handle in legend.legend_handles[: len(groups) + 1]:
         if isinstance(handle, Line2D):
             handle.set_markersize(4.0)
-    style.set_title(canvas, view.title, ax)
-    return canvas
+    return style.set_title(canvas, view.title, ax)
 
 
 def _is_spot(view: StepView, zone: Mask) -> bool:

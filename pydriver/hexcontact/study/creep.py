@@ -7,12 +7,12 @@ compared with further cases.
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +21,17 @@ from .._version import __version__
 from ..arrays import Array, Dataset
 from ..core.friction import Rolling
 from ..creep_table import CreepTable
-from ..deck.faults import Source, deck_error
-from ..deck.read import assemble
-from ..deck.toml import read_toml
-from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import replacing, text_of
-from ..problem.loads import LoadStep
+from ..errors import ConvergenceError, DeckError
+from ..files import text_of
 from ..problem.problem import Problem
 from ..solve import steps as solving
 from ..solve.events import Listener, Listeners
 from ..solve.log import Log
 from ..solve.window import FrictionWindow
 from ..text import quantity
-from ..variables import CONVENTIONS, CREEPAGES, VARIABLES
-from .dataset import STATES, STUDY_VERSION, refuse_foreign, write
-from .plan import StudyFile
+from ..variables import CREEPAGES, VARIABLES
+from .dataset import ABOUT, FLAGS, refuse_foreign, write, writing
+from .plan import StudyFile, base_of
 
 _HEAD = "# hexcontact creep table"
 _LOADS = ("tangential_load_x", "tangential_load_y", "torque")
@@ -46,11 +42,12 @@ _FINE = 0.005  # error of interpolation over mu P that is not worth more cases
 _POLE = 0.45  # distance of the pole from the middle of the contact, over the half-length
 
 
-class _Rolled(NamedTuple):
+@dataclass
+class _Rolled:
     """A contact that rolls freely, from which all cases start."""
 
     window: FrictionWindow
-    state: Any
+    state: Any  # after the last case
     limit: float  # mu P [N]
     radius: float  # of a circle with the area of the contact [m]
     unit: float  # creepage mu p_max/G
@@ -78,14 +75,8 @@ class CreepStudy:
     @classmethod
     def from_toml(cls, path: str | Path, output: str | Path | None = None) -> Self:
         """Read a study file with [creep_table] and its deck."""
-        data, text = read_toml(path, "a study")
-        file = StudyFile.parse(data, Source(str(path), text))
-        deck = Path(path).parent / file.deck
-        base, deck_text = read_toml(deck)
-        whole = assemble(base, deck_text, Source(str(deck), deck_text), deck.parent)
-        if whole.problems:
-            raise deck_error(whole.problems, whole.source)
-        return cls(file, str(path), Problem._made(whole), output)
+        file = StudyFile.read(path)
+        return cls(file, str(path), Problem._made(base_of(Path(path).parent / file.deck)), output)
 
     @property
     def title(self) -> str:
@@ -100,8 +91,8 @@ class CreepStudy:
             raise DeckError(
                 f'{self.name}: {key}: expected "steady" in the last entry of [[load]] of the deck'
             )
-        mu = case.friction_coefficient
-        if not 0.0 < mu < math.inf:
+        self.direction = last.roll.direction
+        if not 0.0 < case.friction_coefficient < math.inf:
             raise DeckError(
                 f"{self.name}: friction.coefficient: expected one number above 0 for a creep table"
             )
@@ -131,12 +122,12 @@ class CreepStudy:
             creepages = _unturned(at, rolled.pole)
             loads, work = np.zeros_like(at), np.zeros(counts)
             for number, along in enumerate(_lines(counts), start=1):
-                loads[along], work[along], rolled = self._solved(rolled, creepages[along])
+                loads[along], work[along] = self._solved(rolled, creepages[along])
                 if number % counts[1] == 0:
                     listener.said("cases", f"{number * counts[0]} of {work.size} cases")
             rows = loads.transpose(2, 1, 0, 3).reshape(-1, 3).tolist()
             table = CreepTable([axis.tolist() for axis in axes], rolled.pole.tolist(), rolled.limit, rows)
-            errors, rolled = self._errors(table, rolled, axes)
+            errors = self._errors(table, rolled, axes)
             stated = ", ".join(f"{100 * error:.2f} %" for error in errors)
             seconds = time.perf_counter() - started
             words = f"{work.size} cases in {quantity(seconds, 's', 3)}, {work.mean():.0f} applications each"
@@ -159,7 +150,7 @@ class CreepStudy:
         state = window.contact.virgin() if state is None else state
         _, _, state = self._called(window, state, [[0.0, 0.0, 0.0]])
         lattice, inside = window.lattice, state.pressure > 0.0
-        along = np.array([math.cos(_direction(last)), math.sin(_direction(last))])
+        along = np.array([math.cos(self.direction), math.sin(self.direction)])
         way = (along[0] * lattice.x + along[1] * lattice.y)[inside]
         half_length = 0.5 * float(way.max() - way.min())
         pair, limit = case.solved_pair, case.friction_coefficient * state.normal_load
@@ -182,7 +173,7 @@ class CreepStudy:
     def _called(self, window: FrictionWindow, state: Any, creepages: Any) -> tuple[Array, Array, Any]:
         """Return loads, work and last state of some cases."""
         last, solver = self.case.load_steps[-1], self.case.solver
-        how = last.z.control, last.z.value, creepages, Rolling(_direction(last)), solver.tolerance
+        how = last.z.control, last.z.value, creepages, Rolling(self.direction), solver.tolerance
         loads, work, after = window.contact.creep_loads(state, *how)
         if len(loads) < len(creepages) or after.touches_rim:
             names = zip(CREEPAGES, creepages[len(loads) - after.touches_rim], strict=True)
@@ -192,14 +183,12 @@ class CreepStudy:
             raise ConvergenceError(f"{self.name}: the steady state of {case} is not found")
         return loads, work, after
 
-    def _solved(self, rolled: _Rolled, creepages: Any) -> tuple[Array, Array, _Rolled]:
-        """Return loads and work of some cases, and the contact after the last of them."""
-        loads, work, state = self._called(rolled.window, rolled.state, creepages)
-        return loads, work, rolled._replace(state=state)
+    def _solved(self, rolled: _Rolled, creepages: Any) -> tuple[Array, Array]:
+        """Return loads and work of some cases, each of which starts from the case before it."""
+        loads, work, rolled.state = self._called(rolled.window, rolled.state, creepages)
+        return loads, work
 
-    def _errors(
-        self, table: CreepTable, rolled: _Rolled, axes: Sequence[Array]
-    ) -> tuple[list[float], _Rolled]:
+    def _errors(self, table: CreepTable, rolled: _Rolled, axes: Sequence[Array]) -> list[float]:
         """Return the largest errors of the interpolated loads over mu P, and of the torque over mu P c."""
         from scipy.stats import qmc
 
@@ -207,10 +196,10 @@ class CreepStudy:
         ends = [(-axis[-1] if axis[0] == 0.0 else axis[0], axis[-1]) for axis in axes]
         at = np.stack([_graded(end, part) for end, part in zip(ends, parts.T, strict=True)], axis=-1)
         creepages = _unturned(at, rolled.pole)
-        found, _, rolled = self._solved(rolled, creepages)
+        found, _ = self._solved(rolled, creepages)
         errors = np.abs(np.array([table(*case) for case in creepages.tolist()]) - found).max(axis=0)
         scale = rolled.limit * np.array([1.0, 1.0, rolled.radius])
-        return (errors / scale).tolist(), rolled
+        return [float(error) for error in errors / scale]
 
     def _dataset(
         self, axes: Sequence[Array], creepages: Array, loads: Array, work: Array, errors: Any, rolled: _Rolled
@@ -223,9 +212,8 @@ class CreepStudy:
         values |= dict(zip(_LOADS, np.moveaxis(loads, -1, 0), strict=True))
         values |= {"creep_power": power, "operator_applications": work}
         columns: dict[str, Any] = {name: (_AXES, values[name], VARIABLES[name].attributes) for name in values}
-        flags = {"flag_values": np.array(list(STATES), "i1"), "flag_meanings": " ".join(STATES.values())}
         none = np.zeros(work.shape)
-        columns["status"] = _AXES, none.astype("i1"), {"long_name": "state of the case", **flags}
+        columns["status"] = _AXES, none.astype("i1"), {"long_name": "state of the case", **FLAGS}
         columns["exit_code"] = _AXES, none.astype("i2"), {"long_name": "exit code of the case", "units": "1"}
         columns["message"] = _AXES, np.full(work.shape, ""), {"long_name": "why the case failed"}
         number = np.arange(1, work.size + 1, dtype="i4").reshape(work.shape)
@@ -236,20 +224,11 @@ class CreepStudy:
             name: (name, axis, {"long_name": f"{word} at the pole", "units": unit, "deck_key": f"load.{key}"})
             for name, axis, word, unit, key in zip(_AXES, axes, words, units, CREEPAGES, strict=True)
         }
-        about = {
-            "Conventions": CONVENTIONS,
-            "source": f"hexcontact {__version__}",
-            "hexcontact_version": __version__,
-            "study_version": STUDY_VERSION,
-            "pole": rolled.pole,
-            "friction_limit": rolled.limit,
-            "interpolation_error": errors,
-        }
-        return xarray.Dataset(columns, coordinates, about)
+        about = {"pole": rolled.pole, "friction_limit": rolled.limit, "interpolation_error": errors}
+        return xarray.Dataset(columns, coordinates, ABOUT | about)
 
     def _write(self, table: CreepTable, stated: str, dataset: Dataset) -> None:
         """Write both files."""
-        study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
         lines = [
             f"{_HEAD} 1, of hexcontact {__version__}: {' '.join(self.title.split())}",
             "# numbers of creepages x, creepages y, spins; pole [m], mu P [N]; the three axes [1, 1, rad/m];",
@@ -259,18 +238,9 @@ class CreepStudy:
             _written([*table.pole, table.limit]),
             *map(_written, (*table.axes, *table.loads)),
         ]
-        write(dataset, self.output, {"title": self.title, "study": study})
-        try:
-            with replacing(self.table) as path:
-                path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise ResourceError(f"cannot write {self.table}: {error.strerror or error}") from error
-
-
-def _direction(step: LoadStep) -> float:
-    """Return the direction of rolling of a step, which is checked to roll."""
-    assert step.roll is not None
-    return step.roll.direction
+        write(dataset, self.output, self.title, self.file)
+        with writing(self.table) as path:
+            path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _written(numbers: Sequence[float]) -> str:

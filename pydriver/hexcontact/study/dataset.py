@@ -12,7 +12,7 @@ import json
 import operator
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,17 @@ from ..result.view import last_steps, parameters_of
 from ..text import Table, counted, quantity, visible
 from ..variables import CONVENTIONS, SUMMARY, VARIABLES
 from .backend import Outcome, holds
-from .plan import Axis, Plan, PlannedCase
+from .plan import Axis, Plan, PlannedCase, StudyFile
 
 INDEX = "index.json"
+STUDY_VERSION = 1
+ABOUT = {
+    "Conventions": CONVENTIONS,
+    "source": f"hexcontact {__version__}",
+    "hexcontact_version": __version__,
+    "study_version": STUDY_VERSION,
+}
+"""Attributes of every result of a study."""
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
 
 
@@ -53,22 +61,20 @@ class StudyFolder:
             raise DeckError(
                 f"the folder {self.folder} holds other things than cases of a study; choose another output"
             )
-        self.numbers: dict[str, int] = {}
-        self._entries: dict[str, Any] = {}
-        if (self.folder / INDEX).exists():
-            self._read()
+        self._entries = self._read() if (self.folder / INDEX).exists() else {}  # number and values by hash
+        self._written = len(self._entries)
 
-    def _read(self) -> None:
+    def _read(self) -> dict[str, Any]:
         path = self.folder / INDEX
         content = text_of(path, "the index of a study")
         try:
-            self._entries = json.loads(content)["cases"]
-            self.numbers = {name: operator.index(entry["number"]) for name, entry in self._entries.items()}
-            numbers = sorted(self.numbers.values())
+            entries: dict[str, Any] = json.loads(content)["cases"]
+            numbers = [operator.index(entry["number"]) for entry in entries.values()]
             if len(set(numbers)) < len(numbers) or any(not 1 <= n <= 10**9 for n in numbers):
                 raise ValueError("its numbers are not those of cases")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise DeckError(f"{path} is damaged ({error}); move the folder {self.folder} away") from None
+        return entries
 
     def lock(self) -> Lock:
         """Lock the folder against other runs of the study, up to `Lock.release`."""
@@ -77,34 +83,28 @@ class StudyFolder:
 
     def enter(self, plan: Plan) -> None:
         """Assign numbers to the cases and write the index, if any case is new."""
-        new = [case.hash for case in plan.cases if case.hash not in self._entries]
-        if not new:
-            return
-        self.folder.mkdir(exist_ok=True)
         self.assign(plan)
-        for case in plan.cases:
-            if case.hash in new:
-                number = self.numbers[case.hash]
-                self._entries[case.hash] = {"number": number, "parameters": dict(case.settings)}
-        self._write(INDEX, {"index_version": 1, "cases": self._entries})
+        if len(self._entries) > self._written:
+            self.folder.mkdir(exist_ok=True)
+            self._write(INDEX, {"index_version": 1, "cases": self._entries})
+            self._written = len(self._entries)
 
     def assign(self, plan: Plan) -> None:
-        """Assign numbers to the cases without writing the index."""
-        new = dict.fromkeys(case.hash for case in plan.cases if case.hash not in self.numbers)
-        start = max(self.numbers.values(), default=0) + 1
-        self.numbers |= {name: number for number, name in enumerate(new, start=start)}
+        """Assign numbers to new cases without writing the index."""
+        number = max((entry["number"] for entry in self._entries.values()), default=0)
+        for case in plan.cases:
+            if case.hash not in self._entries:
+                number += 1
+                self._entries[case.hash] = {"number": number, "parameters": dict(case.settings)}
 
     def _write(self, name: str, content: Any) -> None:
         text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
-        try:
-            with replacing(self.folder / name) as path:
-                path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
+        with writing(self.folder / name) as path:
+            path.write_text(text, encoding="utf-8")
 
     def number(self, case: PlannedCase) -> int:
         """Return the number of a case, from 1."""
-        return self.numbers[case.hash]
+        return int(self._entries[case.hash]["number"])
 
     def path(self, case: PlannedCase) -> Path:
         """Return the file of a case."""
@@ -134,12 +134,8 @@ class StudyFolder:
 
     def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
         """Return the cases to run; with `retry` also those that would fail again."""
-        wanted = {case.hash: case for case in cases}
-        return [
-            case
-            for case in wanted.values()
-            if not (case.fault or self.done(case)) and (retry or not self._is_final(case))
-        ]
+        wanted = {case.hash: case for case in cases if not case.fault}.values()
+        return [case for case in wanted if not self.done(case) and (retry or not self._is_final(case))]
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
         """Record the outcome of a case, and remove files of its attempts."""
@@ -157,7 +153,8 @@ class StudyFolder:
 
 DONE, FAILED, MISSING, INVALID = range(4)
 STATES = {DONE: "done", FAILED: "failed", MISSING: "missing", INVALID: "invalid"}
-STUDY_VERSION = 1
+FLAGS = {"flag_values": np.array(list(STATES), "i1"), "flag_meanings": " ".join(STATES.values())}
+"""CF attributes of the states."""
 
 
 def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
@@ -173,7 +170,7 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
         }
 
 
-def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> Dataset:
+def collect(plan: Plan, folder: StudyFolder, file: StudyFile) -> Dataset:
     """Combine the finished cases in one dataset: the last load step of each, or all along ``step``.
 
     Values of other cases are NaN, for the reason in ``status``, ``exit_code`` and ``message``.
@@ -187,25 +184,22 @@ def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, A
     longest = max((len(next(iter(history.values()))) for history in found if history), default=0)
     present = {name for history in found for name in history}
     columns: dict[str, Any] = {}
+    over, sizes = (("step",), (longest,)) if file.steps == "all" else ((), ())
     for name in (name for name in VARIABLES if name in present):
-        values = np.full((total, longest if steps == "all" else 1), np.nan)
+        values = np.full((total, *(sizes or (1,))), np.nan)
         for row, history in enumerate(found):
-            kept = history.get(name, ())[0 if steps == "all" else -1 :]
+            kept = history.get(name, ())[0 if sizes else -1 :]
             values[row, : len(kept)] = kept
         about = {key: value for key, value in VARIABLES[name].attributes.items() if key[:4] != "flag"}
-        if steps == "all":
-            columns[name] = ((*dims, "step"), values.reshape(*shape, longest), about)
-        else:
-            columns[name] = (dims, values.reshape(shape), about)
+        columns[name] = ((*dims, *over), values.reshape(*shape, *sizes), about)
 
     def by_case(values: Any, dtype: Any, long_name: str, **more: Any) -> Any:
         return dims, np.array(list(values), dtype=dtype).reshape(shape), {"long_name": long_name, **more}
 
     outcomes = [state_of(folder, case) for case in plan.cases]
     status, codes, messages = zip(*outcomes, strict=True)
-    flags = {"flag_values": np.array(list(STATES), "i1"), "flag_meanings": " ".join(STATES.values())}
     numbers = map(folder.number, plan.cases)
-    columns["status"] = by_case(status, "i1", "state of the case", **flags)
+    columns["status"] = by_case(status, "i1", "state of the case", **FLAGS)
     columns["exit_code"] = by_case(codes, "i2", "exit code of the case, 0 if it has not failed", units="1")
     columns["message"] = by_case(messages, str, "why the case failed")
     columns["case_number"] = by_case(numbers, "i4", "number of the file of the case", units="1")
@@ -219,10 +213,9 @@ def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, A
         of = "case in the study" if dim == "case" else "values in the group"
         about = {"long_name": f"number of the {of}, the first is 1", "units": "1"}
         coordinates[dim] = (dim, np.arange(1, plan.dims[dim] + 1, dtype="i4"), about)
-    if steps == "all":
-        step = VARIABLES["step"]
-        coordinates["step"] = ("step", np.arange(1, longest + 1, dtype="i4"), step.attributes)
-    return xarray.Dataset(columns, coordinates, {"Conventions": CONVENTIONS, **attributes})
+    if over:
+        coordinates["step"] = (over, np.arange(1, longest + 1, dtype="i4"), VARIABLES["step"].attributes)
+    return xarray.Dataset(columns, coordinates, {**ABOUT, "combine": file.combine})
 
 
 def state_of(folder: StudyFolder, case: PlannedCase) -> tuple[int, int, str]:
@@ -253,23 +246,32 @@ def refuse_foreign(path: Path) -> None:
             raise DeckError(f"{path} exists and is not the result of a study; choose another output")
 
 
-def write(dataset: Dataset, path: Path, about: dict[str, str]) -> None:
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """Yield the temporary name of a file as `replacing`; ResourceError if it cannot be written."""
+    try:
+        with replacing(path) as temporary:
+            yield temporary
+    except (OSError, RuntimeError) as error:
+        raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def write(dataset: Dataset, path: Path, title: str, file: StudyFile) -> None:
     """Write the result of a study; an older one is replaced as a whole.
 
-    The texts `about` are attributes of the group ``study``: xarray does not combine datasets whose own
+    Its title and file are attributes of the group ``study``: xarray does not combine datasets whose own
     attributes differ.
     """
     refuse_foreign(path)
+    study = json.dumps(file.model_dump(mode="json", exclude_defaults=True), default=str)
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
     texts = [name for name, variable in dataset.variables.items() if variable.dtype.kind in "UO"]
     import xarray
 
-    try:
-        with replacing(path) as temporary:
-            netcdf_library.write(dataset, temporary, encoding={name: {"dtype": "S1"} for name in texts})
-            netcdf_library.write(xarray.Dataset(attrs=about), temporary, mode="a", group="study")
-    except (OSError, RuntimeError) as error:
-        raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error
+    about = xarray.Dataset(attrs={"title": title, "study": study})
+    with writing(path) as temporary:
+        netcdf_library.write(dataset, temporary, encoding={name: {"dtype": "S1"} for name in texts})
+        netcdf_library.write(about, temporary, mode="a", group="study")
 
 
 _MOST_ROWS = 100  # in a terminal

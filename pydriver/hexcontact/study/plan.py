@@ -8,13 +8,15 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar, Literal
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 from pydantic_core import PydanticCustomError
 
-from ..deck.faults import Source
+from ..deck.faults import Source, deck_error
 from ..deck.interface import FrictionKind, NodalCoefficient, TwoCoefficients
 from ..deck.json_schema import schema_of
 from ..deck.keys import Deck
@@ -32,9 +34,9 @@ from ..deck.kinds import (
     WordOr,
     refuse,
 )
-from ..deck.read import assemble
+from ..deck.read import Assembled, assemble
 from ..deck.table_base import Table, extended, kind_of, meaning
-from ..deck.toml import as_toml, with_overrides
+from ..deck.toml import as_toml, read_toml, with_overrides
 from ..deck.units import NUMBER, SPIN, UnitError, to_si
 from ..errors import DeckError, Fault
 from ..problem.checks import checked
@@ -91,6 +93,9 @@ class Expression(Text):
             refuse(f"expected {error}")
 
 
+_pair = partial(Several, count=2)
+
+
 class Parameter(Table):
     """An entry of [[parameter]]: a key of the deck, or several, and its values."""
 
@@ -103,8 +108,8 @@ class Parameter(Table):
     values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = meaning(
         None, "the values"
     )
-    range: Annotated[tuple[Any, ...], Several(Anything(), "bounds", '["1 N", "5 N"]', count=2)] | None = (
-        meaning(None, "first and last value, instead of `values`")
+    range: Annotated[tuple[Any, ...], _pair(Anything(), "bounds", '["1 N", "5 N"]')] | None = meaning(
+        None, "first and last value, instead of `values`"
     )
     count: Annotated[int, Whole(2, MOST_CASES)] | None = meaning(
         None, "number of values in `range` (grid, zip)"
@@ -151,32 +156,22 @@ def _from_zero(values: Sequence[float]) -> str:
     return "" if fits else "expected 0, or a number below it, and a number above it"
 
 
+_CREEPAGE_X = _pair(Quantity(NUMBER), "numbers", "[0, 0.01]", fault_of=_from_zero)
+_CREEPAGE_Y = _pair(Quantity(NUMBER), "numbers", "[-0.01, 0.01]", fault_of=_both_signs)
+_SPIN = _pair(Quantity(SPIN), "spins", '["0 rad/m", "40 rad/m"]', fault_of=_from_zero)
 _FEWEST = 4  # values along an axis of a creep table: as many as a cubic needs
 
 
 class CreepAxes(Table):
     """Ranges of a creep table, and numbers of its cases; an empty table takes all from the contact."""
 
-    creepage_x: (
-        Annotated[
-            tuple[float, ...], Several(Quantity(NUMBER), "numbers", "[0, 0.01]", count=2, fault_of=_from_zero)
-        ]
-        | None
-    ) = meaning(None, "range of `creepage_x`; from 0: the table is mirrored; to full slip if absent")
-    creepage_y: (
-        Annotated[
-            tuple[float, ...],
-            Several(Quantity(NUMBER), "numbers", "[-0.01, 0.01]", count=2, fault_of=_both_signs),
-        ]
-        | None
-    ) = meaning(None, "range of `creepage_y` at the pole of the table; to full slip if absent")
-    spin: (
-        Annotated[
-            tuple[float, ...],
-            Several(Quantity(SPIN), "spins", '["0 rad/m", "40 rad/m"]', count=2, fault_of=_from_zero),
-        ]
-        | None
-    ) = meaning(None, "range of `spin`, likewise")
+    creepage_x: Annotated[tuple[float, ...], _CREEPAGE_X] | None = meaning(
+        None, "range of `creepage_x`; from 0: the table is mirrored; to full slip if absent"
+    )
+    creepage_y: Annotated[tuple[float, ...], _CREEPAGE_Y] | None = meaning(
+        None, "range of `creepage_y` at the pole of the table; to full slip if absent"
+    )
+    spin: Annotated[tuple[float, ...], _SPIN] | None = meaning(None, "range of `spin`, likewise")
     counts: Annotated[
         tuple[int, ...], Several(Whole(_FEWEST, MOST_CASES), "whole numbers", "[12, 27, 10]", count=3)
     ] = meaning((12, 27, 10), "numbers of creepages x and y and of spins, denser near 0")
@@ -253,6 +248,19 @@ _Extended: Any = extended(_Study, KEYS)
 class StudyFile(_Extended):
     """A whole study file."""
 
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """Read a study file; DeckError with a sentence for each fault."""
+        data, text = read_toml(path, "a study")
+        if "body" in data and "parameter" not in data:
+            raise DeckError(f"{path} is a deck and no study; hexcontact run {path} solves it")
+        return cls.parse(data, Source(str(path), text))
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Names of parameters by their keys; keys without one are missing."""
+        return {key: entry.name for entry in self.parameter if entry.name for key in entry.key}
+
 
 def study_schema() -> Schema:
     """Return the JSON schema of study files."""
@@ -280,6 +288,7 @@ class Axis:
     scale: str = "linear"  # spacing of the values in a range: linear or log
     dims: tuple[str, ...] = ()  # of the result, along which it varies
     formula: Formula | None = None  # its value in each case
+    inputs: Mapping[str, str] = field(default_factory=dict)  # keys of the names in the formula
 
     @property
     def key(self) -> str:
@@ -403,16 +412,19 @@ def dimensions(
     for axis in axes:
         if axis.formula is not None:
             used: set[str] = set()
+            inputs: dict[str, str] = {}
             for name in axis.formula.names:
-                (key, source), problem = _key_of(name, axes), ""
-                if source is None and not _is_number(deck, key):
+                source, problem = next((one for one in axes if name in (one.name, *one.keys)), None), ""
+                inputs[name] = name if source is None or name in source.keys else source.key
+                if source is None and not _is_number(deck, name):
                     problem = f"{name} is neither a parameter nor a number of the deck"
                 elif source is not None and source.name not in placed:
                     problem = f"{name} has an expression itself; expected one above this parameter"
                 if problem:
                     raise wrong(study, axis.key, f"expression: {problem}")
                 used |= set(placed[source.name].dims if source else ())
-            placed[axis.name] = replace(axis, dims=tuple(dim for dim in together if dim in used))
+            dims_of = tuple(dim for dim in together if dim in used)
+            placed[axis.name] = replace(axis, dims=dims_of, inputs=inputs)
     dims = {}
     for dim, group in together.items():
         rows: Iterable[Sequence[Any]] = zip(*(axis.values for axis in group), strict=True)
@@ -429,12 +441,6 @@ def dimensions(
     return tuple(placed[axis.name] for axis in axes), dims
 
 
-def _key_of(name: str, axes: Sequence[Axis]) -> tuple[str, Axis | None]:
-    """Return the key of a name in a formula, and its parameter; None for a key of the deck alone."""
-    axis = next((axis for axis in axes if name == axis.name or name in axis.keys), None)
-    return (name if axis is None or name in axis.keys else axis.key), axis
-
-
 def _is_number(deck: Table, key: str) -> bool:
     with contextlib.suppress(StopIteration, LookupError, ValueError, AttributeError):
         info, value = _field(deck, key)
@@ -442,12 +448,11 @@ def _is_number(deck: Table, key: str) -> bool:
     return False
 
 
-def evaluated(axis: Axis, axes: Sequence[Axis], deck: Table, merged: Mapping[str, Any], study: str) -> Any:
+def evaluated(axis: Axis, deck: Table, merged: Mapping[str, Any], study: str) -> Any:
     """Return the value of a formula in a case, as its deck holds it."""
     assert axis.formula is not None
     numbers = {}
-    for name in axis.formula.names:
-        key, _ = _key_of(name, axes)
+    for name, key in axis.inputs.items():
         info, default = _field(deck, key)
         value: Any = merged
         for part in key.split("."):
@@ -518,36 +523,39 @@ def in_short(value: object) -> str:
     return shown(float(f"{value:.10g}") if isinstance(value, float) else value)
 
 
-def plan(
-    file: StudyFile,
-    base: Mapping[str, Any],
-    source: Source,
-    study: str,
-    check: CheckLevel,
-    skip_invalid: bool,
-) -> Plan:
+def base_of(deck: str | Path | Mapping[str, Any]) -> Assembled:
+    """Return a base deck that contains included decks and rows of series, as its cases do."""
+    base, text = (deck, "") if isinstance(deck, Mapping) else read_toml(deck)
+    name = "" if isinstance(deck, Mapping) else str(deck)
+    whole = assemble(base, text, Source(name, text), Path(name).parent)
+    if whole.problems:
+        raise deck_error(whole.problems, whole.source)
+    return whole
+
+
+def plan(file: StudyFile, whole: Assembled, study: str, check: CheckLevel, skip_invalid: bool) -> Plan:
     """Build and check all cases of a study; raise a DeckError with a sentence for each fault.
 
-    Of `base` the output file is ignored. Check "windows" finds the window of every case by a coarse solution,
-    "decks" tests decks and loads, "nothing" builds the decks alone. With `skip_invalid` wrong cases are
-    marked, unless all are wrong.
+    The output file of the deck is ignored. Check "windows" finds the window of every case by a coarse
+    solution, "decks" tests decks and loads, "nothing" builds the decks alone. With `skip_invalid` wrong
+    cases are marked, unless all are wrong.
     """
     tolerant = skip_invalid or check == "nothing"
-    output = base.get("output")
+    base, source = dict(whole.data), whole.source
+    output = base.pop("output", None)
     if isinstance(output, Mapping):
         output = {key: value for key, value in output.items() if key != "file"}
-    others = {} if output in (None, {}) else {"output": output}
-    base = {key: value for key, value in base.items() if key != "output"} | others
+    if output not in (None, {}):
+        base["output"] = output
     keys = [key for parameter in file.parameter for key in parameter.key]
-    mark = f"{study}: parameter "
-    about = replace(source, overrides=frozenset(keys), of_override=mark)
+    about = replace(source, overrides=frozenset(keys), of_override=f"{study}: parameter ")
     for key in keys:
         if key == "output" or key.startswith("output.file"):
             raise wrong(study, key, "a study names the files of its cases itself")
         if keys.count(key) > 1:
             raise wrong(study, key, "expected each key only once")
-    names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
-    deck = _first_deck(file, base, about, mark, tolerant, names)
+    names = file.names
+    deck = _first_deck(file, base, about, tolerant)
     given = [axis_of(entry, deck, file.combine, study) for entry in file.parameter]
     _refuse_namesakes(given, [entry.group for entry in file.parameter], study)
     axes, dims = dimensions(file, given, deck, study)
@@ -557,12 +565,13 @@ def plan(
     lines: dict[str, str] = {}  # about wrong cases, by their messages
     for position, choices in enumerate(itertools.product(*dims.values())):
         values = {key: value for choice in choices for key, value in choice.items()}
-        merged, faults = {}, []
+        merged: dict[str, Any] = {}
+        faults: dict[str, str] = {}
         try:
-            merged = _merged(base, values, mark)
+            merged = _merged(base, values, about)
             for axis in axes:
                 if axis.formula is not None:
-                    found = dict.fromkeys(axis.keys, evaluated(axis, axes, deck, merged, study))
+                    found = dict.fromkeys(axis.keys, evaluated(axis, deck, merged, study))
                     values |= found
                     merged = with_overrides(merged, found)
             if check == "windows":
@@ -570,11 +579,9 @@ def plan(
             elif check == "decks":
                 checked(assemble(merged, source=about), None, None)
         except DeckError as error:
-            faults = _shared_by_segments(error)
-            of_case = _lines(faults, keys, PlannedCase(position, values, "", names=names))
-            lines |= {message: line for message, line in of_case.items() if message not in lines}
-        messages = "\n".join(fault.message for fault in faults)
-        cases.append(PlannedCase(position, values, as_toml(merged), messages, names))
+            faults = _lines(error, keys, PlannedCase(position, values, "", names=names))
+            lines |= {message: line for message, line in faults.items() if message not in lines}
+        cases.append(PlannedCase(position, values, as_toml(merged), "\n".join(faults), names))
     invalid = sum(bool(case.fault) for case in cases)
     if invalid and not (tolerant and invalid < len(cases)):
         more = f"... and {len(lines) - _MOST_LINES} more"
@@ -587,58 +594,44 @@ def plan(
     return Plan(axes, tuple(cases), {name: len(choices) for name, choices in dims.items()})
 
 
-def _first_deck(
-    file: StudyFile,
-    base: Mapping[str, Any],
-    about: Source,
-    mark: str,
-    tolerant: bool,
-    names: Mapping[str, str],
-) -> Deck:
+def _first_deck(file: StudyFile, base: Mapping[str, Any], about: Source, tolerant: bool) -> Deck:
     """Return the checked deck of the first values, or of the first valid ones, in which keys are found."""
     given = {key: entry.values or entry.range or () for entry in file.parameter for key in entry.key}
     error: DeckError | None = None
     for place in range(max(map(len, given.values())) if tolerant else 1):
         values = {key: entries[min(place, len(entries) - 1)] for key, entries in given.items() if entries}
         try:
-            return Deck.parse(_merged(base, values, mark), about)
+            return Deck.parse(_merged(base, values, about), about)
         except DeckError as found:
-            lines = _lines(_shared_by_segments(found), given, PlannedCase(place, values, "", names=names))
-            error = error or DeckError("\n".join(lines.values()), found.faults)
+            case = PlannedCase(place, values, "", names=file.names)
+            error = error or DeckError("\n".join(_lines(found, given, case).values()), found.faults)
     assert error is not None
     raise error
 
 
-def _merged(base: Mapping[str, Any], values: Mapping[str, Any], mark: str) -> dict[str, Any]:
+def _merged(base: Mapping[str, Any], values: Mapping[str, Any], about: Source) -> dict[str, Any]:
     """Return a deck with the values of parameters; an error names the parameter."""
     try:
         return with_overrides(base, values)
     except DeckError as error:
-        message = f"{mark}{error}"
+        message = f"{about.of_override}{error}"
         raise DeckError(message, [Fault(message, next(iter(values)))]) from None
 
 
-def _shared_by_segments(error: DeckError) -> list[Fault]:
-    """Return the faults of an error, one for those that several load segments share."""
+def _lines(error: DeckError, keys: Iterable[str], case: PlannedCase) -> dict[str, str]:
+    """Return a line for each fault by its message, one for those that several load segments share.
+
+    Parameters of the case are named if the fault is of none.
+    """
     found: dict[tuple[str, str], list[Fault]] = {}
     for fault in error.faults or [Fault(str(error))]:
         name = fault.key
         if name.startswith("load."):
             name = next(part for part in reversed(name.split(".")) if not part.isdecimal())
         found.setdefault((name, fault.sentence or fault.message), []).append(fault)
-    return [
-        first._replace(
-            message=first.message + f" (likewise in {counted(len(more), 'more segment')})" * bool(more)
-        )
-        for first, *more in found.values()
-    ]
-
-
-def _lines(faults: Sequence[Fault], keys: Iterable[str], case: PlannedCase) -> dict[str, str]:
-    """Return a line for each fault by its message; parameters of the case are named if it is of none."""
-    found = {}
-    for fault in faults:
-        of_parameter = any(fault.key == key or fault.key.startswith(f"{key}.") for key in keys)
-        about = "" if of_parameter else f" (in case {case.position + 1}: {case})"
-        found[fault.message] = fault.message + about
-    return found
+    lines = {}
+    for first, *more in found.values():
+        message = first.message + f" (likewise in {counted(len(more), 'more segment')})" * bool(more)
+        of_parameter = any(first.key == key or first.key.startswith(f"{key}.") for key in keys)
+        lines[message] = message + ("" if of_parameter else f" (in case {case.position + 1}: {case})")
+    return lines

@@ -9,7 +9,6 @@ Examples
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import sys
@@ -18,11 +17,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from .._version import __version__
 from ..arrays import Dataset
-from ..deck.faults import Source, deck_error
-from ..deck.read import assemble
-from ..deck.toml import read_toml
+from ..deck.faults import Source
+from ..deck.toml import plain, read_toml
 from ..errors import DeckError
 from ..solve.events import Bar, Lines, Listener, Listeners
 from ..solve.log import Log
@@ -31,8 +28,8 @@ from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
 from .creep import CreepStudy
-from .dataset import STATES, STUDY_VERSION, StudyFolder, collect, refuse_foreign, state_of, write
-from .plan import CheckLevel, Plan, PlannedCase, StudyFile, plan
+from .dataset import STATES, StudyFolder, collect, refuse_foreign, state_of, write
+from .plan import CheckLevel, Plan, PlannedCase, StudyFile, base_of, plan
 
 
 class StudyLines(Lines):
@@ -116,19 +113,16 @@ class Study:
         skip_invalid: bool = False,
         **keys: Any,
     ) -> None:
-        from ..deck.toml import plain
-
         if isinstance(parameters, Mapping):
             parameters = [
                 {"key": key, **(values if isinstance(values, Mapping) else {"values": plain(values)})}
                 for key, values in parameters.items()
             ]
-        given = isinstance(deck, Mapping)
-        data = {**keys, "parameter": list(parameters), "deck": "deck" if given else str(deck)}
+        named = "deck" if isinstance(deck, Mapping) else str(deck)
+        data = {**keys, "parameter": list(parameters), "deck": named}
         self.file, self.name = StudyFile.parse(data, Source()), name
         self.output = Path(output or self.file.output or "study.nc")
-        base, text = (dict(deck), "") if isinstance(deck, Mapping) else read_toml(deck)
-        self._build(base, Source("" if given else str(deck), text), "windows", skip_invalid)
+        self._build(deck, "windows", skip_invalid)
 
     @classmethod
     def from_toml(
@@ -150,27 +144,18 @@ class Study:
         skip_invalid : bool
             Leave out wrong cases, with the status ``invalid`` in the result.
         """
-        data, text = read_toml(path, "a study")
-        if "body" in data and "parameter" not in data:
-            raise DeckError(f"{path} is a deck and no study; hexcontact run {path} solves it")
         study = cls.__new__(cls)
-        study.file, study.name = StudyFile.parse(data, Source(str(path), text)), str(path)
+        study.file, study.name = StudyFile.read(path), str(path)
         if study.file.creep_table is not None:
             raise DeckError(f"{path} is a creep table; hexcontact study {path} or run_study computes it")
         study.output = Path(output or study.file.output or f"{Path(path).stem}.nc")
-        deck = Path(path).parent / study.file.deck
-        base, deck_text = read_toml(deck)
         level: CheckLevel = check if isinstance(check, str) else "windows" if check else "nothing"
-        study._build(base, Source(str(deck), deck_text), level, skip_invalid)
+        study._build(Path(path).parent / study.file.deck, level, skip_invalid)
         return study
 
-    def _build(self, base: Mapping[str, Any], source: Source, check: CheckLevel, skip_invalid: bool) -> None:
+    def _build(self, deck: str | Path | Mapping[str, Any], check: CheckLevel, skip_invalid: bool) -> None:
         """Build and check the cases, and open the folder of the study."""
-        # Every case contains included decks and rows of series.
-        whole = assemble(base, source.text, source, Path(source.name).parent)
-        if whole.problems:
-            raise deck_error(whole.problems, whole.source)
-        self.plan: Plan = plan(self.file, whole.data, whole.source, self.name, check, skip_invalid)
+        self.plan: Plan = plan(self.file, base_of(deck), self.name, check, skip_invalid)
         self.folder = StudyFolder(self.output)
         self.folder.assign(self.plan)
 
@@ -307,20 +292,13 @@ class Study:
         DeckError or ResourceError if it cannot be written.
         """
         dataset = self._combined()
-        study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
-        write(dataset, self.output, {"title": self.title, "study": study})
+        write(dataset, self.output, self.title, self.file)
         return dataset
 
     def _combined(self) -> Dataset:
         """Return the data set of the finished cases."""
         self.folder.enter(self.plan)
-        attributes = {
-            "source": f"hexcontact {__version__}",
-            "hexcontact_version": __version__,
-            "study_version": STUDY_VERSION,
-            "combine": self.file.combine,
-        }
-        return collect(self.plan, self.folder, self.file.steps, attributes)
+        return collect(self.plan, self.folder, self.file)
 
     def __repr__(self) -> str:
         """Name the study, its parameters and the number of its cases."""

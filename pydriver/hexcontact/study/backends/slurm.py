@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import itertools
 import os
 import re
 import shlex
@@ -107,10 +108,6 @@ class JobArray:
 
 def _ranges(numbers: Sequence[int]) -> str:
     """Return numbers in the notation of Slurm: 1-4,7."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1][1:] = [number]
-        else:
-            runs.append([number])
-    return ",".join("-".join(map(str, run)) for run in runs)
+    steps = itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0])  # one for each run
+    runs = [[number for _, number in run] for _, run in steps]
+    return ",".join(f"{run[0]}-{run[-1]}" if run[1:] else str(run[0]) for run in runs)

@@ -121,7 +121,8 @@ class Bodies(Table):
         """Initial gap between the two surfaces."""
         modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
         one, two = (
-            body.surface.beside(modulus) if body.surface else Flat() for body in (self.body_1, self.body_2)
+            body.surface.each(lambda part: part.beside(modulus)) if body.surface else Flat()
+            for body in (self.body_1, self.body_2)
         )
         return Separation(one, two)
 

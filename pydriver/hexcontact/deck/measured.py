@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from .faults import MISSING
 from .height_map import HeightMap, Placed, along_axes, axis_names, place
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
-from .surfaces import Angle, Point, Surface, shape
+from .surfaces import Angle, Point, PositiveLength, Surface, shape
 from .table_base import meaning, refuse_key
 from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
@@ -83,22 +83,11 @@ class Numbers(Kind):
         return found.tolist()
 
 
-if TYPE_CHECKING:
-    HeightFile = Read[Path | None, str | Path | None]
-    TwoLengths = Read[tuple[float, float] | None, Sequence[float | str] | None]
-    Width = Read[float | None, float | str | None]
-    Line = Read[list[Any] | None, ArrayLike | None]
-    Grid = Read[list[Any] | None, ArrayLike | None]
-else:
-    HeightFile = Annotated[Path, FileName()] | None
-    TwoLengths = (
-        Annotated[
-            tuple[float, float], Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2)
-        ]
-        | None
-    )
-    Width = Annotated[float, Quantity(LENGTH, above=0)] | None
-    Line, Grid = Annotated[list[Any], Numbers()] | None, Annotated[list[Any], Numbers(2)] | None
+_Pair = Read[tuple[float, float], Sequence[float | str]]
+HeightFile = Annotated[Read[Path, str | Path], FileName()] | None
+TwoLengths = Annotated[_Pair, Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', 2)] | None
+Line = Annotated[Read[list[Any], ArrayLike], Numbers()] | None
+Grid = Annotated[Read[list[Any], ArrayLike], Numbers(2)] | None
 
 
 class Points(NamedTuple):
@@ -137,9 +126,10 @@ class Measured(Surface):
         "cubic",
         "cubic: a spline, near steps monotone between the points; linear: bilinear between four points",
     )
-    taper: Width = meaning(
+    taper: PositiveLength | None = meaning(
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
+    of_points: ClassVar[bool] = True
     extruded: ClassVar[bool] = False
     _file_key: ClassVar[str] = "file"
     _period: tuple[float, float] | None = PrivateAttr(None)
@@ -259,11 +249,6 @@ class Measured(Surface):
         return HeightMap(x, y, height, "heights", 3 if self.interpolation == "cubic" else 1)
 
     # --- the surface ----------------------------------------------------------------------------------------
-
-    @property
-    def measured(self) -> tuple[Measured, ...]:
-        """Itself."""
-        return (self,)
 
     @property
     def direction(self) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,31 +51,19 @@ def _coefficient_dimension(exponent: float) -> Dimension:
     return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
 
 
-PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
-PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
-if TYPE_CHECKING:
-    Radius = Read[float, float | str]
-    CurvatureRadius = Read[float, float | str]
-    SignedRadius = Read[float, float | str]
-    LengthFromZero = Read[float, float | str]
-    Angle = Read[float, float | str]
-    Tilt = Read[tuple[float, float], Sequence[float | str]]
-    Coefficient = Read[float, float | str]
-    Point = Read[tuple[float, float], Sequence[float | str]]
-else:
-    Radius = PositiveLength
-    CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
-    SignedRadius = Annotated[float, NonzeroQuantity(LENGTH)]
-    LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
-    Angle = Annotated[float, Quantity(ANGLE)]
-    Tilt = Annotated[
-        tuple[float, float],
-        Several(Quantity(ANGLE, at_least=-0.1, at_most=0.1), "angles", '["0.01 deg", "0 deg"]', count=2),
-    ]
-    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
-    Point = Annotated[
-        tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
-    ]
+_Number = Read[float, float | str]
+_Pair = Read[tuple[float, float], Sequence[float | str]]
+PositiveNumber = Annotated[_Number, Quantity(NUMBER, above=0)]
+Radius = Annotated[_Number, Quantity(LENGTH, above=0)]
+PositiveLength = Radius
+CurvatureRadius = Annotated[_Number, RadiusOfCurvature(LENGTH, above=0)]
+SignedRadius = Annotated[_Number, NonzeroQuantity(LENGTH)]
+LengthFromZero = Annotated[_Number, Quantity(LENGTH, at_least=0)]
+Angle = Annotated[_Number, Quantity(ANGLE)]
+Coefficient = Annotated[_Number, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
+Point = Annotated[_Pair, Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
+_SMALL = Quantity(ANGLE, at_least=-0.1, at_most=0.1)
+Tilt = Annotated[_Pair, Several(_SMALL, "angles", '["0.01 deg", "0 deg"]', count=2)]
 
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
@@ -110,6 +98,8 @@ class Surface(Argument):
     """Height about the shape's own center, for the documentation."""
     as_given: ClassVar[bool] = False
     """Whether its heights are used unshifted, wherever it would touch first."""
+    of_points: ClassVar[bool] = False
+    """Whether it was measured."""
     one_spot: ClassVar[bool] = True
     """Whether it touches a flat in about an ellipse, for a spacing of "auto"."""
     wave: ClassVar[str] = ""
@@ -146,26 +136,30 @@ class Surface(Argument):
             height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
         return height
 
+    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
+        """Return the surface with each of its shapes changed."""
+        return changed(self)
+
     def beside(self, modulus: float) -> Surface:
-        """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
+        """Return the shape on bodies of a modulus E* (Pa), which few shapes depend on."""
+        return self
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the shape over a window that repeats with two sides (m) along x and y; None: others."""
         return self
 
     @property
     def measured(self) -> tuple[Any, ...]:
         """The maps and profiles among its shapes (`Measured`)."""
-        return ()
-
-    def repeating(self, sides: tuple[float, float] | None) -> Surface:
-        """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
-        return self
+        return tuple(one for one in self.shapes if one.of_points)
 
     @property
     def moving(self) -> tuple[Surface, ...]:
         """The shapes that are bound to a rolling body."""
-        return (self,) if self.moves else ()
+        return tuple(one for one in self.shapes if one.moves)
 
     def moved(self, by: ArrayLike) -> Surface:
-        """Return the surface after its body has moved by a vector (m), with the shapes bound to it."""
+        """Return the shape after its body has moved by a vector (m), if it is bound to it."""
         x, y = np.add(self.offset, by)
         return self.model_copy(update={"offset": (float(x), float(y))}) if self.moves else self
 
@@ -671,11 +665,6 @@ class SurfaceSum(Surface):
         return self.parts
 
     @property
-    def curvature(self) -> Array | None:
-        """None: the shapes may have different centers."""
-        return None
-
-    @property
     def reach(self) -> float:
         """The smallest of all."""
         return min(part.reach for part in self.parts)
@@ -684,27 +673,9 @@ class SurfaceSum(Surface):
         """Return the sum of the heights (m)."""
         return np.asarray(sum(part.height(x, y) for part in self.parts))
 
-    def beside(self, modulus: float) -> Surface:
-        """Return the sum of shapes of the modulus."""
-        return SurfaceSum(parts=tuple(part.beside(modulus) for part in self.parts))
-
-    @property
-    def measured(self) -> tuple[Any, ...]:
-        """Those of all shapes."""
-        return tuple(one for part in self.parts for one in part.measured)
-
-    @property
-    def moving(self) -> tuple[Surface, ...]:
-        """Those of all shapes."""
-        return tuple(one for part in self.parts for one in part.moving)
-
-    def moved(self, by: ArrayLike) -> Surface:
-        """Return the sum of the moved shapes."""
-        return SurfaceSum(parts=tuple(part.moved(by) for part in self.parts))
-
-    def repeating(self, sides: tuple[float, float] | None) -> Surface:
-        """Return the sum of shapes over a window that repeats."""
-        return SurfaceSum(parts=tuple(part.repeating(sides) for part in self.parts))
+    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
+        """Return the sum of the changed shapes."""
+        return SurfaceSum(parts=tuple(map(changed, self.parts)))
 
     def written(self, defaults: bool = True) -> Any:
         """Return the shapes with their keys."""

@@ -31,7 +31,7 @@ def surface(case: Any) -> Figure:
     case : hexcontact.Case
         A case.
     """
-    both = enumerate((case.surfaces.surface_1, case.surfaces.surface_2), 1)
+    both = enumerate(case.surfaces.surfaces, 1)
     maps = [(number, one) for number, part in both for one in part.measured]
     canvas = new_figure(_WIDTH * max(len(maps), 1), _HEIGHT)
     canvas.set_layout_engine("compressed")

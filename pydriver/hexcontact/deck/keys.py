@@ -345,7 +345,7 @@ def _annotation(name: str, kind: Quantity) -> Any:
 _Driven: Any = extended(
     Table,
     {
-        name: (_annotation(name, load.kind), meaning(None, load.of_segment, load.example))
+        name: (_annotation(name, load.kind), meaning(None, load.meaning, load.example))
         for name, load in COLUMNS.items()
     },
 )

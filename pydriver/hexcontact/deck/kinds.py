@@ -320,15 +320,15 @@ class Whole(Kind):
 
 
 class Word(Kind):
-    """One of several words."""
+    """One of several words, or false if it is among them."""
 
-    def __init__(self, words: tuple[str, ...]) -> None:
+    def __init__(self, words: tuple[Any, ...]) -> None:
         self.words, self.schema = words, {"enum": list(words)}
-        self.expected = listed([f'"{word}"' for word in words], "or")
+        self.expected = listed([shown(word) for word in words], "or")
 
-    def _parse(self, value: object) -> str:
-        if not isinstance(value, str) or value not in self.words:
-            refuse(f"expected {self.expected}{did_you_mean(value, self.words)}")
+    def _parse(self, value: object) -> Any:
+        if not isinstance(value, str | bool) or value not in self.words:
+            refuse(f"expected {self.expected}{did_you_mean(value, filter(None, self.words))}")
         return value
 
 

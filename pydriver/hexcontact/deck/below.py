@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar
 
 from ..text import did_you_mean, listed
 from ..variables import STRESSES
 from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr
-from .table_base import Table, meaning
+from .table_base import Conflicts, Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
 
@@ -79,7 +79,7 @@ class Below(Table):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one region, and only the keys that belong to it."""
         given = [key for key in REGIONS if key in data] or [*cls.default_region]
         if len(given) != 1:
@@ -154,7 +154,7 @@ class Criteria(Table):
     ductility_exponent: Annotated[float, _EXPONENT] | None = meaning(None, "c of the life", "-0.52")
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the constants of the parameters."""
         wanted = data.get("parameters")
         for name in wanted if isinstance(wanted, list | tuple) else ():
@@ -179,7 +179,7 @@ class Fatigue(Criteria, Below):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the segments or the load steps of the cycle."""
         yield from super().conflicts(data)
         if ("segment" in data) == ("steps" in data):

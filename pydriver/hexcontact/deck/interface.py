@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ from ..errors import DeckError
 from ..text import listed, quantity
 from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .measured import CoefficientMap
-from .table_base import Table, meaning
+from .table_base import Conflicts, Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, angle_text, to_si
 
 FROM_PYTHON = "python"  # in the deck of a case with a coefficient from Python
@@ -182,7 +182,7 @@ class Interface(Table):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Refuse the exponent of an absent friction limit."""
         if "friction_exponent" in data and "friction_coefficient" not in data:
             yield "friction_exponent", "expected nothing, or a friction_coefficient, too"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
+from ..text import listed
 from ..variables import BULK_STRESS, CREEPAGES, FIELDS, LOADS, ROLLED
 from . import measured, rough  # noqa: F401 (their shapes)
 from .below import Fatigue, Stress
@@ -40,7 +41,7 @@ from .kinds import (
 from .separation import Separation
 from .series import COLUMNS, CONTROLS, MEANS, MOST_STEPS, Series
 from .surfaces import Flat, Point, Surface, SurfaceKind
-from .table_base import Table, extended, meaning, problems_of
+from .table_base import Conflicts, Table, extended, meaning, not_both, problems_of, refused
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, SPIN, Dimension
 
 ALGORITHMS = ("frictionless", "static", "incremental")
@@ -99,14 +100,14 @@ class Body(Table):
         return None if surface and surface.flat else surface
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require moduli of an elastic body, and refuse those of a rigid one."""
         moduli = {"young_modulus": 'a pressure such as "210 GPa"', "poisson_ratio": "a number such as 0.3"}
+        if data.get("rigid") is True:
+            yield from refused(data, moduli, "expected nothing, since the body is rigid")
+            return
         for key, words in moduli.items():
-            if data.get("rigid") is True:
-                if key in data:
-                    yield key, "expected nothing, since the body is rigid"
-            elif key not in data:
+            if key not in data:
                 yield key, f"missing; expected {words}, or rigid = true"
 
 
@@ -120,19 +121,15 @@ class Bodies(Table):
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
         modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
-        one, two = (
-            body.surface.each(lambda part: part.beside(modulus)) if body.surface else Flat()
-            for body in (self.body_1, self.body_2)
-        )
-        return Separation(one, two)
+        one, two = (body.surface or Flat() for body in (self.body_1, self.body_2))
+        return Separation(one, two).each(lambda part: part.beside(modulus))
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require at least one elastic body, or a coating."""
-        bodies = [data.get(key) for key in ("1", "2")]
-        if all(
-            isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies
-        ):
+        bodies = [one for key in "12" if isinstance(one := data.get(key), Mapping)]
+        bare = [one for one in bodies if one.get("rigid") is True and not one.get("coating")]
+        if len(bare) == 2:
             yield "2", "expected one elastic body at least; both are rigid, without a coating"
 
 
@@ -251,21 +248,20 @@ class Grid(Table):
         return self.cell_angle or (math.pi / 2 if right else math.pi / 3)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one key for the spacing, and at most one for the size."""
         fineness = [key for key in FINENESS if key in data]
+        keys = listed(FINENESS, "and")
         if not fineness:
-            yield "spacing", "missing; expected one of spacing, nodes_across and nodes_in_radius"
+            yield "spacing", f"missing; expected one of {keys}"
         for key in fineness[1:]:
-            keys = "spacing, nodes_across and nodes_in_radius"
             yield key, f"expected only one of {keys}; {fineness[0]} is given too"
         if "window" in data and data.get("extent", "auto") != "auto":
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:
             yield "window", "expected window or nodes_across, not both"
-        for key in ("cell_angle", "cell_ratio"):
-            if data.get("lattice") and key in data:
-                yield key, "expected lattice or cells, not both"
+        if data.get("lattice"):
+            yield from refused(data, ("cell_angle", "cell_ratio"), "expected lattice or cells, not both")
         two = isinstance(data.get("spacing"), list | tuple)
         if two and "cell_ratio" in data:
             yield "cell_ratio", "expected two spacings or cell_ratio, not both"
@@ -352,36 +348,24 @@ _Driven: Any = extended(
 
 
 _ROLLING = ("rolling", *CREEPAGES)
-_UNROLLED = (
-    "shift_x",
-    "shift_y",
-    "twist",
-    "ramp",
-    "bulk_stress_xx",
-    "bulk_stress_yy",
-    "bulk_stress_xy",
-    *MEANS,
-)
 
 
-def _rolling_conflicts(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _rolling_conflicts(data: Mapping[str, Any]) -> Conflicts:
     """Refuse creepages beside their loads and without rolling, and keys that mean nothing beside rolling."""
-    pairs = [(load, motion) for load, motion in ROLLED.values() if motion in CREEPAGES]
     if "rolling" not in data:
-        for key in ("rolling_direction", *CREEPAGES):
-            if key in data:
-                yield key, 'needs rolling beside it: "steady", or a distance'
+        needed = 'needs rolling beside it: "steady", or a distance'
+        yield from refused(data, ("rolling_direction", *CREEPAGES), needed)
         return
-    for force, creepage in pairs:
-        if force in data and creepage in data:
-            yield creepage, f"expected {force} or {creepage}, not both"
-    for key in _UNROLLED:
-        if key in data and not (key == "ramp" and data[key] == "linear"):
-            yield key, "expected nothing beside rolling, which takes creepages, spin or loads"
+    for force, motion in ROLLED.values():
+        if motion in CREEPAGES:
+            yield from not_both(data, force, motion)
+    ramp = ("ramp",) * (data.get("ramp") != "linear")
+    unrolled = "shift_x", "shift_y", "twist", *ramp, *BULK_STRESS, *MEANS
+    sentence = "expected nothing beside rolling, which takes creepages, spin or loads"
+    yield from refused(data, unrolled, sentence)
     if data["rolling"] != "steady":
-        for key in ("steps", "values"):
-            if key in data:
-                yield key, "expected nothing beside a rolled distance, which takes a step for each spacing"
+        sentence = "expected nothing beside a rolled distance, which takes a step for each spacing"
+        yield from refused(data, ("steps", "values"), sentence)
     elif data.get("steps") == "auto":
         yield "steps", "expected a number beside rolling"
 
@@ -429,7 +413,7 @@ class Segment(_Driven):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one control of each motion, and one kind of ramp."""
         whole = "path" in data or "series" in data
         known = cls.known_keys()
@@ -439,9 +423,7 @@ class Segment(_Driven):
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for names in CONTROLS:
-            found = [key for key in names if key in data]
-            if found[1:]:
-                yield found[1], f"expected {found[0]} or {found[1]}, not both"
+            yield from not_both(data, *names)
         yield from _rolling_conflicts(data)
         if data.get("ramp") == "cubic" and not {"normal_load", "mean_pressure"} & data.keys():
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
@@ -481,15 +463,14 @@ class Load(Segment):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Refuse keys of a segment beside a path or a series."""
         yield from super().conflicts(data)
-        if "path" in data and "series" in data:
-            yield "series", "expected path or series, not both"
+        if {"path", "series"} <= data.keys():
+            yield from not_both(data, "path", "series")
         elif whole := next((key for key in _BESIDE if key in data), ""):
-            for key in Segment.known_keys():
-                if key in data and key not in _BESIDE[whole]:
-                    yield key, f"expected in the {whole}, not beside it"
+            inner = (key for key in Segment.known_keys() if key not in _BESIDE[whole])
+            yield from refused(data, inner, f"expected in the {whole}, not beside it")
         elif "repeat" in data:
             yield "repeat", "needs a path of segments or a series to repeat"
 
@@ -536,7 +517,7 @@ class Wear(Table):
         return max(tolerance, _SOLVED * self.tolerance)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require a body that wears, and refuse a tolerance with a given jump."""
         if not any(data.get(f"coefficient_{number}") for number in (1, 2)):
             yield "coefficient_1", "expected a coefficient above 0 of one body at least"

@@ -24,7 +24,7 @@ from .height_map import HeightMap, Placed, along_axes, place, rotated
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
 from .surfaces import Angle, Point, PositiveLength, Surface, shape
-from .table_base import meaning, refuse_key
+from .table_base import Conflicts, meaning, not_both, refuse_key, refused
 from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
 _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file alone
@@ -125,13 +125,11 @@ class Measured(Surface):
     _placing: ClassVar[tuple[str, ...]] = ()  # further keys that go with a file alone
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require a file or points, without the keys of the other one."""
         own = [key for key in _POINTS if key in cls.known_keys()]
         if data.get("file"):
-            for key in own:
-                if key in data:
-                    yield key, "expected a file or points, not both"
+            yield from refused(data, own, "expected a file or points, not both")
             return
         if "heights" not in data:
             yield "file", 'missing; expected the name of a file such as "heights.csv"'
@@ -139,9 +137,8 @@ class Measured(Surface):
         for key in own:
             if key not in data:
                 yield key, "missing; expected numbers (m)"
-        for key in (*_OF_FILES, *cls._placing):
-            if key in data:
-                yield key, "expected nothing beside points, which are in m"
+        sentence = "expected nothing beside points, which are in m"
+        yield from refused(data, (*_OF_FILES, *cls._placing), sentence)
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -381,11 +378,10 @@ class Map(Measured):
     _placing: ClassVar[tuple[str, ...]] = ("extent", "spacing", "center", "first_row")
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one key for the distances at most."""
         yield from super().conflicts(data)
-        if "extent" in data and "spacing" in data:
-            yield "spacing", "expected extent or spacing, not both"
+        yield from not_both(data, "extent", "spacing")
 
     @cached_property
     def points(self) -> Points:

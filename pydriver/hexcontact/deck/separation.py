@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -55,10 +56,13 @@ class Separation:
                 return (*key, "expression") if part.shape == "formula" else key
         return ("body",)
 
+    def each(self, changed: Callable[[Surface], Surface]) -> Separation:
+        """Return the gap of surfaces with each of their shapes changed."""
+        return Separation(self.surface_1.each(changed), self.surface_2.each(changed))
+
     def moved(self, by: ArrayLike) -> Separation:
         """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
-        one, two = (surface.each(lambda part: part.moved(by)) for surface in self.surfaces)
-        return Separation(one, two, self.at_rest or self)
+        return replace(self.each(lambda part: part.moved(by)), at_rest=self.at_rest or self)
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -68,7 +72,7 @@ class Separation:
     @property
     def moves(self) -> bool:
         """Whether shapes are bound to rolling bodies."""
-        return any(part.moves for part in self.shapes)
+        return bool(self.surface_1.moving or self.surface_2.moving)
 
     @property
     def convex(self) -> bool:
@@ -139,8 +143,7 @@ class Separation:
 
     def repeating(self, sides: tuple[float, float] | None) -> Separation:
         """Return the gap over a window that repeats with two sides (m) along x and y; None: others."""
-        one, two = (surface.each(lambda part: part.repeating(sides)) for surface in self.surfaces)
-        return Separation(one, two)
+        return self.each(lambda part: part.repeating(sides))
 
     @property
     def one_map(self) -> bool:

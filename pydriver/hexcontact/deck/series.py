@@ -20,7 +20,7 @@ from ..files import is_defect, require_ordinary, text_of
 from ..text import counted, did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Several, Text, refuse
-from .table_base import Table, extended, meaning
+from .table_base import Conflicts, Table, extended, meaning, refused
 from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 
@@ -172,14 +172,12 @@ class Series(_Rows):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require arrays of one length, one control of each motion in a row, and a file without arrays."""
         data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
         arrays = {key: data[key] for key in (*COLUMNS, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
-            for key in (*COLUMNS, "label"):
-                if key in data:
-                    yield key, "expected in the file, not beside it"
+            yield from refused(data, (*COLUMNS, "label"), "expected in the file, not beside it")
             return
         if "columns" in data:
             yield "columns", "needs a file"

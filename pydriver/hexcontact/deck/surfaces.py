@@ -37,7 +37,7 @@ from .kinds import (
     Word,
     refuse,
 )
-from .table_base import Argument, meaning, refuse_key
+from .table_base import Argument, Conflicts, meaning, refuse_key
 from .units import ANGLE, FORCE, LENGTH, NUMBER, Dimension, readable
 
 _S = TypeVar("_S", bound="Surface")
@@ -517,7 +517,7 @@ class Roller(Surface):
     _modulus: float = PrivateAttr(0.0)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the key of the profile, and no other."""
         needed = {"chamfer": "chamfer", "crown": "crown_radius", "logarithmic": "design_load"}
         profile = data.get("profile", "sharp")

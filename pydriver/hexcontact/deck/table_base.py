@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NoReturn, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
@@ -69,6 +69,21 @@ def not_included(word: str) -> str:
     return f"{found[0]}: not included (docs/limits.md says what is, and what to do instead)" if found else ""
 
 
+Conflicts = Iterator[tuple[str, str]]
+"""Key and sentence of each fault of a table as a whole; an empty key is the whole table."""
+
+
+def refused(data: Mapping[str, Any], keys: Iterable[str], sentence: str) -> Conflicts:
+    """Yield the given ones of some keys with a sentence."""
+    return ((key, sentence) for key in keys if key in data)
+
+
+def not_both(data: Mapping[str, Any], *keys: str) -> Conflicts:
+    """Yield the second of the given ones of some keys that exclude each other."""
+    found = [key for key in keys if key in data]
+    return ((key, f"expected {found[0]} or {key}, not both") for key in found[1:2])
+
+
 class Table(BaseModel):
     """A table of a deck: immutable, with known keys only, and with all mistakes reported together."""
 
@@ -81,11 +96,8 @@ class Table(BaseModel):
     """Further conditions if no key of the table is in an included deck."""
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Yield (key, sentence) for keys that exclude or need each other, from the table as written.
-
-        An empty key is the whole table.
-        """
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
+        """Yield keys that exclude or need each other, from the table as written."""
         yield from ()
 
     @classmethod

@@ -43,7 +43,7 @@ SYMBOLS = {
     **dict.fromkeys(("R", "r", "diameter"), "radius"),
     **{f"diameter_{axis}": f"radius_{axis}" for axis in "xy"},
     **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
-    "height": "length",
+    **{"height": "length", "periodic": "boundary", "creepage": "creepage_x"},
     **dict.fromkeys(("coatings", "layer", "layers", "film"), "coating"),
 }
 """Keys of decks by the symbols and words of engineers, with the table if several have such a key."""
@@ -56,8 +56,6 @@ _NOT_INCLUDED = {
     "viscoelastic bodies": ("viscoelastic", "prony"),
     "anisotropic bodies": ("anisotrop", "orthotropicstiffness"),
     "inertia": ("density", "mass", "inertia", "velocity", "frequency"),
-    "rolling": ("rolling", "creepage"),
-    "periodic surfaces": ("periodic",),
 }
 """Features that the program does not have (docs/limits.md), with the beginnings of their words, folded."""
 

@@ -48,6 +48,7 @@ ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
 ITERATIONS = ("newton", "dissertation")
 FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
+_ONE_OF = listed(FINENESS, "and")
 BOUNDARIES = ("free", "periodic")
 LATTICES = ("equilateral", "rectangular")
 AUTO_SPACINGS = 20.0  # in the contact radius, where the spacing is "auto"
@@ -120,9 +121,10 @@ class Bodies(Table):
     @functools.cached_property
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
-        modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
-        one, two = (body.surface or Flat() for body in (self.body_1, self.body_2))
-        return Separation(one, two).each(lambda part: part.beside(modulus))
+        one, two = self.body_1, self.body_2
+        modulus = 1.0 / (one.compliance + two.compliance)
+        gap = Separation(one.surface or Flat(), two.surface or Flat())
+        return gap.each(lambda part: part.beside(modulus))
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
@@ -251,11 +253,10 @@ class Grid(Table):
     def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one key for the spacing, and at most one for the size."""
         fineness = [key for key in FINENESS if key in data]
-        keys = listed(FINENESS, "and")
         if not fineness:
-            yield "spacing", f"missing; expected one of {keys}"
+            yield "spacing", f"missing; expected one of {_ONE_OF}"
         for key in fineness[1:]:
-            yield key, f"expected only one of {keys}; {fineness[0]} is given too"
+            yield key, f"expected only one of {_ONE_OF}; {fineness[0]} is given too"
         if "window" in data and data.get("extent", "auto") != "auto":
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ class Separation:
     @property
     def moves(self) -> bool:
         """Whether shapes are bound to rolling bodies."""
-        return bool(self.surface_1.moving or self.surface_2.moving)
+        return any(map(attrgetter("moves"), self.shapes))
 
     @property
     def convex(self) -> bool:
@@ -82,7 +83,7 @@ class Separation:
     @property
     def flat(self) -> bool:
         """Whether both surfaces are planes without a tilt."""
-        return all(one.flat for one in self.surfaces)
+        return self.surface_1.flat and self.surface_2.flat
 
     @cached_property
     def first_touch(self) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
@@ -151,12 +152,7 @@ class Surface(Argument):
     @property
     def measured(self) -> tuple[Any, ...]:
         """The maps and profiles among its shapes (`Measured`)."""
-        return tuple(one for one in self.shapes if one.of_points)
-
-    @property
-    def moving(self) -> tuple[Surface, ...]:
-        """The shapes that are bound to a rolling body."""
-        return tuple(one for one in self.shapes if one.moves)
+        return tuple(filter(attrgetter("of_points"), self.shapes))
 
     def moved(self, by: ArrayLike) -> Surface:
         """Return the shape after its body has moved by a vector (m), if it is bound to it."""
@@ -717,14 +713,14 @@ class SurfaceKind(Kind):
         if not isinstance(value, Mapping):
             refuse(f"expected {self.expected}")
         shape = value.get("shape")
-        words = Word(tuple(SHAPES))
-        if shape is None:
-            refuse_key("shape", MISSING, f"missing; expected {words.expected}")
         if not isinstance(shape, str) or shape not in SHAPES:
-            known = f"expected {words.expected}{did_you_mean(shape, SHAPES)}"
+            expected = f"expected {Word(tuple(SHAPES)).expected}"
+            if shape is None:
+                refuse_key("shape", MISSING, f"missing; {expected}")
+            known = expected + did_you_mean(shape, SHAPES)
             refuse_key("shape", shape, _REFUSED.get(str(shape), known))
         try:
-            return SHAPES[shape](**{str(key): entry for key, entry in value.items()})
+            return SHAPES[shape](**dict(zip(map(str, value), value.values(), strict=True)))
         except DeckError as error:
             # pydantic merges the inner error, with its keys, into that of the enclosing deck.
             raise (error.__cause__ or error) from None

@@ -73,13 +73,16 @@ Conflicts = Iterator[tuple[str, str]]
 
 def refused(data: Mapping[str, Any], keys: Iterable[str], sentence: str) -> Conflicts:
     """Yield the given ones of some keys with a sentence."""
-    return ((key, sentence) for key in keys if key in data)
+    for key in keys:
+        if key in data:
+            yield key, sentence
 
 
 def not_both(data: Mapping[str, Any], *keys: str) -> Conflicts:
     """Yield the second of the given ones of some keys that exclude each other."""
-    found = [key for key in keys if key in data]
-    return ((key, f"expected {found[0]} or {key}, not both") for key in found[1:2])
+    first, second, *_ = *filter(data.__contains__, keys), "", ""
+    if second:
+        yield second, f"expected {first} or {second}, not both"
 
 
 class Table(BaseModel):

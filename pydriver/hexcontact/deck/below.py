@@ -12,16 +12,6 @@ from .table_base import Conflicts, Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
 
-def _above(point: Sequence[float]) -> str:
-    """Return the fault of a point above the surface."""
-    return "expected a point of the body: a depth of at least 0, whichever body it is" * (point[2] < 0.0)
-
-
-def _falling(side: Sequence[float]) -> str:
-    """Return the fault of a side of a box."""
-    return "expected the smaller coordinate first" * (side[0] >= side[1])
-
-
 def _degenerate(points: Sequence[Sequence[float]]) -> str:
     """Return the fault of the ends of a line, or of three corners of a parallelogram."""
     one, two = ([b - a for a, b in zip(points[0], point, strict=True)] for point in (points[1], points[-1]))
@@ -31,8 +21,15 @@ def _degenerate(points: Sequence[Sequence[float]]) -> str:
     return "expected three points that are not on one line" * on_a_line
 
 
-_POINT = Several(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', 3, _above)
-_SIDE = Several(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2, _falling)
+_ABOVE = "expected a point of the body: a depth of at least 0, whichever body it is"
+_POINT = Several(
+    *(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', 3),
+    fault_of=lambda point: _ABOVE * (point[2] < 0.0),
+)
+_SIDE = Several(
+    *(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2),
+    fault_of=lambda side: "expected the smaller coordinate first" * (side[0] >= side[1]),
+)
 _ENDS = '[["0 mm", "0 mm", "0 um"], ["0 mm", "0 mm", "2 mm"]]'
 _CORNERS = "[[-1e-3, 0, 0], [1e-3, 0, 0], [-1e-3, 0, 1e-3]]"
 _Points = Annotated[tuple[Any, ...], Several(_POINT, "points", '[["0 mm", "0 mm", "20 um"]]')]

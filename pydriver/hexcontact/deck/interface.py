@@ -6,7 +6,6 @@ import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import DeckError
 from ..text import listed, quantity
-from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
+from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .measured import CoefficientMap
 from .table_base import Conflicts, Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, angle_text, to_si
@@ -79,7 +78,7 @@ class FrictionKind(Kind):
             return self.kind.parse(value)
         if value == FROM_PYTHON:
             refuse("the coefficient was given in Python and is not in the deck; run the script it came from")
-        return NodalCoefficient(partial(_at, formula_over_plane(value, self.expected)), value)
+        return NodalCoefficient(formula_over_plane(value, self.expected), value)
 
     def _of_table(self, value: Mapping[str, Any]) -> Any:
         """Return two coefficients, the name of a map, or a map from a table."""
@@ -143,10 +142,6 @@ def _is_pure(text: str) -> bool:
     except UnitError:
         return False
     return True
-
-
-def _at(formula: Formula, x: Any, y: Any) -> Any:
-    return formula.over(x=x, y=y)
 
 
 def stiffness(exponent: float) -> Dimension:

@@ -151,11 +151,8 @@ class Bulk(Table):
     @property
     def components(self) -> tuple[str, ...]:
         """Keys of [[load]] for its stress, without the direction of no strain."""
-        return tuple(
-            name
-            for name in BULK_STRESS
-            if not self.state.endswith(f"strain {name[-2]}") or name[-2] != name[-1]
-        )
+        axis = self.state.removeprefix("plane strain ")
+        return tuple(name for name in BULK_STRESS if not name.endswith(2 * axis))
 
 
 class Grid(Table):

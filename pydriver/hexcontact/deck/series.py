@@ -192,15 +192,19 @@ class Series(_Rows):
             yield displacement, f"expected {force} or {displacement} in each row, not both (entry {row + 1})"
 
     @property
+    def _arrays(self) -> dict[str, Any]:
+        return {key: array for key in (*COLUMNS, "label") if (array := getattr(self, key)) is not None}
+
+    @property
     def count(self) -> int:
         """Number of rows."""
-        return len(next(filled for key in COLUMNS if (filled := getattr(self, key)) is not None))
+        return len(next(iter(self._arrays.values())))
 
     @property
     def missing(self) -> dict[str, int]:
         """Number of rows without a value of each load or motion that other rows have."""
-        arrays = {key: array for key in COLUMNS if (array := getattr(self, key)) is not None}
-        counts = {}
+        arrays, counts = self._arrays, {}
+        arrays.pop("label", None)
         for key in arrays:
             others = next((names for names in CONTROLS if key in names), (key,))
             columns = [arrays[name] for name in others if name in arrays]
@@ -209,9 +213,9 @@ class Series(_Rows):
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the values of each row, in SI, and its label."""
-        named = {key: array for key in (*COLUMNS, "label") if (array := getattr(self, key)) is not None}
-        for row in zip(*named.values(), strict=True):
-            yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
+        arrays = self._arrays
+        for row in zip(*arrays.values(), strict=True):
+            yield {key: value for key, value in zip(arrays, row, strict=True) if value is not None}
 
 
 def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:

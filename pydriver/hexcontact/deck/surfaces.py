@@ -28,10 +28,8 @@ from .kinds import (
     Formula,
     HeightFormula,
     Kind,
-    NonzeroQuantity,
     PowerCoefficient,
     Quantity,
-    RadiusOfCurvature,
     Read,
     Schema,
     Several,
@@ -57,8 +55,9 @@ _Pair = Read[tuple[float, float], Sequence[float | str]]
 PositiveNumber = Annotated[_Number, Quantity(NUMBER, above=0)]
 Radius = Annotated[_Number, Quantity(LENGTH, above=0)]
 PositiveLength = Radius
-CurvatureRadius = Annotated[_Number, RadiusOfCurvature(LENGTH, above=0)]
-SignedRadius = Annotated[_Number, NonzeroQuantity(LENGTH)]
+_HOLLOW = '; a hollow is an ellipsoid: { shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }'
+CurvatureRadius = Annotated[_Number, Quantity(LENGTH, above=0, remedy=_HOLLOW)]
+SignedRadius = Annotated[_Number, Quantity(LENGTH, nonzero=True)]
 LengthFromZero = Annotated[_Number, Quantity(LENGTH, at_least=0)]
 Angle = Annotated[_Number, Quantity(ANGLE)]
 Coefficient = Annotated[_Number, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
@@ -111,7 +110,7 @@ class Surface(Argument):
     @property
     def flat(self) -> bool:
         """Whether it is the plane z = 0."""
-        return False
+        return self.shape == "flat" and not any(self.tilt)
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -234,11 +233,6 @@ class Flat(Surface):
     one_spot: ClassVar[bool] = False
 
     formula: ClassVar[str] = "h = 0"
-
-    @property
-    def flat(self) -> bool:
-        """Whether it is not tilted."""
-        return not any(self.tilt)
 
     @property
     def curvature(self) -> Array:
@@ -611,7 +605,7 @@ class FormulaSurface(Surface):
 
     def _height(self, x: Array, y: Array) -> Array:
         x, y = np.broadcast_arrays(x, y)
-        return Formula(self.expression).over(x=x, y=y) + np.zeros(x.shape)
+        return Formula(self.expression)(x, y) + np.zeros(x.shape)
 
 
 @functools.lru_cache(64)

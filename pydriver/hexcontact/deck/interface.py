@@ -74,8 +74,10 @@ class FrictionKind(Kind):
             return value
         if isinstance(value, Mapping):
             return self._of_table(value)
-        if not isinstance(value, str) or _is_pure(value):
+        if not isinstance(value, str):
             return self.kind.parse(value)
+        with contextlib.suppress(UnitError):  # a text that is a number, such as a share in percent
+            return self.kind.parse(to_si(value, NUMBER))
         if value == FROM_PYTHON:
             refuse("the coefficient was given in Python and is not in the deck; run the script it came from")
         return NodalCoefficient(formula_over_plane(value, self.expected), value)
@@ -134,14 +136,6 @@ class FrictionKind(Kind):
         description = self.expected[0].upper() + self.expected[1:]
         kinds = [{"type": "number", "minimum": 0}, {"type": "string"}, *objects]
         return {"anyOf": kinds, "description": description}
-
-
-def _is_pure(text: str) -> bool:
-    try:
-        to_si(text, NUMBER)
-    except UnitError:
-        return False
-    return True
 
 
 def stiffness(exponent: float) -> Dimension:

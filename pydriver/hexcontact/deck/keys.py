@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -36,7 +36,6 @@ from .kinds import (
     Whole,
     Word,
     WordOr,
-    refuse,
 )
 from .separation import Separation
 from .series import COLUMNS, CONTROLS, MEANS, MOST_STEPS, Series
@@ -311,35 +310,26 @@ class Solver(Table):
     )
 
 
-class Fractions(Several):
-    """Fractions of a segment, rising to 1."""
-
-    def __init__(self, kind: Quantity, example: str) -> None:
-        super().__init__(kind, "", example)
-        self.expected = f"fractions of the segment, rising to 1, such as {example}"
-
-    def _parse(self, value: object) -> tuple[float, ...]:
-        fractions = super()._parse(value)
-        if fractions[-1] != 1.0 or any(b <= a for a, b in pairwise(fractions)):
-            refuse(f"expected {self.expected}")
-        return fractions
-
-    @property
-    def schema(self) -> Schema:  # type: ignore[override]
-        """An array of different numbers."""
-        return super().schema | {"uniqueItems": True}
+def _unlike_fractions(values: Sequence[float]) -> str:
+    """Return the fault of numbers that do not rise to 1."""
+    rise = values[-1] == 1.0 and all(a < b for a, b in pairwise(values))
+    return "" if rise else f"expected {_FRACTIONS.expected}"
 
 
-def _annotation(name: str, kind: Quantity) -> Any:
-    if name.startswith(("tangential_load", "mean_traction")):
-        return Annotated[float | Share, OrShare(kind)] | None
-    return Annotated[float, kind] | None
-
-
+_FRACTIONS = Several(
+    *(Quantity(NUMBER, above=0, at_most=1), "fractions", "[0.1, 0.4, 1]"),
+    fault_of=_unlike_fractions,
+    unique=True,
+    words="fractions of the segment, rising to 1,",
+)
+_SHARED = ("tangential_load_x", "tangential_load_y", "mean_traction_x", "mean_traction_y")
+_KINDS: dict[str, Any] = {
+    name: OrShare(load.kind) if name in _SHARED else load.kind for name, load in COLUMNS.items()
+}
 _Driven: Any = extended(
     Table,
     {
-        name: (_annotation(name, load.kind), meaning(None, load.meaning, load.example))
+        name: (Annotated[float | Share, _KINDS[name]] | None, meaning(None, load.meaning, load.example))
         for name, load in COLUMNS.items()
     },
 )
@@ -388,9 +378,9 @@ class Segment(_Driven):
     ramp: Annotated[str, Word(("linear", "cubic"))] = meaning(
         "linear", "cubic: the cube root of normal_load grows evenly, all else linearly"
     )
-    values: (
-        Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "[0.1, 0.4, 1]")] | None
-    ) = meaning(None, "fraction of the segment done at the end of each step, instead of `ramp`")
+    values: Annotated[tuple[float, ...], _FRACTIONS] | None = meaning(
+        None, "fraction of the segment done at the end of each step, instead of `ramp`"
+    )
     label: Annotated[str, Text()] = meaning("", "name of the segment in the result", '"press"')
     rolling: Annotated[float | str, WordOr("steady", Quantity(LENGTH, above=0))] | None = meaning(
         None,

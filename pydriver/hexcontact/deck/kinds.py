@@ -399,7 +399,7 @@ class Several(Kind):
     """An array of values of one kind: `count` of them, or at least one.
 
     `plural` is the noun for them, `example` an array as in a deck; `fault_of` returns a sentence about values
-    that do not fit together.
+    that do not fit together, `unique` ones differ; `words` are others for the array.
     """
 
     def __init__(
@@ -409,17 +409,19 @@ class Several(Kind):
         example: str,
         count: int | None = None,
         fault_of: Callable[[Any], str] = lambda _: "",
+        unique: bool = False,
+        words: str = "",
     ) -> None:
         self.kind, self.example, self.count, self.fault_of = kind, example, count, fault_of
         number = {None: "an array of", 2: "two", 3: "three"}[count]
-        self.expected = f"{number} {plural} such as {example}"
+        self.expected = f"{words or f'{number} {plural}'} such as {example}"
+        self._bounds = ({"maxItems": count} if count else {}) | ({"uniqueItems": True} if unique else {})
 
     @property
     def schema(self) -> Schema:  # type: ignore[override]
         """An array of the values."""
-        most = {"maxItems": self.count} if self.count else {}
         items = getattr(self.kind, "schema", {})
-        return {"type": "array", "items": items, "minItems": self.count or 1, **most}
+        return {"type": "array", "items": items, "minItems": self.count or 1, **self._bounds}
 
     def written(self, value: Any) -> list[Any]:
         """Return the entries."""

@@ -127,6 +127,7 @@ class Measured(Surface):
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require a file or points, without the keys of the other one."""
+        yield from not_both(data, "extent", "spacing")
         own = [key for key in _POINTS if key in cls.known_keys()]
         if data.get("file"):
             yield from refused(data, own, "expected a file or points, not both")
@@ -376,12 +377,6 @@ class Map(Measured):
     heights: Grid = meaning(None, "heights there, an array over y for each x", "[[0.0, 1e-9], [2e-9, 0.0]]")
     formula: ClassVar[str] = "h = z_max − z of heights, h = g − g_min of a gap, interpolated"
     _placing: ClassVar[tuple[str, ...]] = ("extent", "spacing", "center", "first_row")
-
-    @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
-        """Require one key for the distances at most."""
-        yield from super().conflicts(data)
-        yield from not_both(data, "extent", "spacing")
 
     @cached_property
     def points(self) -> Points:

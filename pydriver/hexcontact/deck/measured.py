@@ -237,8 +237,8 @@ class Measured(Surface):
 
     @property
     def direction(self) -> float:
-        """Angle (rad) of the first axis of the map from x."""
-        return 0.0
+        """Angle (rad) of the first axis of its points from x."""
+        return float(getattr(self, "angle", 0.0))
 
     @property
     def _axes(self) -> str:
@@ -518,11 +518,6 @@ class Profile(Measured):
             if self.center is not None:
                 y = y - (y.min() + y.max()) / 2 + self.center
         return Points(np.array([-_LONG, _LONG]), y, np.stack([z, z]), about)
-
-    @property
-    def direction(self) -> float:
-        """Angle (rad) of the extrusion from x."""
-        return self.angle
 
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""

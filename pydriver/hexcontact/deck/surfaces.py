@@ -15,9 +15,8 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, TypeAdapter
 from pydantic.fields import FieldInfo
-from pydantic_core import SchemaValidator, core_schema
 
 from ..arrays import Array, Mask
 from ..errors import DeckError
@@ -681,13 +680,6 @@ class SurfaceKind(Kind):
 
     expected = 'a table such as { shape = "sphere", radius = "1 mm" }'
 
-    @functools.cached_property
-    def _array(self) -> SchemaValidator:
-        """Validator of several shapes, which numbers their faults."""
-        return SchemaValidator(
-            core_schema.list_schema(core_schema.no_info_plain_validator_function(self.parse))
-        )
-
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""
         return value.written()
@@ -702,8 +694,8 @@ class SurfaceKind(Kind):
         if isinstance(value, Surface):
             return value
         if isinstance(value, list | tuple) and value:
-            parts = tuple(self._array.validate_python(list(value)))
-            return parts[0] if len(parts) == 1 else SurfaceSum(parts=parts)
+            first, *others = _PARTS.validate_python(list(value))  # which numbers their faults
+            return SurfaceSum(parts=(first, *others)) if others else first
         if not isinstance(value, Mapping):
             refuse(f"expected {self.expected}")
         shape = value.get("shape")
@@ -718,3 +710,6 @@ class SurfaceKind(Kind):
         except DeckError as error:
             # pydantic merges the inner error, with its keys, into that of the enclosing deck.
             raise (error.__cause__ or error) from None
+
+
+_PARTS: TypeAdapter[list[Surface]] = TypeAdapter(list[Annotated[Surface, SurfaceKind()]])

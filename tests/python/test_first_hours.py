@@ -374,6 +374,15 @@ def test_features_that_are_not_included_point_to_the_limits(folder: Path, key: s
         Case(**{"body_1": {}, "body_2": {}, key: 1})
 
 
+@pytest.mark.parametrize(
+    ("key", "meant"),
+    [("grid.periodic", "boundary"), ("load.1.creepage", "creepage_x"), ("load.1.rolling_to", "rolling")],
+)
+def test_rolling_and_windows_that_repeat_are_included(folder: Path, key: str, meant: str) -> None:
+    with pytest.raises(DeckError, match=f"unknown key; did you mean {meant}\\?"):
+        Case.from_toml("deck.toml", {key: 1})
+
+
 # --- contacts that are hollow, long, or no ellipse ----------------------------------------------------------
 
 BODIES = """

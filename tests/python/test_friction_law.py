@@ -60,8 +60,8 @@ def test_formula_over_arrays():
     x = np.linspace(-1.0, 1.0, 5)
     formula = Formula("max(min(x, 0.5), 0) ** 2 - -tanh(x) * pi / exp(abs(x))")
     expected = [formula.value({"x": float(at)}) for at in x]
-    np.testing.assert_allclose(formula.over(x=x), expected, rtol=1e-14)
-    np.testing.assert_equal(pickle.loads(pickle.dumps(formula)).over(x=x), formula.over(x=x))
+    np.testing.assert_allclose(formula(x, x), expected, rtol=1e-14)
+    np.testing.assert_equal(pickle.loads(pickle.dumps(formula))(x, x), formula(x, x))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_formula_over_arrays():
 )
 def test_formula_without_a_value_over_arrays(text, expected):
     """What raises for one number is infinite or NaN over arrays, which the law refuses."""
-    np.testing.assert_equal(Formula(text).over(x=np.ones(2)) + 0 * np.ones(2), np.full(2, expected))
+    np.testing.assert_equal(Formula(text)(np.ones(2), np.ones(2)) + 0 * np.ones(2), np.full(2, expected))
 
 
 def test_full_slip_of_a_formula(tmp_path):

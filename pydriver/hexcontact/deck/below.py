@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar
 
 from ..text import did_you_mean, listed
 from ..variables import STRESSES
 from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr
-from .table_base import Table, meaning
+from .table_base import Conflicts, Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
-
-
-def _above(point: Sequence[float]) -> str:
-    """Return the fault of a point above the surface."""
-    return "expected a point of the body: a depth of at least 0, whichever body it is" * (point[2] < 0.0)
-
-
-def _falling(side: Sequence[float]) -> str:
-    """Return the fault of a side of a box."""
-    return "expected the smaller coordinate first" * (side[0] >= side[1])
 
 
 def _degenerate(points: Sequence[Sequence[float]]) -> str:
@@ -31,8 +21,15 @@ def _degenerate(points: Sequence[Sequence[float]]) -> str:
     return "expected three points that are not on one line" * on_a_line
 
 
-_POINT = Several(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', 3, _above)
-_SIDE = Several(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2, _falling)
+_ABOVE = "expected a point of the body: a depth of at least 0, whichever body it is"
+_POINT = Several(
+    *(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', 3),
+    fault_of=lambda point: _ABOVE * (point[2] < 0.0),
+)
+_SIDE = Several(
+    *(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2),
+    fault_of=lambda side: "expected the smaller coordinate first" * (side[0] >= side[1]),
+)
 _ENDS = '[["0 mm", "0 mm", "0 um"], ["0 mm", "0 mm", "2 mm"]]'
 _CORNERS = "[[-1e-3, 0, 0], [1e-3, 0, 0], [-1e-3, 0, 1e-3]]"
 _Points = Annotated[tuple[Any, ...], Several(_POINT, "points", '[["0 mm", "0 mm", "20 um"]]')]
@@ -79,7 +76,7 @@ class Below(Table):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one region, and only the keys that belong to it."""
         given = [key for key in REGIONS if key in data] or [*cls.default_region]
         if len(given) != 1:
@@ -154,7 +151,7 @@ class Criteria(Table):
     ductility_exponent: Annotated[float, _EXPONENT] | None = meaning(None, "c of the life", "-0.52")
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the constants of the parameters."""
         wanted = data.get("parameters")
         for name in wanted if isinstance(wanted, list | tuple) else ():
@@ -179,7 +176,7 @@ class Fatigue(Criteria, Below):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the segments or the load steps of the cycle."""
         yield from super().conflicts(data)
         if ("segment" in data) == ("steps" in data):

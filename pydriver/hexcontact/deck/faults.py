@@ -52,9 +52,12 @@ class Source:
         """Return the file of a dotted key and the place in it; no file for overrides and cases of Python."""
         if self._overridden(key) or not self.name:
             return "", None
-        written = [(name, place_of(found, tuple(key.split(".")))) for name, found in self._places]
-        name, (_, place) = max(written, key=lambda entry: entry[1][0])  # of equals the first
-        return name, place
+        path = tuple(key.split("."))
+        for length in range(len(path), 0, -1):  # a missing key has the place of its table
+            for name, found in self._places:
+                if place := found.get(path[:length]):
+                    return name, place
+        return self.name, None
 
     def locate(self, key: str) -> str:
         """Return "file:line:column: ", "override: " or "" for a dotted key."""
@@ -178,11 +181,3 @@ def places(text: str) -> dict[KeyPath, Place]:
             around.append((outer, number and number + 1))
             state = "value" if number else "key"
     return found
-
-
-def place_of(found: dict[KeyPath, Place], path: KeyPath) -> tuple[int, Place | None]:
-    """Return the number of parts of a path that are written, and the place of the last of them."""
-    for length in range(len(path), 0, -1):
-        if place := found.get(path[:length]):
-            return length, place
-    return 0, None

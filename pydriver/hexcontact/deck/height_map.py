@@ -213,7 +213,7 @@ class Placed(NamedTuple):
     @property
     def names(self) -> str:
         """Names of its own axes."""
-        return axis_names(self.angle)
+        return "st" if self.angle else "xy"
 
     @property
     def distances(self) -> tuple[float, ...]:
@@ -232,11 +232,11 @@ class Placed(NamedTuple):
 
     def own(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return points of the plane in coordinates of the map."""
-        return _rotated(x - self.offset[0], y - self.offset[1], -self.angle)
+        return rotated(x - self.offset[0], y - self.offset[1], -self.angle)
 
     def in_plane(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return points of the map in coordinates of the plane."""
-        x, y = _rotated(x, y, self.angle)
+        x, y = rotated(x, y, self.angle)
         return x + self.offset[0], y + self.offset[1]
 
     # --- contacts that the data do not bound ----------------------------------------------------------------
@@ -289,20 +289,17 @@ class Placed(NamedTuple):
         return place(*(float(at) for at in self.in_plane(np.asarray(x), np.asarray(y))))
 
 
-def _rotated(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+def rotated(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
     """Return points that are turned about the origin by an angle (rad)."""
-    a, b = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
+    if not angle:
+        return x, y
+    a, b = math.cos(angle), math.sin(angle)
     return a * x - b * y, b * x + a * y
-
-
-def axis_names(angle: float) -> str:
-    """Return the names of axes that are turned by an angle (rad)."""
-    return "st" if angle else "xy"
 
 
 def along_axes(offset: tuple[float, float], angle: float) -> tuple[float, float]:
     """Return an offset (m) along axes that are turned by an angle (rad)."""
-    x, y = _rotated(np.asarray(offset[0]), np.asarray(offset[1]), -angle)
+    x, y = rotated(np.asarray(offset[0]), np.asarray(offset[1]), -angle)
     return float(x), float(y)
 
 

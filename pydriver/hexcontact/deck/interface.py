@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,9 +13,9 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import DeckError
 from ..text import listed, quantity
-from .kinds import Formula, Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
+from .kinds import Kind, PowerCoefficient, Quantity, Schema, Word, formula_over_plane, refuse
 from .measured import CoefficientMap
-from .table_base import Table, meaning
+from .table_base import Conflicts, Table, meaning
 from .units import ANGLE, NUMBER, PRESSURE, Dimension, UnitError, angle_text, to_si
 
 FROM_PYTHON = "python"  # in the deck of a case with a coefficient from Python
@@ -75,11 +74,13 @@ class FrictionKind(Kind):
             return value
         if isinstance(value, Mapping):
             return self._of_table(value)
-        if not isinstance(value, str) or _is_pure(value):
+        if not isinstance(value, str):
             return self.kind.parse(value)
+        with contextlib.suppress(UnitError):  # a text that is a number, such as a share in percent
+            return self.kind.parse(to_si(value, NUMBER))
         if value == FROM_PYTHON:
             refuse("the coefficient was given in Python and is not in the deck; run the script it came from")
-        return NodalCoefficient(partial(_at, formula_over_plane(value, self.expected)), value)
+        return NodalCoefficient(formula_over_plane(value, self.expected), value)
 
     def _of_table(self, value: Mapping[str, Any]) -> Any:
         """Return two coefficients, the name of a map, or a map from a table."""
@@ -137,18 +138,6 @@ class FrictionKind(Kind):
         return {"anyOf": kinds, "description": description}
 
 
-def _is_pure(text: str) -> bool:
-    try:
-        to_si(text, NUMBER)
-    except UnitError:
-        return False
-    return True
-
-
-def _at(formula: Formula, x: Any, y: Any) -> Any:
-    return formula.over(x=x, y=y)
-
-
 def stiffness(exponent: float) -> Dimension:
     """Return the dimension of a pressure over a power of the penetration."""
     unit = "Pa/m" + f"^{exponent:g}" * (exponent != 1)
@@ -182,7 +171,7 @@ class Interface(Table):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Refuse the exponent of an absent friction limit."""
         if "friction_exponent" in data and "friction_coefficient" not in data:
             yield "friction_exponent", "expected nothing, or a friction_coefficient, too"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
+from ..text import listed
 from ..variables import BULK_STRESS, CREEPAGES, FIELDS, LOADS, ROLLED
 from . import measured, rough  # noqa: F401 (their shapes)
 from .below import Fatigue, Stress
@@ -35,18 +36,18 @@ from .kinds import (
     Whole,
     Word,
     WordOr,
-    refuse,
 )
 from .separation import Separation
 from .series import COLUMNS, CONTROLS, MEANS, MOST_STEPS, Series
 from .surfaces import Flat, Point, Surface, SurfaceKind
-from .table_base import Table, extended, meaning, problems_of
+from .table_base import Conflicts, Table, extended, meaning, not_both, problems_of, refused
 from .units import ANGLE, LENGTH, NUMBER, PRESSURE, SPIN, Dimension
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
 ITERATIONS = ("newton", "dissertation")
 FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
+_ONE_OF = listed(FINENESS, "and")
 BOUNDARIES = ("free", "periodic")
 LATTICES = ("equilateral", "rectangular")
 AUTO_SPACINGS = 20.0  # in the contact radius, where the spacing is "auto"
@@ -99,14 +100,14 @@ class Body(Table):
         return None if surface and surface.flat else surface
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require moduli of an elastic body, and refuse those of a rigid one."""
         moduli = {"young_modulus": 'a pressure such as "210 GPa"', "poisson_ratio": "a number such as 0.3"}
+        if data.get("rigid") is True:
+            yield from refused(data, moduli, "expected nothing, since the body is rigid")
+            return
         for key, words in moduli.items():
-            if data.get("rigid") is True:
-                if key in data:
-                    yield key, "expected nothing, since the body is rigid"
-            elif key not in data:
+            if key not in data:
                 yield key, f"missing; expected {words}, or rigid = true"
 
 
@@ -119,19 +120,17 @@ class Bodies(Table):
     @functools.cached_property
     def separation(self) -> Separation:
         """Initial gap between the two surfaces."""
-        modulus = 1.0 / sum(body.compliance for body in (self.body_1, self.body_2))
-        one, two = (
-            body.surface.beside(modulus) if body.surface else Flat() for body in (self.body_1, self.body_2)
-        )
-        return Separation(one, two)
+        one, two = self.body_1, self.body_2
+        modulus = 1.0 / (one.compliance + two.compliance)
+        gap = Separation(one.surface or Flat(), two.surface or Flat())
+        return gap.each(lambda part: part.beside(modulus))
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require at least one elastic body, or a coating."""
-        bodies = [data.get(key) for key in ("1", "2")]
-        if all(
-            isinstance(one, Mapping) and one.get("rigid") is True and not one.get("coating") for one in bodies
-        ):
+        bodies = [one for key in "12" if isinstance(one := data.get(key), Mapping)]
+        bare = [one for one in bodies if one.get("rigid") is True and not one.get("coating")]
+        if len(bare) == 2:
             yield "2", "expected one elastic body at least; both are rigid, without a coating"
 
 
@@ -151,11 +150,8 @@ class Bulk(Table):
     @property
     def components(self) -> tuple[str, ...]:
         """Keys of [[load]] for its stress, without the direction of no strain."""
-        return tuple(
-            name
-            for name in BULK_STRESS
-            if not self.state.endswith(f"strain {name[-2]}") or name[-2] != name[-1]
-        )
+        axis = self.state.removeprefix("plane strain ")
+        return tuple(name for name in BULK_STRESS if not name.endswith(2 * axis))
 
 
 class Grid(Table):
@@ -250,21 +246,19 @@ class Grid(Table):
         return self.cell_angle or (math.pi / 2 if right else math.pi / 3)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one key for the spacing, and at most one for the size."""
         fineness = [key for key in FINENESS if key in data]
         if not fineness:
-            yield "spacing", "missing; expected one of spacing, nodes_across and nodes_in_radius"
+            yield "spacing", f"missing; expected one of {_ONE_OF}"
         for key in fineness[1:]:
-            keys = "spacing, nodes_across and nodes_in_radius"
-            yield key, f"expected only one of {keys}; {fineness[0]} is given too"
+            yield key, f"expected only one of {_ONE_OF}; {fineness[0]} is given too"
         if "window" in data and data.get("extent", "auto") != "auto":
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:
             yield "window", "expected window or nodes_across, not both"
-        for key in ("cell_angle", "cell_ratio"):
-            if data.get("lattice") and key in data:
-                yield key, "expected lattice or cells, not both"
+        if data.get("lattice"):
+            yield from refused(data, ("cell_angle", "cell_ratio"), "expected lattice or cells, not both")
         two = isinstance(data.get("spacing"), list | tuple)
         if two and "cell_ratio" in data:
             yield "cell_ratio", "expected two spacings or cell_ratio, not both"
@@ -316,71 +310,50 @@ class Solver(Table):
     )
 
 
-class Fractions(Several):
-    """Fractions of a segment, rising to 1."""
-
-    def __init__(self, kind: Quantity, example: str) -> None:
-        super().__init__(kind, "", example)
-        self.expected = f"fractions of the segment, rising to 1, such as {example}"
-
-    def _parse(self, value: object) -> tuple[float, ...]:
-        fractions = super()._parse(value)
-        if fractions[-1] != 1.0 or any(b <= a for a, b in pairwise(fractions)):
-            refuse(f"expected {self.expected}")
-        return fractions
-
-    @property
-    def schema(self) -> Schema:  # type: ignore[override]
-        """An array of different numbers."""
-        return super().schema | {"uniqueItems": True}
+def _unlike_fractions(values: Sequence[float]) -> str:
+    """Return the fault of numbers that do not rise to 1."""
+    rise = values[-1] == 1.0 and all(a < b for a, b in pairwise(values))
+    return "" if rise else f"expected {_FRACTIONS.expected}"
 
 
-def _annotation(name: str, kind: Quantity) -> Any:
-    if name.startswith(("tangential_load", "mean_traction")):
-        return Annotated[float | Share, OrShare(kind)] | None
-    return Annotated[float, kind] | None
-
-
+_FRACTIONS = Several(
+    *(Quantity(NUMBER, above=0, at_most=1), "fractions", "[0.1, 0.4, 1]"),
+    fault_of=_unlike_fractions,
+    unique=True,
+    words="fractions of the segment, rising to 1,",
+)
+_SHARED = ("tangential_load_x", "tangential_load_y", "mean_traction_x", "mean_traction_y")
+_KINDS: dict[str, Any] = {
+    name: OrShare(load.kind) if name in _SHARED else load.kind for name, load in COLUMNS.items()
+}
 _Driven: Any = extended(
     Table,
     {
-        name: (_annotation(name, load.kind), meaning(None, load.of_segment, load.example))
+        name: (Annotated[float | Share, _KINDS[name]] | None, meaning(None, load.meaning, load.example))
         for name, load in COLUMNS.items()
     },
 )
 
 
 _ROLLING = ("rolling", *CREEPAGES)
-_UNROLLED = (
-    "shift_x",
-    "shift_y",
-    "twist",
-    "ramp",
-    "bulk_stress_xx",
-    "bulk_stress_yy",
-    "bulk_stress_xy",
-    *MEANS,
-)
 
 
-def _rolling_conflicts(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _rolling_conflicts(data: Mapping[str, Any]) -> Conflicts:
     """Refuse creepages beside their loads and without rolling, and keys that mean nothing beside rolling."""
-    pairs = [(load, motion) for load, motion in ROLLED.values() if motion in CREEPAGES]
     if "rolling" not in data:
-        for key in ("rolling_direction", *CREEPAGES):
-            if key in data:
-                yield key, 'needs rolling beside it: "steady", or a distance'
+        needed = 'needs rolling beside it: "steady", or a distance'
+        yield from refused(data, ("rolling_direction", *CREEPAGES), needed)
         return
-    for force, creepage in pairs:
-        if force in data and creepage in data:
-            yield creepage, f"expected {force} or {creepage}, not both"
-    for key in _UNROLLED:
-        if key in data and not (key == "ramp" and data[key] == "linear"):
-            yield key, "expected nothing beside rolling, which takes creepages, spin or loads"
+    for force, motion in ROLLED.values():
+        if motion in CREEPAGES:
+            yield from not_both(data, force, motion)
+    ramp = ("ramp",) * (data.get("ramp") != "linear")
+    unrolled = "shift_x", "shift_y", "twist", *ramp, *BULK_STRESS, *MEANS
+    sentence = "expected nothing beside rolling, which takes creepages, spin or loads"
+    yield from refused(data, unrolled, sentence)
     if data["rolling"] != "steady":
-        for key in ("steps", "values"):
-            if key in data:
-                yield key, "expected nothing beside a rolled distance, which takes a step for each spacing"
+        sentence = "expected nothing beside a rolled distance, which takes a step for each spacing"
+        yield from refused(data, ("steps", "values"), sentence)
     elif data.get("steps") == "auto":
         yield "steps", "expected a number beside rolling"
 
@@ -405,9 +378,9 @@ class Segment(_Driven):
     ramp: Annotated[str, Word(("linear", "cubic"))] = meaning(
         "linear", "cubic: the cube root of normal_load grows evenly, all else linearly"
     )
-    values: (
-        Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "[0.1, 0.4, 1]")] | None
-    ) = meaning(None, "fraction of the segment done at the end of each step, instead of `ramp`")
+    values: Annotated[tuple[float, ...], _FRACTIONS] | None = meaning(
+        None, "fraction of the segment done at the end of each step, instead of `ramp`"
+    )
     label: Annotated[str, Text()] = meaning("", "name of the segment in the result", '"press"')
     rolling: Annotated[float | str, WordOr("steady", Quantity(LENGTH, above=0))] | None = meaning(
         None,
@@ -428,7 +401,7 @@ class Segment(_Driven):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one control of each motion, and one kind of ramp."""
         whole = "path" in data or "series" in data
         known = cls.known_keys()
@@ -438,9 +411,7 @@ class Segment(_Driven):
         ):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for names in CONTROLS:
-            found = [key for key in names if key in data]
-            if found[1:]:
-                yield found[1], f"expected {found[0]} or {found[1]}, not both"
+            yield from not_both(data, *names)
         yield from _rolling_conflicts(data)
         if data.get("ramp") == "cubic" and not {"normal_load", "mean_pressure"} & data.keys():
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
@@ -480,15 +451,14 @@ class Load(Segment):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Refuse keys of a segment beside a path or a series."""
         yield from super().conflicts(data)
-        if "path" in data and "series" in data:
-            yield "series", "expected path or series, not both"
+        if {"path", "series"} <= data.keys():
+            yield from not_both(data, "path", "series")
         elif whole := next((key for key in _BESIDE if key in data), ""):
-            for key in Segment.known_keys():
-                if key in data and key not in _BESIDE[whole]:
-                    yield key, f"expected in the {whole}, not beside it"
+            inner = (key for key in Segment.known_keys() if key not in _BESIDE[whole])
+            yield from refused(data, inner, f"expected in the {whole}, not beside it")
         elif "repeat" in data:
             yield "repeat", "needs a path of segments or a series to repeat"
 
@@ -535,7 +505,7 @@ class Wear(Table):
         return max(tolerance, _SOLVED * self.tolerance)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require a body that wears, and refuse a tolerance with a given jump."""
         if not any(data.get(f"coefficient_{number}") for number in (1, 2)):
             yield "coefficient_1", "expected a coefficient above 0 of one body at least"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import contextlib
 import functools
 import math
 import operator
@@ -121,10 +120,10 @@ class Formula:
 
         return self._term(polynomials, {math.pow: power})
 
-    def over(self, **arrays: Array) -> Array:
-        """Return the values over arrays of its names; NaN or infinite where there are none."""
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Return the values over arrays of x and y; NaN or infinite where there are none."""
         with np.errstate(all="ignore"):
-            return np.asarray(self._term(arrays, _OVER_ARRAYS), float)
+            return np.asarray(self._term({"x": x, "y": y}, _OVER_ARRAYS), float)
 
 
 Schema = dict[str, Any]
@@ -183,7 +182,8 @@ class Read(Generic[_Value, _Given]):
 class Quantity(Kind):
     """A finite number with a dimension and bounds, in SI once read.
 
-    `infinite` admits +inf; `any_size` also admits values beyond those of lengths, forces and moduli.
+    `infinite` admits +inf; `any_size` also admits values beyond those of lengths, forces and moduli;
+    `nonzero` refuses 0; `remedy` follows the message about a number below 0.
     """
 
     def __init__(
@@ -194,8 +194,11 @@ class Quantity(Kind):
         at_most: float = math.inf,
         infinite: bool = False,
         any_size: bool = False,
+        nonzero: bool = False,
+        remedy: str = "",
     ) -> None:
         self.dimension, self.infinite, self.any_size = dimension, infinite, any_size
+        self.nonzero, self.remedy = nonzero, remedy
         self.above, self.at_least, self.at_most = above, at_least, at_most
         limits = [
             f"{word} {bound:g} {dimension.unit if bound else ''}".strip()
@@ -232,14 +235,18 @@ class Quantity(Kind):
         except UnitError as error:
             refuse(f"expected {self.expected}" + (f"; {error}" if str(error) else ""))
         if not (math.isfinite(number) or (self.infinite and number == math.inf)):
-            refuse(f"expected {self.expected}, a finite number")
-        if not (self.above < number and self.at_least <= number <= self.at_most):
-            refuse(f"expected {self.expected}")
-        if not self.any_size and LARGEST < abs(number) < math.inf:
-            refuse(f"expected {self.expected}, not above {LARGEST:g} in SI")
-        if not self.any_size and self.above == 0 and number < SMALLEST:
-            refuse(f"expected {self.expected}, not below {SMALLEST:g} in SI")
-        return number
+            fault = ", a finite number"
+        elif not (self.above < number and self.at_least <= number <= self.at_most):
+            fault = ""
+        elif not self.any_size and LARGEST < abs(number) < math.inf:
+            fault = f", not above {LARGEST:g} in SI"
+        elif not self.any_size and self.above == 0 and number < SMALLEST:
+            fault = f", not below {SMALLEST:g} in SI"
+        elif self.nonzero and number == 0.0:
+            fault = ", not 0"
+        else:
+            return number
+        refuse(f"expected {self.expected}{fault}" + self.remedy * (number < 0.0))
 
 
 class PowerCoefficient(Kind):
@@ -320,15 +327,15 @@ class Whole(Kind):
 
 
 class Word(Kind):
-    """One of several words."""
+    """One of several words, or false if it is among them."""
 
-    def __init__(self, words: tuple[str, ...]) -> None:
+    def __init__(self, words: tuple[Any, ...]) -> None:
         self.words, self.schema = words, {"enum": list(words)}
-        self.expected = listed([f'"{word}"' for word in words], "or")
+        self.expected = listed([shown(word) for word in words], "or")
 
-    def _parse(self, value: object) -> str:
-        if not isinstance(value, str) or value not in self.words:
-            refuse(f"expected {self.expected}{did_you_mean(value, self.words)}")
+    def _parse(self, value: object) -> Any:
+        if not isinstance(value, str | bool) or value not in self.words:
+            refuse(f"expected {self.expected}{did_you_mean(value, filter(None, self.words))}")
         return value
 
 
@@ -388,34 +395,11 @@ class Flag(Kind):
         return value if isinstance(value, bool) else refuse(f"expected {self.expected}")
 
 
-class RadiusOfCurvature(Quantity):
-    """A radius of curvature above 0; that of a hollow is refused with a remedy."""
-
-    def _parse(self, value: object) -> float:
-        try:
-            return super()._parse(value)
-        except PydanticCustomError as error:
-            with contextlib.suppress(UnitError):
-                if to_si(value, self.dimension) < 0.0:
-                    example = '{ shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }'
-                    refuse(f"{error.message()}; a hollow is an ellipsoid: {example}")
-            raise
-
-
-class NonzeroQuantity(Quantity):
-    """A quantity of either sign, not 0."""
-
-    def _parse(self, value: object) -> float:
-        if (found := super()._parse(value)) == 0.0:
-            refuse(f"expected {self.expected}, not 0")
-        return found
-
-
 class Several(Kind):
     """An array of values of one kind: `count` of them, or at least one.
 
     `plural` is the noun for them, `example` an array as in a deck; `fault_of` returns a sentence about values
-    that do not fit together.
+    that do not fit together, `unique` ones differ; `words` are others for the array.
     """
 
     def __init__(
@@ -425,17 +409,19 @@ class Several(Kind):
         example: str,
         count: int | None = None,
         fault_of: Callable[[Any], str] = lambda _: "",
+        unique: bool = False,
+        words: str = "",
     ) -> None:
         self.kind, self.example, self.count, self.fault_of = kind, example, count, fault_of
         number = {None: "an array of", 2: "two", 3: "three"}[count]
-        self.expected = f"{number} {plural} such as {example}"
+        self.expected = f"{words or f'{number} {plural}'} such as {example}"
+        self._bounds = ({"maxItems": count} if count else {}) | ({"uniqueItems": True} if unique else {})
 
     @property
     def schema(self) -> Schema:  # type: ignore[override]
         """An array of the values."""
-        most = {"maxItems": self.count} if self.count else {}
         items = getattr(self.kind, "schema", {})
-        return {"type": "array", "items": items, "minItems": self.count or 1, **most}
+        return {"type": "array", "items": items, "minItems": self.count or 1, **self._bounds}
 
     def written(self, value: Any) -> list[Any]:
         """Return the entries."""

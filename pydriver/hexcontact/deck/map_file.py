@@ -7,7 +7,7 @@ import importlib
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from ..errors import DeckError
 from ..files import reading, text_of
 from ..text import counted, listed, shown
 from .series import MISSING_CELLS, split_header
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_POINTS = 1_000_000
 """Points of a map, which is text in the deck of a result."""
@@ -286,8 +283,10 @@ def _distinct(values: Array) -> tuple[Array, Array]:
 # --- other formats ------------------------------------------------------------------------------------------
 
 
-def netcdf_map(path: Path, variable: str | None = None) -> xarray.DataArray:
+def _of_netcdf(path: Path, variable: str | None, profile: bool) -> MapFile:
     """Read a variable with the coordinates x and y: that of a name, or the only one."""
+    if profile:
+        raise DeckError(f"{path}: expected a profile as text, columns y and z")
     with reading(path, "a map in netCDF"), netcdf_library.opened_by_xarray(path) as dataset:
         known = {str(name): v for name, v in dataset.data_vars.items() if {"x", "y"} <= set(v.coords)}
         if variable is not None and variable not in known:
@@ -303,13 +302,7 @@ def netcdf_map(path: Path, variable: str | None = None) -> xarray.DataArray:
                 f"expected one variable with the coordinates x and y in {path}, not {len(maps)}{more}"
             )
         _refuse_many(path, maps[0].size)
-        return maps[0].load()
-
-
-def _of_netcdf(path: Path, variable: str | None, profile: bool) -> MapFile:
-    if profile:
-        raise DeckError(f"{path}: expected a profile as text, columns y and z")
-    found = netcdf_map(path, variable)
+        found = maps[0].load()
     x, y = found.coords["x"], found.coords["y"]
     if x.ndim != 1 or y.ndim != 1 or set(found.dims) != {*x.dims, *y.dims}:
         raise DeckError(f"{path}: expected coordinates x and y along a dimension each")

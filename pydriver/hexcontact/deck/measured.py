@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +20,11 @@ from ..arrays import Array
 from ..errors import DeckError
 from ..text import counted, quantity
 from .faults import MISSING
-from .height_map import HeightMap, Placed, along_axes, axis_names, place
+from .height_map import HeightMap, Placed, along_axes, place, rotated
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
-from .surfaces import Angle, Point, Surface, shape
-from .table_base import meaning, refuse_key
+from .surfaces import Angle, Point, PositiveLength, Surface, shape
+from .table_base import Conflicts, meaning, not_both, refuse_key, refused
 from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
 _OF_FILES = ("variable", "units", "height_units")  # keys that go with a file alone
@@ -51,19 +51,6 @@ class LengthUnit(Text):
         return str(text)
 
 
-class Levelling(Word):
-    """False, or a word."""
-
-    expected = 'false, "mean" or "plane"'
-
-    def __init__(self) -> None:
-        super().__init__(("mean", "plane"))
-        self.expected, self.schema = 'false, "mean" or "plane"', {"enum": [False, *self.words]}
-
-    def _parse(self, value: object) -> Any:
-        return False if value is False else super()._parse(value)
-
-
 class Numbers(Kind):
     """An array of numbers, or of arrays of them, in m; NaN in holes."""
 
@@ -83,22 +70,11 @@ class Numbers(Kind):
         return found.tolist()
 
 
-if TYPE_CHECKING:
-    HeightFile = Read[Path | None, str | Path | None]
-    TwoLengths = Read[tuple[float, float] | None, Sequence[float | str] | None]
-    Width = Read[float | None, float | str | None]
-    Line = Read[list[Any] | None, ArrayLike | None]
-    Grid = Read[list[Any] | None, ArrayLike | None]
-else:
-    HeightFile = Annotated[Path, FileName()] | None
-    TwoLengths = (
-        Annotated[
-            tuple[float, float], Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2)
-        ]
-        | None
-    )
-    Width = Annotated[float, Quantity(LENGTH, above=0)] | None
-    Line, Grid = Annotated[list[Any], Numbers()] | None, Annotated[list[Any], Numbers(2)] | None
+_Pair = Read[tuple[float, float], Sequence[float | str]]
+HeightFile = Annotated[Read[Path, str | Path], FileName()] | None
+TwoLengths = Annotated[_Pair, Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', 2)] | None
+Line = Annotated[Read[list[Any], ArrayLike], Numbers()] | None
+Grid = Annotated[Read[list[Any], ArrayLike], Numbers(2)] | None
 
 
 class Points(NamedTuple):
@@ -126,7 +102,7 @@ class Measured(Surface):
     upwards: Annotated[bool, Flag()] = meaning(
         ..., "true: heights of the surface, which rise out of its body; false: a gap", "true"
     )
-    level: Annotated[str | bool, Levelling()] = meaning(
+    level: Annotated[str | bool, Word((False, "mean", "plane"))] = meaning(
         False, "subtracts the mean, or the plane of least squares", '"plane"'
     )
     holes: Annotated[str, Word(("refuse", "open", "fill"))] = meaning(
@@ -137,9 +113,10 @@ class Measured(Surface):
         "cubic",
         "cubic: a spline, near steps monotone between the points; linear: bilinear between four points",
     )
-    taper: Width = meaning(
+    taper: PositiveLength | None = meaning(
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
+    of_points: ClassVar[bool] = True
     extruded: ClassVar[bool] = False
     _file_key: ClassVar[str] = "file"
     _period: tuple[float, float] | None = PrivateAttr(None)
@@ -148,13 +125,12 @@ class Measured(Surface):
     _placing: ClassVar[tuple[str, ...]] = ()  # further keys that go with a file alone
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require a file or points, without the keys of the other one."""
+        yield from not_both(data, "extent", "spacing")
         own = [key for key in _POINTS if key in cls.known_keys()]
         if data.get("file"):
-            for key in own:
-                if key in data:
-                    yield key, "expected a file or points, not both"
+            yield from refused(data, own, "expected a file or points, not both")
             return
         if "heights" not in data:
             yield "file", 'missing; expected the name of a file such as "heights.csv"'
@@ -162,9 +138,8 @@ class Measured(Surface):
         for key in own:
             if key not in data:
                 yield key, "missing; expected numbers (m)"
-        for key in (*_OF_FILES, *cls._placing):
-            if key in data:
-                yield key, "expected nothing beside points, which are in m"
+        sentence = "expected nothing beside points, which are in m"
+        yield from refused(data, (*_OF_FILES, *cls._placing), sentence)
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -212,7 +187,7 @@ class Measured(Surface):
     @property
     def holes_found(self) -> int:
         """Number of points without a height."""
-        return int(np.isnan(self.points.z).sum())
+        return int(np.isnan(self.points.z[: 1 if self.extruded else None]).sum())
 
     @cached_property
     def plane(self) -> tuple[float, float, float]:
@@ -261,23 +236,14 @@ class Measured(Surface):
     # --- the surface ----------------------------------------------------------------------------------------
 
     @property
-    def measured(self) -> tuple[Measured, ...]:
-        """Itself."""
-        return (self,)
-
-    @property
     def direction(self) -> float:
-        """Angle (rad) of the first axis of the map from x."""
-        return 0.0
+        """Angle (rad) of the first axis of its points from x."""
+        return float(getattr(self, "angle", 0.0))
 
     @property
     def _axes(self) -> str:
         """Names of the axes of its points."""
-        return axis_names(self.direction)
-
-    @property
-    def _name(self) -> str:
-        return self.file.name if self.file else ""
+        return "st" if self.direction else "xy"
 
     @property
     def _origin(self) -> tuple[float, float]:
@@ -291,12 +257,23 @@ class Measured(Surface):
     @property
     def _heights(self) -> str:
         """Describe the heights but for the place of the lowest point."""
-        z = self.points.z
+        z, holes, (mean, *slopes) = self.points.z, self.holes_found, self.plane
         rise = quantity(float(np.nanmax(z) - np.nanmin(z)), "m")
-        words = (
-            f"{'heights' if self.upwards else 'gap'}, range {rise}; {self.levelled}; {self.holes_in_words}"
-        )
-        return words + self._tapered + self._closing
+        words = f"{'heights' if self.upwards else 'gap'}, range {rise}; "
+        if self.level is False:
+            words += "not levelled; "
+        else:
+            along, across = (round(slope, 9) + 0.0 for slope in slopes)  # without noise, and without -0
+            names = self._axes
+            sloped = f" and slopes of {along:.3g} along {names[0]}, {across:.3g} along {names[1]}"
+            sloped *= self.level == "plane"
+            words += f"levelled: mean of {quantity(mean, 'm', 3)}{sloped} subtracted; "
+        neighbors = "mean of its" if holes == 1 else "means of their"
+        done = {"fill": f"filled with the {neighbors} neighbors", "open": "open: nothing touches there"}
+        words += f"{counted(holes, 'hole')} {done[self.holes]}" if holes else "no holes"
+        if self.taper and self._period:
+            words += f"; tapered over {quantity(self.taper, 'm')} at its ends"
+        return words + self._closing
 
     def placed(self, name: str) -> Placed:
         """Return the map at its place in the plane; `name` stands for it in messages."""
@@ -320,7 +297,8 @@ class Measured(Surface):
         return other
 
     def _height(self, x: Array, y: Array) -> Array:
-        return np.asarray(self.field(*self._in_period(*np.broadcast_arrays(x, y))))
+        x, y = np.broadcast_arrays(x, y)
+        return np.asarray(self.field(*self._in_period(*rotated(x, y, -self.direction))))
 
     def _in_period(self, x: Any, y: Any) -> tuple[Any, Any]:
         """Return coordinates of the map; those of the measured period if it repeats."""
@@ -349,10 +327,10 @@ class Measured(Surface):
         """Return the keys, with the points in place of a file."""
         keys = super().written(defaults) | {"upwards": self.upwards}
         left_out = ("file", *_OF_FILES, *self._placing, *_POINTS)
-        return {key: value for key, value in keys.items() if key not in left_out} | self._written_points()
-
-    def _written_points(self) -> dict[str, Any]:
-        raise NotImplementedError
+        x, y, z, _ = self.points
+        places = {"y": y, "heights": z[0]} if self.extruded else {"x": x, "y": y, "heights": z}
+        written = {key: value for key, value in keys.items() if key not in left_out}
+        return written | {key: at.tolist() for key, at in places.items()}
 
     def __eq__(self, other: object) -> bool:
         """Test whether two surfaces have the same heights at the same points, whether from a file or not."""
@@ -365,33 +343,6 @@ class Measured(Surface):
     __hash__ = None  # type: ignore[assignment]
 
     # --- in words -------------------------------------------------------------------------------------------
-
-    @property
-    def levelled(self) -> str:
-        """Describe the levelling."""
-        mean, along, across = self.plane
-        if self.level is False:
-            return "not levelled"
-        along, across = (round(slope, 9) + 0.0 for slope in (along, across))  # without noise, and without -0
-        names = self._axes
-        slopes = f" and slopes of {along:.3g} along {names[0]}, {across:.3g} along {names[1]}"
-        slopes *= self.level == "plane"
-        return f"levelled: mean of {quantity(mean, 'm', 3)}{slopes} subtracted"
-
-    @property
-    def _tapered(self) -> str:
-        """Describe the taper."""
-        if not (self.taper and self._period):
-            return ""
-        return f"; tapered over {quantity(self.taper, 'm')} at its ends"
-
-    @property
-    def holes_in_words(self) -> str:
-        """Describe the holes."""
-        count = self.holes_found
-        neighbors = "mean of its" if count == 1 else "means of their"
-        done = {"fill": f"filled with the {neighbors} neighbors", "open": "open: nothing touches there"}
-        return f"{counted(count, 'hole')} {done[self.holes]}" if count else "no holes"
 
     def notes(self, name: str) -> Iterator[str]:
         """Yield notes on the surface under its name: filled holes, an extent that may be swapped."""
@@ -427,13 +378,6 @@ class Map(Measured):
     formula: ClassVar[str] = "h = z_max − z of heights, h = g − g_min of a gap, interpolated"
     _placing: ClassVar[tuple[str, ...]] = ("extent", "spacing", "center", "first_row")
 
-    @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Require one key for the distances at most."""
-        yield from super().conflicts(data)
-        if "extent" in data and "spacing" in data:
-            yield "spacing", "expected extent or spacing, not both"
-
     @cached_property
     def points(self) -> Points:
         """Points and heights (m), as measured."""
@@ -455,11 +399,11 @@ class Map(Measured):
         units = f"heights in {found.value_units or self.height_units}"
         if of_file := found.units or self.units:
             units = f"x and y in {of_file}, {units}"
-        return Points(x, y, z, f"{self._name}, {units}; {how}")
+        return Points(x, y, z, f"{self.file.name}, {units}; {how}")
 
     def _of_matrix(self, rows: Array) -> tuple[Array, Array, Array, str]:
         """Return the points of a matrix: columns along x, the first row at the top or at the bottom."""
-        n_y, n_x = rows.shape
+        (n_y, n_x), name = rows.shape, Path(self.file or "").name
         if self.spacing:
             steps = self.spacing
         elif self.extent is None:
@@ -472,7 +416,7 @@ class Map(Measured):
             slender, if_swapped = (max(cell) / min(cell) for cell in (steps, swapped))
             if slender > _SLENDER and if_swapped < slender / _SLENDER:
                 self._doubt = (
-                    f"the length in x first: the {n_y} rows and {n_x} columns of {self._name} have points "
+                    f"the length in x first: the {n_y} rows and {n_x} columns of {name} have points "
                     f"{readable(steps[0])} apart in x and {readable(steps[1])} in y, and with the two "
                     f"swapped {readable(swapped[0])} and {readable(swapped[1])}"
                 )
@@ -481,10 +425,6 @@ class Map(Measured):
         x, y = (step * (np.arange(n) - (n - 1) / 2) for step, n in zip(steps, (n_x, n_y), strict=True))
         z = (rows[::-1] if self.first_row == "top" else rows).T
         return x, y, z, f"columns along x, first row at the {self.first_row}"
-
-    def _written_points(self) -> dict[str, Any]:
-        x, y, z, _ = self.points
-        return {"x": x.tolist(), "y": y.tolist(), "heights": z.tolist()}
 
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the map, beside the distance of nodes along a direction."""
@@ -574,20 +514,10 @@ class Profile(Measured):
             assert found.y is not None
             y = found.y * scale
             units = f"y in {found.units or self.units}, heights in {found.value_units or self.height_units}"
-            about = f"{self._name}, {units}"
+            about = f"{self.file.name}, {units}"
             if self.center is not None:
                 y = y - (y.min() + y.max()) / 2 + self.center
         return Points(np.array([-_LONG, _LONG]), y, np.stack([z, z]), about)
-
-    @property
-    def holes_found(self) -> int:
-        """Number of points without a height."""
-        return super().holes_found // 2
-
-    @property
-    def direction(self) -> float:
-        """Angle (rad) of the extrusion from x."""
-        return self.angle
 
     def points_near(self, point: tuple[float, float]) -> tuple[Array, Array]:
         """Return points of the plane (m), one of which is where another body of some center touches first."""
@@ -604,13 +534,6 @@ class Profile(Measured):
                 f"{self} repeats with a window along x or y only; expected an angle of 0 or 90 deg"
             )
         return super().repeating(sides and (sides[::-1] if round(turns) % 2 else sides))
-
-    def _height(self, x: Array, y: Array) -> Array:
-        a, b = math.cos(self.angle), math.sin(self.angle)
-        return super()._height(a * x + b * y, a * y - b * x)
-
-    def _written_points(self) -> dict[str, Any]:
-        return {"y": self.points.y.tolist(), "heights": self.points.z[0].tolist()}
 
     def rows(self, apart: Callable[[float], float]) -> Iterator[str]:
         """Yield lines about the profile, beside the distance of nodes along a direction."""

@@ -127,21 +127,24 @@ def _over(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
 
 def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str, int | None]]:
     """Yield the tables that name files, their keys, and the indices of their entries of [[load]], if any."""
-
-    def below(outer: Any, name: str) -> Any:
-        return outer.get(name) if isinstance(outer, Mapping) else None
-
-    loads, bodies = data.get("load"), data.get("body")
-    series = [below(load, "series") for load in (loads if isinstance(loads, list) else ())]
-    surfaces = [below(below(bodies, number), "surface") for number in ("1", "2")]
-    shapes = [one for given in surfaces for one in (given if isinstance(given, list) else [given])]
-    for number, table in enumerate(series):
-        if isinstance(table, dict) and isinstance(table.get("file"), str):
-            yield table, "file", number
-    maps = [(below(data.get("friction"), "coefficient"), "map"), *((one, "file") for one in shapes)]
+    loads = data.get("load")
+    for number, load in enumerate(loads if isinstance(loads, list) else ()):
+        if isinstance(_value(load, "series", "file"), str):
+            yield load["series"], "file", number
+    maps = [(_value(data, "friction", "coefficient"), "map")]
+    for body in "12":
+        shapes = _value(data, "body", body, "surface")
+        maps += ((one, "file") for one in (shapes if isinstance(shapes, list) else [shapes]))
     for table, key in maps:
-        if isinstance(table, dict) and isinstance(table.get(key), str) and table[key]:
+        if isinstance(name := _value(table, key), str) and name:
             yield table, key, None
+
+
+def _value(table: Any, *keys: str) -> Any:
+    """Return the value below some keys; None if there is none."""
+    for key in keys:
+        table = table.get(key) if isinstance(table, dict) else None
+    return table
 
 
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
@@ -173,13 +176,7 @@ class RecordedDeck:
         self._source = Source(name, text)
         self.data = parse_toml(text, name) if text else {}
         places = {"surface": ("body", "1", "surface", "shape"), "friction": ("friction", "coefficient")}
-        self.given = frozenset(part for part, keys in places.items() if self._value(keys) == FROM_PYTHON)
-
-    def _value(self, keys: tuple[str, ...]) -> Any:
-        value: Any = self.data
-        for key in keys:
-            value = value.get(key) if isinstance(value, dict) else None
-        return value
+        self.given = frozenset(part for part in places if _value(self.data, *places[part]) == FROM_PYTHON)
 
     @functools.cached_property
     def _checked(self) -> tuple[dict[str, Any], list[Mistake]]:
@@ -210,7 +207,7 @@ class RecordedDeck:
     def only_surface(self) -> Surface | None:
         """The surface of a body on a flat one; None if there is none, or both have one."""
         gap = self.separation
-        curved = [one for one in (gap.surface_1, gap.surface_2) if not one.flat] if gap else []
+        curved = [one for one in gap.surfaces if not one.flat] if gap else []
         return curved[0] if len(curved) == 1 else None
 
 

@@ -22,7 +22,7 @@ from ..text import counted
 from .kinds import Quantity, Whole
 from .measured import TwoLengths
 from .surfaces import PositiveLength, PositiveNumber, Surface, shape
-from .table_base import meaning
+from .table_base import Conflicts, meaning
 from .units import NUMBER, readable
 
 _POINTS = 8  # of the grid in the shortest wave; a cubic spline between them
@@ -60,7 +60,7 @@ class Rough(Surface):
     _rms: tuple[float, float] = PrivateAttr()
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require one root mean square."""
         if ("rms_height" in data) == ("rms_slope" in data):
             found = "not both" if "rms_height" in data else "one of them"

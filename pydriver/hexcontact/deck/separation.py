@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,8 @@ from ..errors import DeckError
 from ..text import dotted
 from .height_map import Placed
 from .surfaces import Surface
+
+_APART = "the two surfaces nowhere face each other: their offsets put them side by side"
 
 
 @dataclass(frozen=True)
@@ -32,19 +36,19 @@ class Separation:
         """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
         return self._sum(x, y) - (self.at_rest or self).first_touch[2]
 
-    def key_of(self, number: str) -> str:
-        """Return the key of the heights of a body in a deck."""
-        shape = (self.surface_1 if number == "1" else self.surface_2).shape
-        return f"body.{number}.surface" + ".expression" * (shape == "formula")
+    @property
+    def surfaces(self) -> tuple[Surface, Surface]:
+        """The surfaces of both bodies."""
+        return self.surface_1, self.surface_2
 
     @cached_property
     def keyed(self) -> list[tuple[tuple[str | int, ...], Surface]]:
         """The shapes of both surfaces with their keys in a deck, those of sums with places from 0."""
-        found: list[tuple[tuple[str | int, ...], Surface]] = []
-        for number, surface in (("1", self.surface_1), ("2", self.surface_2)):
-            for place, part in enumerate(surface.shapes):
-                found.append((("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part))
-        return found
+        return [
+            (("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part)
+            for number, surface in zip("12", self.surfaces, strict=True)
+            for place, part in enumerate(surface.shapes)
+        ]
 
     def without_height(self, x: Array, y: Array) -> tuple[str | int, ...]:
         """Return the key of a shape that has no height at points where the sum has none."""
@@ -53,9 +57,13 @@ class Separation:
                 return (*key, "expression") if part.shape == "formula" else key
         return ("body",)
 
+    def each(self, changed: Callable[[Surface], Surface]) -> Separation:
+        """Return the gap of surfaces with each of their shapes changed."""
+        return Separation(self.surface_1.each(changed), self.surface_2.each(changed))
+
     def moved(self, by: ArrayLike) -> Separation:
         """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
-        return Separation(self.surface_1.moved(by), self.surface_2.moved(by), self.at_rest or self)
+        return replace(self.each(lambda part: part.moved(by)), at_rest=self.at_rest or self)
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -65,7 +73,7 @@ class Separation:
     @property
     def moves(self) -> bool:
         """Whether shapes are bound to rolling bodies."""
-        return bool(self.surface_1.moving or self.surface_2.moving)
+        return any(map(attrgetter("moves"), self.shapes))
 
     @property
     def convex(self) -> bool:
@@ -125,46 +133,41 @@ class Separation:
 
     def _first_of_points(self) -> tuple[float, float, float]:
         """Return the point of measured surfaces at which the bodies touch first, and the sum of heights."""
-        pairs = ((self.surface_1, self.surface_2), (self.surface_2, self.surface_1))
-        near = [(one, other.offset) for surface, other in pairs for one in surface.measured]
-        x, y = np.concatenate([one.points_near(offset) for one, offset in near], axis=1)
+        pairs = zip(self.surfaces, self.surfaces[::-1], strict=True)
+        near = [one.points_near(other.offset) for surface, other in pairs for one in surface.measured]
+        x, y = np.concatenate(near, axis=1)
         heights = self._sum(x, y)
         lowest = int(np.argmin(heights))
         if not math.isfinite(heights[lowest]):
-            raise DeckError("the two surfaces nowhere face each other: their offsets put them side by side")
+            raise DeckError(_APART)
         return float(x[lowest]), float(y[lowest]), float(heights[lowest])
 
     def repeating(self, sides: tuple[float, float] | None) -> Separation:
         """Return the gap over a window that repeats with two sides (m) along x and y; None: others."""
-        return Separation(self.surface_1.repeating(sides), self.surface_2.repeating(sides))
+        return self.each(lambda part: part.repeating(sides))
 
     @property
     def one_map(self) -> bool:
         """Whether one measured surface faces a plane, and neither is tilted."""
-        both = (self.surface_1, self.surface_2)
-        single = [one for one in both if one.measured == (one,) and not any(one.tilt)]
-        return len(single) == 1 and any(one.flat for one in both)
+        single = [one for one in self.surfaces if one.measured == (one,) and not any(one.tilt)]
+        return len(single) == 1 and any(one.flat for one in self.surfaces)
 
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """The measured maps of both bodies."""
-        found: list[Placed] = []
-        for key, part in self.keyed:
-            for one in part.measured:
-                found.append(one.placed(dotted(key)))
-        return tuple(found)
+        return tuple(one.placed(dotted(key)) for key, part in self.keyed for one in part.measured)
 
     def _search(self) -> tuple[float, float]:
         """Return the point of the smallest sum of heights, searched from the best one between the centers."""
         from scipy.optimize import minimize
 
-        first, second = np.array(self.surface_1.offset), np.array(self.surface_2.offset)
+        first, second = (np.array(one.offset) for one in self.surfaces)
         scale = float(np.hypot(*(second - first)))
 
         def inside(point: Array) -> Array:
             # The nearest point that can touch: the minimum may lie on the rim of a punch, where a search over
             # the bare height (infinite beyond) would not move.
-            for surface, center in ((self.surface_1, first), (self.surface_2, second)):
+            for surface, center in zip(self.surfaces, (first, second), strict=True):
                 arm = point - center
                 point = center + arm * min(1.0, surface.reach / max(float(np.hypot(*arm)), 1e-300))
             return point
@@ -176,7 +179,7 @@ class Separation:
         starts = [along * t for t in np.linspace(0.0, 1.0, 101)]
         best = min(starts, key=height)
         if not math.isfinite(height(best)):
-            raise DeckError("the two surfaces nowhere face each other: their offsets put them side by side")
+            raise DeckError(_APART)
         # A convex sum (all shapes but powers below 1) has no other minima.
         size = max(height(best), 1e-30)
         options: Any = {"xatol": 1e-9, "fatol": 1e-15 * size, "maxiter": 2000}

@@ -20,7 +20,7 @@ from ..files import is_defect, require_ordinary, text_of
 from ..text import counted, did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Several, Text, refuse
-from .table_base import Table, extended, meaning
+from .table_base import Conflicts, Table, extended, meaning, refused
 from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 
@@ -28,95 +28,62 @@ class Driven(NamedTuple):
     """A load or motion with its own key in decks and files of series."""
 
     kind: Quantity  # kind of its values
-    of_segment: str  # meaning of the key in [[load]] and in a series
-    of_row: str
-    header: str  # examples of the header of a column and of an array of values in a deck
-    rows: str
+    meaning: str  # of the key in [[load]]
+    noun: str
+    header: str  # example of the header of a column
     example: str = ""  # example of a value, if that of its dimension does not suit
+    mean_of: str = ""  # of a mean over a window that repeats: the load or motion that it is
+    values: str = ""  # example of an array, if 1 and 2 in the unit of the header do not suit
 
 
-_FORCES, _LENGTHS = '["1 N", "2 N"]', '["1 um", "2 um"]'
-_ROWS = "normal load of each row, instead of a file; so are the other arrays"
-_TORQUE = "moment about z through x = y = 0; frees the twist"
-_APPROACH = "approach of the bodies, instead of normal_load"
-_TWIST = "rotation about z, instead of torque"
+def _each(axes: Sequence[str], key: str, kind: Quantity, *words: str) -> dict[str, Driven]:
+    """Return a row for each axis, whose name stands for {} in key and words."""
+    return {key.format(axis): Driven(kind, *(word.format(axis) for word in words)) for axis in axes}
 
 
-def _tangential(axis: str) -> Driven:
-    meant = f"tangential load on body 1 along {axis}", f"tangential load along {axis} of each row"
-    return Driven(Quantity(FORCE), *meant, f'"Q{axis} [N]"', _FORCES, FORCE.example)
-
-
-def _shift(axis: str) -> Driven:
-    meant = f"tangential motion of body 2, instead of tangential_load_{axis}"
-    return Driven(
-        Quantity(LENGTH), meant, f"shift along {axis} of each row", f'"u{axis} [um]"', _LENGTHS, '"1 um"'
-    )
-
-
-DRIVEN: dict[str, Driven] = {
-    "normal_load": Driven(Quantity(FORCE, at_least=0), "normal load P", _ROWS, '"P [N]"', _FORCES),
-    "tangential_load_x": _tangential("x"),
-    "tangential_load_y": _tangential("y"),
-    "torque": Driven(Quantity(TORQUE), _TORQUE, "torque of each row", '"M [N mm]"', '["1 N mm", "2 N mm"]'),
-    "approach": Driven(
-        Quantity(LENGTH), _APPROACH, "approach of each row", '"depth [um]"', _LENGTHS, '"1 um"'
+_LENGTH, _PRESSURE = Quantity(LENGTH), Quantity(PRESSURE)
+_AREA = "over the area of a window that repeats"
+COLUMNS: dict[str, Driven] = {
+    "normal_load": Driven(Quantity(FORCE, at_least=0), "normal load P", "normal load", "P [N]"),
+    **_each(
+        *("xy", "tangential_load_{}", Quantity(FORCE), "tangential load on body 1 along {}"),
+        *("tangential load along {}", "Q{} [N]", FORCE.example),
     ),
-    "shift_x": _shift("x"),
-    "shift_y": _shift("y"),
-    **{
-        f"bulk_stress_{axes}": Driven(
-            Quantity(PRESSURE),
-            f"bulk stress {axes} of the body that [bulk] names, tension positive",
-            f"bulk stress {axes} of each row",
-            f'"S{axes} [MPa]"',
-            '["0 MPa", "80 MPa"]',
-            '"80 MPa"',
-        )
-        for axes in ("xx", "yy", "xy")
-    },
-    "twist": Driven(Quantity(ANGLE), _TWIST, "twist of each row", '"angle [deg]"', '["0 deg", "1 deg"]'),
-}
-"""The loads and motions by key."""
-
-_PRESSURES = '["1 MPa", "2 MPa"]'
-MEAN_LOADS: dict[str, Driven] = {
+    "torque": Driven(
+        Quantity(TORQUE), "moment about z through x = y = 0; frees the twist", "torque", "M [N mm]"
+    ),
+    "approach": Driven(
+        _LENGTH, "approach of the bodies, instead of normal_load", "approach", "depth [um]", '"1 um"'
+    ),
+    **_each(
+        *("xy", "shift_{}", _LENGTH, "tangential motion of body 2, instead of tangential_load_{}"),
+        *("shift along {}", "u{} [um]", '"1 um"'),
+    ),
+    **_each(
+        *(("xx", "yy", "xy"), "bulk_stress_{}", _PRESSURE),
+        "bulk stress {} of the body that [bulk] names, tension positive",
+        *("bulk stress {}", "S{} [MPa]", '"80 MPa"', "", '["0 MPa", "80 MPa"]'),
+    ),
+    "twist": Driven(
+        *(Quantity(ANGLE), "rotation about z, instead of torque", "twist", "angle [deg]"),
+        values='["0 deg", "1 deg"]',
+    ),
     "mean_pressure": Driven(
-        Quantity(PRESSURE, at_least=0),
-        "normal load over the area of a window that repeats, instead of normal_load",
-        "mean pressure of each row",
-        '"p [MPa]"',
-        _PRESSURES,
+        *(Quantity(PRESSURE, at_least=0), f"normal load {_AREA}, instead of normal_load"),
+        *("mean pressure", "p [MPa]", "", "normal_load"),
     ),
     "mean_gap": Driven(
-        Quantity(LENGTH, above=0),
-        "mean of the gap over a window that repeats, instead of normal_load",
-        "mean gap of each row",
-        '"gap [um]"',
-        _LENGTHS,
-        '"0.2 um"',
+        *(Quantity(LENGTH, above=0), "mean of the gap over a window that repeats, instead of normal_load"),
+        *("mean gap", "gap [um]", '"0.2 um"', "approach"),
     ),
-    **{
-        f"mean_traction_{axis}": Driven(
-            Quantity(PRESSURE),
-            f"tangential load along {axis} over the area of a window that repeats",
-            f"mean traction along {axis} of each row",
-            f'"q{axis} [MPa]"',
-            _PRESSURES,
-            '"20 MPa"',
-        )
-        for axis in "xy"
-    },
+    **_each(
+        *("xy", "mean_traction_{}", _PRESSURE, f"tangential load along {{}} {_AREA}"),
+        *("mean traction along {}", "q{} [MPa]", '"20 MPa"', "tangential_load_{}"),
+    ),
 }
-"""The loads of a window that repeats."""
-MEANS = {
-    "mean_pressure": "normal_load",
-    "mean_gap": "approach",
-    "mean_traction_x": "tangential_load_x",
-    "mean_traction_y": "tangential_load_y",
-}
-"""The load or motion that each of them is."""
-COLUMNS = DRIVEN | MEAN_LOADS
+"""The loads and motions by key."""
+MEANS = {name: load.mean_of for name, load in COLUMNS.items() if load.mean_of}
+"""The loads of a window that repeats, and the load or motion that each of them is."""
 CONTROLS = [(*pair, *(mean for mean, load in MEANS.items() if load in pair)) for pair in LOADS.values()]
 """The keys of each motion, of which a segment or row has one."""
 
@@ -157,7 +124,7 @@ _Header = Annotated[str, Text()] | None
 _Headers: Any = extended(
     Table,
     {
-        name: (_Header, meaning(None, f"header of the column of {name}", load.header))
+        name: (_Header, meaning(None, f"header of the column of {name}", f'"{load.header}"'))
         for name, load in COLUMNS.items()
     },
 )
@@ -178,14 +145,23 @@ class _File(Table):
     )
 
 
-def _rows(load: Driven) -> Any:
-    kind = Several(OrEmpty(load.kind), f"values, each {load.kind.expected} or empty text", load.rows)
-    return Annotated[tuple[float | None, ...], kind] | None
+def split_header(header: str) -> tuple[str, str]:
+    """Return a header without its unit, and the unit."""
+    name = header.strip()
+    opening = {"]": "[", ")": "("}.get(name[-1:], "")
+    before, bracket, unit = name[:-1].rpartition(opening) if opening else ("", "", "")
+    return (before.strip(), unit.strip()) if bracket and name[-1] not in unit else (name, "")
 
 
-_Rows: Any = extended(
-    _File, {name: (_rows(load), meaning(None, load.of_row)) for name, load in COLUMNS.items()}
-)
+def _rows(name: str, load: Driven) -> tuple[Any, Any]:
+    unit = split_header(load.header)[1]
+    example = load.values or f'["1 {unit}", "2 {unit}"]'
+    kind = Several(OrEmpty(load.kind), f"values, each {load.kind.expected} or empty text", example)
+    others = ", instead of a file; so are the other arrays" * (name == "normal_load")
+    return Annotated[tuple[float | None, ...], kind] | None, meaning(None, f"{load.noun} of each row{others}")
+
+
+_Rows: Any = extended(_File, {name: _rows(name, load) for name, load in COLUMNS.items()})
 
 
 class Series(_Rows):
@@ -196,14 +172,12 @@ class Series(_Rows):
     )
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require arrays of one length, one control of each motion in a row, and a file without arrays."""
         data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
         arrays = {key: data[key] for key in (*COLUMNS, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
-            for key in (*COLUMNS, "label"):
-                if key in data:
-                    yield key, "expected in the file, not beside it"
+            yield from refused(data, (*COLUMNS, "label"), "expected in the file, not beside it")
             return
         if "columns" in data:
             yield "columns", "needs a file"
@@ -218,15 +192,19 @@ class Series(_Rows):
             yield displacement, f"expected {force} or {displacement} in each row, not both (entry {row + 1})"
 
     @property
+    def _arrays(self) -> dict[str, Any]:
+        return {key: array for key in (*COLUMNS, "label") if (array := getattr(self, key)) is not None}
+
+    @property
     def count(self) -> int:
         """Number of rows."""
-        return len(next(filled for key in COLUMNS if (filled := getattr(self, key)) is not None))
+        return len(next(iter(self._arrays.values())))
 
     @property
     def missing(self) -> dict[str, int]:
         """Number of rows without a value of each load or motion that other rows have."""
-        arrays = {key: array for key in COLUMNS if (array := getattr(self, key)) is not None}
-        counts = {}
+        arrays, counts = self._arrays, {}
+        arrays.pop("label", None)
         for key in arrays:
             others = next((names for names in CONTROLS if key in names), (key,))
             columns = [arrays[name] for name in others if name in arrays]
@@ -235,9 +213,9 @@ class Series(_Rows):
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the values of each row, in SI, and its label."""
-        named = {key: array for key in (*COLUMNS, "label") if (array := getattr(self, key)) is not None}
-        for row in zip(*named.values(), strict=True):
-            yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
+        arrays = self._arrays
+        for row in zip(*arrays.values(), strict=True):
+            yield {key: value for key, value in zip(arrays, row, strict=True) if value is not None}
 
 
 def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:
@@ -371,14 +349,6 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
     if problems:
         raise DeckError("\n".join(problems))
     return chosen
-
-
-def split_header(header: str) -> tuple[str, str]:
-    """Return a header without its unit, and the unit."""
-    name = header.strip()
-    opening = {"]": "[", ")": "("}.get(name[-1:], "")
-    before, bracket, unit = name[:-1].rpartition(opening) if opening else ("", "", "")
-    return (before.strip(), unit.strip()) if bracket and name[-1] not in unit else (name, "")
 
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:

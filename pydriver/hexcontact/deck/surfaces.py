@@ -10,13 +10,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from operator import attrgetter
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, TypeAdapter
 from pydantic.fields import FieldInfo
-from pydantic_core import SchemaValidator, core_schema
 
 from ..arrays import Array, Mask
 from ..errors import DeckError
@@ -27,17 +27,15 @@ from .kinds import (
     Formula,
     HeightFormula,
     Kind,
-    NonzeroQuantity,
     PowerCoefficient,
     Quantity,
-    RadiusOfCurvature,
     Read,
     Schema,
     Several,
     Word,
     refuse,
 )
-from .table_base import Argument, meaning, refuse_key
+from .table_base import Argument, Conflicts, meaning, refuse_key
 from .units import ANGLE, FORCE, LENGTH, NUMBER, Dimension, readable
 
 _S = TypeVar("_S", bound="Surface")
@@ -51,31 +49,20 @@ def _coefficient_dimension(exponent: float) -> Dimension:
     return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
 
 
-PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
-PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
-if TYPE_CHECKING:
-    Radius = Read[float, float | str]
-    CurvatureRadius = Read[float, float | str]
-    SignedRadius = Read[float, float | str]
-    LengthFromZero = Read[float, float | str]
-    Angle = Read[float, float | str]
-    Tilt = Read[tuple[float, float], Sequence[float | str]]
-    Coefficient = Read[float, float | str]
-    Point = Read[tuple[float, float], Sequence[float | str]]
-else:
-    Radius = PositiveLength
-    CurvatureRadius = Annotated[float, RadiusOfCurvature(LENGTH, above=0)]
-    SignedRadius = Annotated[float, NonzeroQuantity(LENGTH)]
-    LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
-    Angle = Annotated[float, Quantity(ANGLE)]
-    Tilt = Annotated[
-        tuple[float, float],
-        Several(Quantity(ANGLE, at_least=-0.1, at_most=0.1), "angles", '["0.01 deg", "0 deg"]', count=2),
-    ]
-    Coefficient = Annotated[float, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
-    Point = Annotated[
-        tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)
-    ]
+_Number = Read[float, float | str]
+_Pair = Read[tuple[float, float], Sequence[float | str]]
+PositiveNumber = Annotated[_Number, Quantity(NUMBER, above=0)]
+Radius = Annotated[_Number, Quantity(LENGTH, above=0)]
+PositiveLength = Radius
+_HOLLOW = '; a hollow is an ellipsoid: { shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }'
+CurvatureRadius = Annotated[_Number, Quantity(LENGTH, above=0, remedy=_HOLLOW)]
+SignedRadius = Annotated[_Number, Quantity(LENGTH, nonzero=True)]
+LengthFromZero = Annotated[_Number, Quantity(LENGTH, at_least=0)]
+Angle = Annotated[_Number, Quantity(ANGLE)]
+Coefficient = Annotated[_Number, PowerCoefficient("m^(1-n)", _coefficient_dimension, "exponent")]
+Point = Annotated[_Pair, Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
+_SMALL = Quantity(ANGLE, at_least=-0.1, at_most=0.1)
+Tilt = Annotated[_Pair, Several(_SMALL, "angles", '["0.01 deg", "0 deg"]', count=2)]
 
 # A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
@@ -110,6 +97,8 @@ class Surface(Argument):
     """Height about the shape's own center, for the documentation."""
     as_given: ClassVar[bool] = False
     """Whether its heights are used unshifted, wherever it would touch first."""
+    of_points: ClassVar[bool] = False
+    """Whether it was measured."""
     one_spot: ClassVar[bool] = True
     """Whether it touches a flat in about an ellipse, for a spacing of "auto"."""
     wave: ClassVar[str] = ""
@@ -120,7 +109,7 @@ class Surface(Argument):
     @property
     def flat(self) -> bool:
         """Whether it is the plane z = 0."""
-        return False
+        return self.shape == "flat" and not any(self.tilt)
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -146,26 +135,25 @@ class Surface(Argument):
             height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
         return height
 
+    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
+        """Return the surface with each of its shapes changed."""
+        return changed(self)
+
     def beside(self, modulus: float) -> Surface:
-        """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
+        """Return the shape on bodies of a modulus E* (Pa), which few shapes depend on."""
+        return self
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the shape over a window that repeats with two sides (m) along x and y; None: others."""
         return self
 
     @property
     def measured(self) -> tuple[Any, ...]:
         """The maps and profiles among its shapes (`Measured`)."""
-        return ()
-
-    def repeating(self, sides: tuple[float, float] | None) -> Surface:
-        """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
-        return self
-
-    @property
-    def moving(self) -> tuple[Surface, ...]:
-        """The shapes that are bound to a rolling body."""
-        return (self,) if self.moves else ()
+        return tuple(filter(attrgetter("of_points"), self.shapes))
 
     def moved(self, by: ArrayLike) -> Surface:
-        """Return the surface after its body has moved by a vector (m), with the shapes bound to it."""
+        """Return the shape after its body has moved by a vector (m), if it is bound to it."""
         x, y = np.add(self.offset, by)
         return self.model_copy(update={"offset": (float(x), float(y))}) if self.moves else self
 
@@ -244,11 +232,6 @@ class Flat(Surface):
     one_spot: ClassVar[bool] = False
 
     formula: ClassVar[str] = "h = 0"
-
-    @property
-    def flat(self) -> bool:
-        """Whether it is not tilted."""
-        return not any(self.tilt)
 
     @property
     def curvature(self) -> Array:
@@ -523,7 +506,7 @@ class Roller(Surface):
     _modulus: float = PrivateAttr(0.0)
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
         """Require the key of the profile, and no other."""
         needed = {"chamfer": "chamfer", "crown": "crown_radius", "logarithmic": "design_load"}
         profile = data.get("profile", "sharp")
@@ -621,7 +604,7 @@ class FormulaSurface(Surface):
 
     def _height(self, x: Array, y: Array) -> Array:
         x, y = np.broadcast_arrays(x, y)
-        return Formula(self.expression).over(x=x, y=y) + np.zeros(x.shape)
+        return Formula(self.expression)(x, y) + np.zeros(x.shape)
 
 
 @functools.lru_cache(64)
@@ -671,11 +654,6 @@ class SurfaceSum(Surface):
         return self.parts
 
     @property
-    def curvature(self) -> Array | None:
-        """None: the shapes may have different centers."""
-        return None
-
-    @property
     def reach(self) -> float:
         """The smallest of all."""
         return min(part.reach for part in self.parts)
@@ -684,27 +662,9 @@ class SurfaceSum(Surface):
         """Return the sum of the heights (m)."""
         return np.asarray(sum(part.height(x, y) for part in self.parts))
 
-    def beside(self, modulus: float) -> Surface:
-        """Return the sum of shapes of the modulus."""
-        return SurfaceSum(parts=tuple(part.beside(modulus) for part in self.parts))
-
-    @property
-    def measured(self) -> tuple[Any, ...]:
-        """Those of all shapes."""
-        return tuple(one for part in self.parts for one in part.measured)
-
-    @property
-    def moving(self) -> tuple[Surface, ...]:
-        """Those of all shapes."""
-        return tuple(one for part in self.parts for one in part.moving)
-
-    def moved(self, by: ArrayLike) -> Surface:
-        """Return the sum of the moved shapes."""
-        return SurfaceSum(parts=tuple(part.moved(by) for part in self.parts))
-
-    def repeating(self, sides: tuple[float, float] | None) -> Surface:
-        """Return the sum of shapes over a window that repeats."""
-        return SurfaceSum(parts=tuple(part.repeating(sides) for part in self.parts))
+    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
+        """Return the sum of the changed shapes."""
+        return SurfaceSum(parts=tuple(map(changed, self.parts)))
 
     def written(self, defaults: bool = True) -> Any:
         """Return the shapes with their keys."""
@@ -720,13 +680,6 @@ class SurfaceKind(Kind):
 
     expected = 'a table such as { shape = "sphere", radius = "1 mm" }'
 
-    @functools.cached_property
-    def _array(self) -> SchemaValidator:
-        """Validator of several shapes, which numbers their faults."""
-        return SchemaValidator(
-            core_schema.list_schema(core_schema.no_info_plain_validator_function(self.parse))
-        )
-
     def written(self, value: Surface) -> dict[str, Any]:
         """Return the shape with its keys."""
         return value.written()
@@ -741,19 +694,22 @@ class SurfaceKind(Kind):
         if isinstance(value, Surface):
             return value
         if isinstance(value, list | tuple) and value:
-            parts = tuple(self._array.validate_python(list(value)))
-            return parts[0] if len(parts) == 1 else SurfaceSum(parts=parts)
+            first, *others = _PARTS.validate_python(list(value))  # which numbers their faults
+            return SurfaceSum(parts=(first, *others)) if others else first
         if not isinstance(value, Mapping):
             refuse(f"expected {self.expected}")
         shape = value.get("shape")
-        words = Word(tuple(SHAPES))
-        if shape is None:
-            refuse_key("shape", MISSING, f"missing; expected {words.expected}")
         if not isinstance(shape, str) or shape not in SHAPES:
-            known = f"expected {words.expected}{did_you_mean(shape, SHAPES)}"
+            expected = f"expected {Word(tuple(SHAPES)).expected}"
+            if shape is None:
+                refuse_key("shape", MISSING, f"missing; {expected}")
+            known = expected + did_you_mean(shape, SHAPES)
             refuse_key("shape", shape, _REFUSED.get(str(shape), known))
         try:
-            return SHAPES[shape](**{str(key): entry for key, entry in value.items()})
+            return SHAPES[shape](**dict(zip(map(str, value), value.values(), strict=True)))
         except DeckError as error:
             # pydantic merges the inner error, with its keys, into that of the enclosing deck.
             raise (error.__cause__ or error) from None
+
+
+_PARTS: TypeAdapter[list[Surface]] = TypeAdapter(list[Annotated[Surface, SurfaceKind()]])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NoReturn, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
@@ -43,7 +43,7 @@ SYMBOLS = {
     **dict.fromkeys(("R", "r", "diameter"), "radius"),
     **{f"diameter_{axis}": f"radius_{axis}" for axis in "xy"},
     **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
-    "height": "length",
+    **{"height": "length", "periodic": "boundary", "creepage": "creepage_x"},
     **dict.fromkeys(("coatings", "layer", "layers", "film"), "coating"),
 }
 """Keys of decks by the symbols and words of engineers, with the table if several have such a key."""
@@ -56,8 +56,6 @@ _NOT_INCLUDED = {
     "viscoelastic bodies": ("viscoelastic", "prony"),
     "anisotropic bodies": ("anisotrop", "orthotropicstiffness"),
     "inertia": ("density", "mass", "inertia", "velocity", "frequency"),
-    "rolling": ("rolling", "creepage"),
-    "periodic surfaces": ("periodic",),
 }
 """Features that the program does not have (docs/limits.md), with the beginnings of their words, folded."""
 
@@ -67,6 +65,24 @@ def not_included(word: str) -> str:
     of_word = folded(word[:100])
     found = [name for name, words in _NOT_INCLUDED.items() if of_word.startswith(words)]
     return f"{found[0]}: not included (docs/limits.md says what is, and what to do instead)" if found else ""
+
+
+Conflicts = Iterator[tuple[str, str]]
+"""Key and sentence of each fault of a table as a whole; an empty key is the whole table."""
+
+
+def refused(data: Mapping[str, Any], keys: Iterable[str], sentence: str) -> Conflicts:
+    """Yield the given ones of some keys with a sentence."""
+    for key in keys:
+        if key in data:
+            yield key, sentence
+
+
+def not_both(data: Mapping[str, Any], *keys: str) -> Conflicts:
+    """Yield the second of the given ones of some keys that exclude each other."""
+    first, second, *_ = *filter(data.__contains__, keys), "", ""
+    if second:
+        yield second, f"expected {first} or {second}, not both"
 
 
 class Table(BaseModel):
@@ -81,11 +97,8 @@ class Table(BaseModel):
     """Further conditions if no key of the table is in an included deck."""
 
     @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Yield (key, sentence) for keys that exclude or need each other, from the table as written.
-
-        An empty key is the whole table.
-        """
+    def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:
+        """Yield keys that exclude or need each other, from the table as written."""
         yield from ()
 
     @classmethod

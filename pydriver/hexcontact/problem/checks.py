@@ -266,8 +266,8 @@ def _moving_problems(tables: Mapping[str, Any]) -> Found:
     if not bodies.separation.moves:
         return
     for number, body in (("1", bodies.body_1), ("2", bodies.body_2)):
-        for one in body.surface.moving if body.surface else ():
-            if math.isfinite(one.reach):
+        for one in body.surface.shapes if body.surface else ():
+            if one.moves and math.isfinite(one.reach):
                 sentence = f"expected no moves = true of a {one.shape}, which ends, so that bodies lose touch"
                 yield ("body", number, "surface"), sentence
     ways = [(key, segment.rolling) for key, segment in _segments(tables["load"]) if segment.rolling]
@@ -276,8 +276,11 @@ def _moving_problems(tables: Mapping[str, Any]) -> Found:
             sentence = "expected a distance: with a surface that moves = true there is no steady state"
             yield (*key, "rolling"), sentence
     if not ways:
-        key = ("body", "1" if bodies.body_1.surface and bodies.body_1.surface.moving else "2", "surface")
-        yield key, "expected no moves = true without rolling over a distance in [[load]]"
+        number = next(str(key[1]) for key, part in bodies.separation.keyed if part.moves)
+        yield (
+            ("body", number, "surface"),
+            "expected no moves = true without rolling over a distance in [[load]]",
+        )
 
 
 def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> Mistake | None:

@@ -92,7 +92,7 @@ class PlaneField:
         self.shapes: tuple[Surface, ...] = ()
         if isinstance(source, Separation):
             self.maps, self.shapes = source.placed, source.shapes
-            self.heights = source.surface_1.height, source.surface_2.height
+            self.heights = tuple(one.height for one in source.surfaces)
 
     @property
     def first_touch(self) -> tuple[float, float] | None:

@@ -378,7 +378,7 @@ def notes(case: Problem) -> dict[str, str]:
 def unjudged(case: Problem) -> str:
     """Return a note on limits that the warnings do not check, and on measured surfaces; empty without one."""
     if not case.gap_given:
-        bodies = ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2)) if case.maps else ()
+        bodies = enumerate(case.surfaces.surfaces, 1) if case.maps else ()
         words = (
             one.notes(f"the {one.shape} of body {number}")
             for number, surface in bodies

@@ -110,7 +110,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
 
 def _measured(case: Problem) -> str:
     """Return the files of measured surfaces, and how they are read."""
-    bodies = (1, case.surfaces.surface_1), (2, case.surfaces.surface_2)
+    bodies = list(enumerate(case.surfaces.surfaces, 1))
     measured = [(number, shape) for number, surface in bodies for shape in surface.measured]
     return "; ".join(f"{shape.shape} of body {number}: {shape.points.about}" for number, shape in measured)
 
@@ -195,7 +195,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
 
 def _plane_contact(case: Problem) -> str:
     """Return half-width and pressure of plane contact beside a roller on a flat; empty for others."""
-    surfaces = case.surfaces.surface_1, case.surfaces.surface_2
+    surfaces = case.surfaces.surfaces
     curved = [surface for surface in surfaces if not surface.flat]
     load = largest_loads(case)["normal_load"]
     other = case.deck.interface or isinstance(case.pair, CoatedPair)
@@ -295,7 +295,7 @@ def surfaces_in_words(case: Problem) -> list[dict[str, Any]]:
     """Return how measured and rough surfaces are read: body, shape and lines of words."""
     return [
         {"body": number, "shape": one.shape, "lines": lines}
-        for number, surface in ((1, case.surfaces.surface_1), (2, case.surfaces.surface_2))
+        for number, surface in enumerate(case.surfaces.surfaces, 1)
         for one in surface.shapes
         if (lines := [*one.rows(case.lattice.apart)])
     ]

@@ -32,11 +32,10 @@ from ..text import counted, listed
 from ..variables import LOADS
 from . import checks, window
 from .arguments import Body
-from .beyond import Surroundings, missed_contact, surroundings
 from .checks import checked
 from .loads import LoadStep, rolled_out, wearing_cycle
 from .plane_field import GAP, FieldSource, FrictionField, PlaneField
-from .window import Estimate, NoContactFound
+from .window import Estimate, NoContactFound, Surroundings, missed_contact, surroundings
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
 MOST_DIRECT_NODES = 200

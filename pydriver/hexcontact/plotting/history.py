@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from ..analytic.compare import CIRCULAR, ClosedForms
+from ..analytic.compare import ClosedForms, is_circular
 from ..analytic.friction import MindlinContact
-from ..analytic.hertz_gap import QuadraticGap
+from ..analytic.hertz_gap import quadratic
 from ..arrays import Array, Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
@@ -379,7 +379,7 @@ def initial_compliance(dataset: Dataset) -> tuple[float, float]:
 
     Spheres are pressed, then sheared at a constant normal load; another result is an error.
     """
-    gap, attributes = QuadraticGap.of(dataset), dataset.attrs
+    gap, attributes = quadratic(dataset), dataset.attrs
     friction = float(attributes.get("friction_coefficient", np.nan))
     frictional = attributes.get("algorithm") in ("static", "incremental") and 0.0 < friction < np.inf
     if not frictional or gap is None:
@@ -392,7 +392,7 @@ def initial_compliance(dataset: Dataset) -> tuple[float, float]:
             "the tangential compliance needs a load step of shear alone after those of pressing"
         )
     hertz = gap.contact(float(normal[step]))
-    if hertz.semi_minor < CIRCULAR * hertz.semi_major:
+    if not is_circular(hertz):
         raise NotInResult("the tangential compliance is that of spheres with friction")
     gamma = float(attributes["tangential_compliance_ratio"])
     compliance = 4.0 / float(attributes["effective_modulus"]) * (1.0 + 0.5 * gamma)

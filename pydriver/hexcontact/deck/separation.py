@@ -46,6 +46,11 @@ class Separation:
                 found.append((("body", number, "surface", *(place,) * (len(surface.shapes) > 1)), part))
         return found
 
+    @property
+    def measured(self) -> list[tuple[str, Any]]:
+        """The measured shapes of both surfaces with the numbers of their bodies."""
+        return [(str(key[1]), one) for key, part in self.keyed for one in part.measured]
+
     def without_height(self, x: Array, y: Array) -> tuple[str | int, ...]:
         """Return the key of a shape that has no height at points where the sum has none."""
         for key, part in self.keyed:
@@ -71,6 +76,12 @@ class Separation:
     def convex(self) -> bool:
         """Whether the bodies touch in one place, however far they are pressed."""
         return self.curvature is not None or all(part.convex for part in self.shapes)
+
+    @property
+    def only_curved(self) -> Surface | None:
+        """The surface that faces a plane without a tilt; None if there is none, or both are curved."""
+        curved = [one for one in (self.surface_1, self.surface_2) if not one.flat]
+        return curved[0] if len(curved) == 1 else None
 
     @property
     def flat(self) -> bool:
@@ -148,11 +159,7 @@ class Separation:
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
         """The measured maps of both bodies."""
-        found: list[Placed] = []
-        for key, part in self.keyed:
-            for one in part.measured:
-                found.append(one.placed(dotted(key)))
-        return tuple(found)
+        return tuple(one.placed(dotted(key)) for key, part in self.keyed for one in part.measured)
 
     def _search(self) -> tuple[float, float]:
         """Return the point of the smallest sum of heights, searched from the best one between the centers."""

@@ -8,7 +8,7 @@ vectors), since the window is a parallelogram.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
 from ..core.steps import ACCEPTED, PENDING
-from ..deck.faults import MISSING, Mistake
+from ..deck.faults import Mistake
 from ..deck.height_map import BEYOND_MAP, Placed, along_axes, place
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
@@ -28,6 +28,8 @@ from ..deck.units import readable
 from ..errors import DeckError
 from .plane_field import PlaneField
 
+Found = Iterator[tuple[tuple[str | int, ...], str]]
+"""Key and sentence of each mistake in a deck."""
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
 
@@ -237,7 +239,7 @@ def check_interface(
     full: bool,
     normal_load: float | None = None,
     approach: float = 0.0,
-) -> tuple[list[float], list[Mistake]]:
+) -> tuple[list[float], list[tuple[tuple[str, str], str]]]:
     """Compare the stiffness of an interface with that of the bodies, E*/size.
 
     That of the interface is dp/dψ at the pressure P/size^2, or at a penetration as large as the approach.
@@ -262,7 +264,7 @@ def check_interface(
             sentence = (
                 f"expected at {limit}: the interface has 1e{ratio:.0f} times the stiffness of the bodies"
             )
-            problems.append(Mistake(("interface", key), given, sentence))
+            problems.append((("interface", key), sentence))
     return [ratio for _, _, ratio, _, _ in found], problems
 
 
@@ -361,7 +363,8 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     nodes = grid.nodes_across or 0  # one of the three is always given
     shape = (nodes, nodes)
     if isinstance(grid.extent, tuple):
-        lower, upper = _corners(center, grid.extent, pattern)
+        corners = np.stack(pattern.coordinates(*_rectangle(center, grid.extent)))
+        lower, upper = corners.min(axis=1), corners.max(axis=1)
         margin = 0
     else:
         center_coordinates = (lower + upper) / 2
@@ -375,8 +378,8 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     return lattice
 
 
-def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
-    """Return the faults of a given window that reaches beyond maps of heights."""
+def _beyond_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> Found:
+    """Yield the faults of a given window that reaches beyond maps of heights."""
     if isinstance(grid.extent, tuple):
         key, center = "extent", grid.center
         middle = lattice.origin + np.array([np.mean(lattice.cols), np.mean(lattice.rows)]) @ lattice.basis
@@ -384,7 +387,6 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
     else:
         key, (col, row) = "window", np.meshgrid(lattice.cols[[0, -1]], lattice.rows[[0, -1]])
         x, y = (lattice.origin + np.stack([col.ravel(), row.ravel()], axis=1) @ lattice.basis).T
-    problems = []
     for one in maps:
         at, own = np.stack(one.own(x, y)), (one.map.x, one.map.y)
         beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
@@ -404,20 +406,7 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
             f"the window is larger than the map of {one.name}: {theirs}, the map {ours} only; expected "
         )
         sentence += "a smaller one, or heights of a larger part" + "; are x and y swapped?" * bool(swapped)
-        problems.append(Mistake(("grid", key), getattr(grid, key), sentence))
-    return problems
-
-
-def check_ends(estimate: Estimate, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
-    """Return the faults of an estimated contact that maps of heights do not bound."""
-    middle = lattice.origin + estimate.bounds.mean(axis=1) / lattice.spacing @ lattice.basis
-    x, y = _rectangle(tuple(middle), tuple(estimate.size))
-    ended = [
-        one for one in maps if math.isinf(estimate.max_pressure) and one.is_near_end(estimate.cell, x, y)
-    ]
-    return [
-        Mistake(tuple(one.name.split(".")), MISSING, f"the estimated contact {BEYOND_MAP}") for one in ended
-    ]
+        yield ("grid", key), sentence
 
 
 def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tuple[Array, Array]:
@@ -425,14 +414,6 @@ def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tupl
     x = center[0] + extent[0] / 2 * np.array([-1, 1, -1, 1])
     y = center[1] + extent[1] / 2 * np.array([-1, -1, 1, 1])
     return x, y
-
-
-def _corners(
-    center: tuple[float, float], extent: tuple[float, float], pattern: Pattern
-) -> tuple[Array, Array]:
-    """Return the bounds of a rectangle in lattice coordinates."""
-    coordinates = np.stack(pattern.coordinates(*_rectangle(center, extent)))
-    return coordinates.min(axis=1), coordinates.max(axis=1)
 
 
 def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
@@ -445,9 +426,8 @@ def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
     )
 
 
-def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
-    """Return the faults of a window: too coarse or too small for the contact, or too many nodes."""
-    problems = []
+def check(grid: Grid, lattice: Lattice, estimate: Estimate, maps: Sequence[Placed]) -> Found:
+    """Yield the faults of a window, and of maps of heights that end within it or within the contact."""
     given = (
         "spacing" if grid.spacing is not None else "nodes_across" if grid.nodes_across else "nodes_in_radius"
     )
@@ -456,13 +436,13 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
         least = readable(lattice.spacing * max(lattice.shape) / MOST_NODES_PER_SIDE * 1.01)
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}: "
         sentence += f"a spacing of {least} or more"
-        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
+        yield ("grid", given), sentence
     if estimate.spacings(lattice) < 1.0:
         sentence = f"the spacing of {readable(lattice.spacing)} is larger than the contact: "
         fitting = readable(estimate.half_width / GOOD_SPACINGS)
         sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}, "
         sentence += f'such as "{fitting}"'
-        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
+        yield ("grid", given), sentence
     if is_fixed(grid) and _outside(lattice, estimate.lower, estimate.upper):
         if size == "extent":
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
@@ -473,8 +453,16 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"
         )
-        problems.append(Mistake(("grid", size), getattr(grid, size, MISSING), sentence))
-    return problems
+        yield ("grid", size), sentence
+    if is_fixed(grid):
+        yield from _beyond_maps(grid, lattice, maps)
+    if not maps or math.isfinite(estimate.max_pressure):
+        return
+    middle = lattice.origin + estimate.bounds.mean(axis=1) / lattice.spacing @ lattice.basis
+    x, y = _rectangle(tuple(middle), tuple(estimate.size))
+    for one in maps:
+        if one.is_near_end(estimate.cell, x, y):
+            yield tuple(one.name.split(".")), f"the estimated contact {BEYOND_MAP}"
 
 
 # --- contact that a window misses ---------------------------------------------------------------------------

@@ -565,7 +565,7 @@ def test_a_constant_of_a_formula_raises_no_false_alarm() -> None:
 
 def test_a_narrow_summit_of_a_large_map_is_seen() -> None:
     """A bowl of 801 x 801 points with one point outside of the window that touches."""
-    from hexcontact.problem.beyond import surroundings
+    from hexcontact.problem.window import surroundings
 
     at = np.linspace(-2e-3, 2e-3, 801)
     heights = 2.0 * (at[:, None] ** 2 + at**2)

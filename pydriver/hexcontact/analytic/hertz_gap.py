@@ -1,10 +1,11 @@
-"""Hertz's solution for a result: its gap as a quadratic form, and the conditions under which it holds."""
+"""Hertz's solution for a result, from its quadratic gap, and the conditions under which it holds."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..core.measures import half_axes
 from ..deck.read import recorded
 from ..deck.surfaces import Roller
 from ..errors import DeckError
-from ..variables import BULK_STRESS, INTERFACE
+from ..variables import BULK_STRESS, INTERFACE, VARIABLES
 from .frictionless import EllipticContact, hertz_ellipse
 
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
@@ -64,92 +65,90 @@ def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
 
 
 @dataclass(frozen=True)
-class QuadraticGap:
-    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid."""
+class Pressed:
+    """A contact without friction that has a closed solution at every load."""
 
-    modulus: float  # E*, Pa
-    hessian: Array  # its second derivatives, 1/m, (2, 2)
-    center: tuple[float, float]  # point of its minimum, m
-    lowest: float  # the gap there, m; not 0 for heights that are not shifted to first touch
+    name: str  # name of the solution
+    center: tuple[float, float]  # m
+    contact: Callable[[float], Any]  # the contact under a load (N) above 0, axisymmetric or elliptic
+    energy: float  # its elastic energy over load times approach; 0: unknown
+    lowest: float = 0.0  # gap at the center, m; not 0 for heights that are not shifted to first touch
+    rim: bool = False  # whether it ends at a sharp rim
 
-    @classmethod
-    def of(cls, dataset: Dataset) -> QuadraticGap | None:
-        """Return the gap of a result; None if Hertz does not hold: another law or shape, a line contact."""
-        try:
-            deck = str(dataset.attrs.get("deck", ""))
-            known, moves = cls.of_deck(deck, dataset.attrs), is_moving(deck)
-        except DeckError:  # a surface of a later version
-            known, moves = None, False
-        if known or moves or "initial_gap" not in dataset:
-            return known
-        gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
-        if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
-            return None
-        size = max(np.ptp(x), np.ptp(y))
-        u, v = (x - x.mean()) / size, (y - y.mean()) / size
-        forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
-        coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
-        if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
-            return None
-        hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
-        try:
-            lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
-        except np.linalg.LinAlgError:
-            return None
-        height = float(coefficients[0] + 0.5 * lowest @ coefficients[1:3] / size)
-        center = (float(x.mean() + lowest[0]), float(y.mean() + lowest[1]))
-        return cls.of_hessian(dataset.attrs, hessian, center, height)
-
-    @classmethod
-    def of_deck(cls, deck: str, attributes: Mapping[Any, Any]) -> QuadraticGap | None:
-        """Return the gap of the surfaces of a deck; None if they are unknown, or as of `of`."""
-        separation = recorded(deck).separation
-        if separation is None or separation.moves or separation.quadratic is None:
-            return None
-        hessian, center = separation.quadratic
-        return cls.of_hessian(attributes, hessian, center, float(separation(*center)))
-
-    @classmethod
-    def of_hessian(
-        cls, attributes: Mapping[Any, Any], hessian: Array, center: tuple[float, float], lowest: float
-    ) -> QuadraticGap | None:
-        """Return the gap if it and the law of contact lead to an ellipse."""
-        modulus = attribute_of(attributes, "effective_modulus")
-        try:
-            hertz_ellipse(modulus, hessian, normal_load=1.0)
-        except DeckError:  # a line contact, or an unknown modulus
-            return None
-        return None if is_compliant(attributes) else cls(modulus, hessian, center, lowest)
-
-    def contact(self, load: float) -> EllipticContact:
-        """Return Hertz's solution under a load (N) above 0."""
-        return hertz_ellipse(self.modulus, self.hessian, normal_load=load)
-
-    def approach(self, load: float) -> float:
-        """Return the approach (m) from the height zero of the surfaces under a load (N)."""
-        return self.contact(load).approach + self.lowest
+    def pressure(self, load: float, x: Array, y: Array) -> Array:
+        """Return the pressure (Pa) under a load (N) at points (m)."""
+        contact, x, y = self.contact(load), x - self.center[0], y - self.center[1]
+        at = (x, y) if isinstance(contact, EllipticContact) else (np.hypot(x, y),)
+        return np.asarray(contact.pressure(*at))
 
 
-def crowned(deck: str, attributes: Mapping[Any, Any], load: float) -> QuadraticGap | None:
-    """Return the gap of a crowned roller whose contact under a load (N) ends before its length; else None."""
-    surface = recorded(deck).only_surface
-    if not isinstance(surface, Roller) or not surface.crown_radius:
+def quadratic(dataset: Dataset) -> Pressed | None:
+    """Return Hertz's solution for the gap of a result; None if it is no quadratic form, or a line contact."""
+    try:
+        deck = str(dataset.attrs.get("deck", ""))
+        known, moves = quadratic_of_deck(deck, dataset.attrs), is_moving(deck)
+    except DeckError:  # a surface of a later version
+        known, moves = None, False
+    if known or moves or "initial_gap" not in dataset:
+        return known
+    gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
+    if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
         return None
-    along = np.array([math.cos(surface.angle), math.sin(surface.angle)])
-    across = np.array([-along[1], along[0]])
-    hessian = np.outer(along, along) / surface.crown_radius + np.outer(across, across) / surface.radius
-    gap = QuadraticGap.of_hessian(
-        attributes, hessian, (float(surface.offset[0]), float(surface.offset[1])), 0.0
-    )
-    return gap if gap and gap.contact(load).semi_major < surface.reach else None
+    size = max(np.ptp(x), np.ptp(y))
+    u, v = (x - x.mean()) / size, (y - y.mean()) / size
+    forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
+    coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
+    if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
+        return None
+    hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
+    try:
+        lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
+    except np.linalg.LinAlgError:
+        return None
+    height = float(coefficients[0] + 0.5 * lowest @ coefficients[1:3] / size)
+    return _hertz(dataset.attrs, hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])), height)
 
 
-def plane_contact(deck: str, attributes: Mapping[Any, Any], load: float) -> tuple[float, float] | None:
-    """Return half-width (m) and pressure (Pa) of plane contact of the roller of a deck; None without one."""
+def quadratic_of_deck(deck: str, attributes: Mapping[Any, Any]) -> Pressed | None:
+    """Return Hertz's solution for the surfaces of a deck; None if they are unknown, or as of `quadratic`."""
+    separation = recorded(deck).separation
+    if separation is None or separation.moves or separation.quadratic is None:
+        return None
+    hessian, center = separation.quadratic
+    return _hertz(attributes, hessian, center, float(separation(*center)))
+
+
+def _hertz(
+    attributes: Mapping[Any, Any], hessian: Array, center: tuple[float, float], lowest: float = 0.0
+) -> Pressed | None:
+    """Return Hertz's solution if the gap and the law of contact lead to an ellipse."""
+    modulus = attribute_of(attributes, "effective_modulus")
+    try:
+        hertz_ellipse(modulus, hessian, normal_load=1.0)
+    except DeckError:  # a line contact, or an unknown modulus
+        return None
+    contact = lambda load: hertz_ellipse(modulus, hessian, normal_load=load)  # noqa: E731
+    return None if is_compliant(attributes) else Pressed("Hertz", center, contact, 0.4, lowest)
+
+
+def roller_on_flat(deck: str, attributes: Mapping[Any, Any], load: float) -> Pressed | None:
+    """Return the contact of the roller of a deck on a flat under a load (N); None without one.
+
+    It is Hertz's if a crown ends the contact before the length, else plane contact, whose pressure is known.
+    """
     surface, modulus = recorded(deck).only_surface, attribute_of(attributes, "effective_modulus")
     if not isinstance(surface, Roller) or math.isnan(modulus) or is_compliant(attributes):
         return None
-    return surface.plane_contact(modulus, load)
+    center = float(surface.offset[0]), float(surface.offset[1])
+    if surface.crown_radius:
+        along = np.array([math.cos(surface.angle), math.sin(surface.angle)])
+        across = np.array([-along[1], along[0]])
+        hessian = np.outer(along, along) / surface.crown_radius + np.outer(across, across) / surface.radius
+        hertz = _hertz(attributes, hessian, center)
+        if hertz and hertz.contact(load).semi_major < surface.reach:
+            return hertz
+    plane = SimpleNamespace(max_pressure=surface.plane_contact(modulus, load)[1])
+    return Pressed("Hertz, plane contact", center, lambda _: plane, 0.0)
 
 
 def against_hertz(
@@ -162,20 +161,20 @@ def against_hertz(
     load = float(history["normal_load"])
     if not load > 0.0 or is_worn(history) or not pressure_is_frictionless(attributes):
         return []
-    gap = QuadraticGap.of_deck(deck, attributes) or crowned(deck, attributes, load)
-    if gap is None:
-        plane = plane_contact(deck, attributes, load)
-        return [("max_pressure", plane[1], float(history["max_pressure"]), "Pa")] if plane else []
-    hertz = gap.contact(load)
-    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (gap.approach(load), "m")}
-    if "mean_gap" in history:  # of mean planes in a window that repeats
-        del known["approach"]
-    if half_axes(history):
-        known |= {f"contact_semi_{n}": (getattr(hertz, f"semi_{n}"), "m") for n in ("major", "minor")}
-    else:
-        known |= {"contact_radius_fit": (hertz.radius, "m"), "contact_radius": (hertz.radius, "m")}
+    pressed = quadratic_of_deck(deck, attributes) or roller_on_flat(deck, attributes, load)
+    if pressed is None:
+        return []
+    hertz = pressed.contact(load)
+    known = {"max_pressure": hertz.max_pressure}
+    if isinstance(hertz, EllipticContact):
+        if "mean_gap" not in history:  # else the approach is that of mean planes in a window that repeats
+            known["approach"] = hertz.approach + pressed.lowest
+        if half_axes(history):
+            known |= {f"contact_semi_{name}": getattr(hertz, f"semi_{name}") for name in ("major", "minor")}
+        else:
+            known |= dict.fromkeys(("contact_radius_fit", "contact_radius"), hertz.radius)
     return [
-        (name, exact, float(history[name]), unit)
-        for name, (exact, unit) in known.items()
+        (name, exact, float(history[name]), VARIABLES[name].unit)
+        for name, exact in known.items()
         if not math.isnan(history.get(name, math.nan))
     ]

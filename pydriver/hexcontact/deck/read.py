@@ -206,9 +206,7 @@ class RecordedDeck:
     @property
     def only_surface(self) -> Surface | None:
         """The surface of a body on a flat one; None if there is none, or both have one."""
-        gap = self.separation
-        curved = [one for one in gap.surfaces if not one.flat] if gap else []
-        return curved[0] if len(curved) == 1 else None
+        return self.separation.only_curved if self.separation else None
 
 
 @functools.lru_cache(4)

@@ -50,6 +50,11 @@ class Separation:
             for place, part in enumerate(surface.shapes)
         ]
 
+    @property
+    def measured(self) -> list[tuple[str, Any]]:
+        """The measured shapes of both surfaces with the numbers of their bodies."""
+        return [(str(key[1]), one) for key, part in self.keyed for one in part.measured]
+
     def without_height(self, x: Array, y: Array) -> tuple[str | int, ...]:
         """Return the key of a shape that has no height at points where the sum has none."""
         for key, part in self.keyed:
@@ -79,6 +84,12 @@ class Separation:
     def convex(self) -> bool:
         """Whether the bodies touch in one place, however far they are pressed."""
         return self.curvature is not None or all(part.convex for part in self.shapes)
+
+    @property
+    def only_curved(self) -> Surface | None:
+        """The surface that faces a plane without a tilt; None if there is none, or both are curved."""
+        curved = [one for one in self.surfaces if not one.flat]
+        return curved[0] if len(curved) == 1 else None
 
     @property
     def flat(self) -> bool:

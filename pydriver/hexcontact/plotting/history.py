@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from ..analytic.compare import ClosedForms, is_circular
 from ..analytic.friction import MindlinContact
+from ..analytic.hertz_gap import quadratic
 from ..arrays import Array, Dataset
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of
@@ -361,8 +362,8 @@ def initial_compliance(dataset: Dataset) -> tuple[float, float]:
 
     Spheres are pressed, then sheared at a constant normal load; another result is an error.
     """
-    closed = ClosedForms(dataset)
-    if closed.gap is None or not 0.0 < closed.friction < np.inf:
+    closed, gap = ClosedForms(dataset), quadratic(dataset)
+    if gap is None or not 0.0 < closed.friction < np.inf:
         raise NotInResult("the tangential compliance is that of spheres with friction")
     normal = values_of(dataset, "normal_load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
@@ -373,7 +374,7 @@ def initial_compliance(dataset: Dataset) -> tuple[float, float]:
         raise NotInResult(
             "the tangential compliance needs a load step of shear alone after those of pressing"
         )
-    hertz = closed.gap.contact(float(normal[step]))
+    hertz = gap.contact(float(normal[step]))
     if not is_circular(hertz):
         raise NotInResult("the tangential compliance is that of spheres with friction")
     compliance = 4.0 / closed.modulus * (1.0 + 0.5 * closed.gamma)

@@ -474,8 +474,7 @@ def surface(case: Any) -> Figure:
     case : hexcontact.Case
         A case.
     """
-    both = enumerate(case.surfaces.surfaces, 1)
-    maps = [(number, one) for number, part in both for one in part.measured]
+    maps = case.surfaces.measured
     canvas = new_figure(_SURFACE[0] * max(len(maps), 1), _SURFACE[1])
     canvas.set_layout_engine("compressed")
     panels = canvas.subplots(1, max(len(maps), 1), squeeze=False)[0]

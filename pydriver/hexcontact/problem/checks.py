@@ -10,7 +10,7 @@ from ..core.lattice import Lattice
 from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import TwoCoefficients, coulomb
-from ..deck.keys import Deck, Grid, Load, Segment, Solver
+from ..deck.keys import Deck, Load, Segment, Solver
 from ..deck.measured import Measured
 from ..deck.read import Assembled
 from ..deck.separation import Separation, principal_curvatures
@@ -22,6 +22,7 @@ from ..variables import BULK_STRESS, FIELDS, FRICTIONLESS_FIELDS, MOVED_GAP, WOR
 from . import window
 from .loads import MOTIONS, LoadStep, Period, cycle_entries, load_steps
 from .plane_field import GAP, FieldSource, PlaneField
+from .window import Found
 
 _ALL_TOUCH = 1 - 1e-9  # approach over mean gap, from which no pressure belongs to it
 _THINNEST = 0.1  # layer over spacing, from which the sums of a periodic window end
@@ -29,8 +30,14 @@ _ALONG = 1e-8  # sine of an angle between directions that are one
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
 
-Found = Iterator[tuple[tuple[str | int, ...], str]]
-"""Key and sentence of each mistake; the value is that of the key."""
+def mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
+    """Yield mistakes with the values of their keys, unless these are absent or tables."""
+    for key, sentence in found:
+        value: Any = tables
+        for part in key:
+            value = value and value[part] if isinstance(part, int) else dict(value or {}).get(part)
+        plain = isinstance(value, str | bool | int | float | tuple)
+        yield Mistake(key, value if plain else MISSING, sentence)
 
 
 def checked(
@@ -52,36 +59,36 @@ def checked(
     if {"grid", "body"} <= tables.keys() and tables["grid"].periodic:
         repeating, against = _repeating(tables, gap, lattice)
         found += against
-    if {"friction", "interface", "solver", "bulk"} <= tables.keys():
+    period = repeating.period if repeating else _SOME_PERIOD
+    law = {"friction", "interface", "solver", "bulk"} <= tables.keys()
+    if law:
         mu = coulomb(tables["friction"], tables["interface"])
         algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
         solver = solver.model_copy(update={"algorithm": algorithm})
-        found += _mistakes(tables, _law_problems(tables, mu, algorithm))
-        if "load" in tables and "grid" in tables:
-            tables["grid"] = _turned(tables["grid"], tables["load"])
-        if "load" in tables:
-            known = None if algorithm == "frictionless" else 0.0 if mu is None else mu
-            period = repeating.period if repeating else _SOME_PERIOD
-            steps, against = load_steps(tables["load"], known, tables.get("bulk"), period)
-            if against and not repeating:
-                against = [fault for fault in against if fault.key[-1] not in MEANS]
-            found += against
-            if {"grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys():
-                found += _mistakes(tables, _period_problems(tables, steps, period))
-                found += _mistakes(tables | {"solver": solver}, _rolling_problems(tables, solver))
-        if {"output", "wear"} <= tables.keys():
-            found += _mistakes(tables, _field_problems(tables, algorithm))
-    if steps and tables.get("wear"):
-        found += _mistakes(tables | {"solver": solver}, _wear_problems(tables, solver))
-    if {"stress", "fatigue", "body", "output"} <= tables.keys():
-        found += _mistakes(tables, _problems_below(tables, steps))
-    if "body" in tables:
-        grid = given.data.get("grid")
-        periodic = isinstance(grid, Mapping) and grid.get("boundary") == "periodic"
-        if "grid" in tables or not periodic:  # a periodic window bounds the contact, also with another fault
-            found += _mistakes(tables, _body_problems(tables, steps, gap is not None))
-        found += _mistakes(tables, _moving_problems(tables)) if "load" in tables else []
-        found += _mistakes(tables, _coating_problems(tables, repeating))
+        found += mistakes(tables, _law_problems(tables, mu, algorithm))
+    if law and "load" in tables:
+        rolled = [one.rolling_direction or 0.0 for _, one in _segments(tables["load"]) if one.rolling]
+        if rolled and "grid" in tables and tables["grid"].direction is None:  # a row along the first one
+            tables["grid"] = tables["grid"].model_copy(update={"direction": rolled[0]})
+        known = None if algorithm == "frictionless" else mu or 0.0
+        steps, against = load_steps(tables["load"], known, tables["bulk"], period)
+        found += [fault for fault in against if repeating or fault.key[-1] not in MEANS]
+    whole = law and {"load", "grid", "body", "wear", "accuracy", "stress", "fatigue"} <= tables.keys()
+    grid = given.data.get("grid")
+    periodic = isinstance(grid, Mapping) and grid.get("boundary") == "periodic"
+    bounded = periodic and "grid" not in tables  # by the window, also with another fault
+    checks: tuple[tuple[bool, Callable[..., Found], tuple[Any, ...]], ...] = (
+        (whole, _period_problems, (steps, period)),
+        (whole, _rolling_problems, (solver,)),
+        (law and {"output", "wear"} <= tables.keys(), _field_problems, (solver,)),
+        (bool(steps and tables.get("wear")), _wear_problems, (solver,)),
+        ({"stress", "fatigue", "body", "output"} <= tables.keys(), _problems_below, (steps,)),
+        ("body" in tables and not bounded, _body_problems, (steps, gap is not None)),
+        ({"body", "load"} <= tables.keys(), _moving_problems, ()),
+        ("body" in tables, _coating_problems, (repeating,)),
+    )
+    for holds, check, facts in checks:
+        found += mistakes(tables | {"solver": solver}, check(tables, *facts)) if holds else ()
     if found:
         raise deck_error(found, given.source)
     return Deck.model_construct(**tables), solver, steps, repeating
@@ -144,10 +151,9 @@ def _period_problems(tables: Mapping[str, Any], steps: Sequence[LoadStep], perio
         for name in ("torque", "twist")
         if getattr(segment, name)
     ]
-    if named:
-        yield from ((key, turned) for key in named)
-    elif any(step.twist.value or step.twist.control == "force" for step in steps):
-        yield ("load",), turned
+    if any(step.twist.value or step.twist.control == "force" for step in steps):
+        named = named or [("load",)]
+    yield from ((key, turned) for key in named)
     # a mean pressure moves no mean plane of a half-space
     bodies = tables["body"].body_1, tables["body"].body_2
     closes = not (tables["interface"] or all(body.rigid for body in bodies))
@@ -184,10 +190,8 @@ def _coating_problems(tables: Mapping[str, Any], repeating: Repeating | None) ->
                 key = "body", str(number), "coating", place, "poisson_ratio"
                 yield key, "expected a number below 0.5 in one of several coatings"
     if tables.get("wear"):
-        yield (
-            ("wear",),
-            "expected nothing beside a coating: wear makes a layer thinner, which is not followed",
-        )
+        sentence = "expected nothing beside a coating: wear makes a layer thinner, which is not followed"
+        yield ("wear",), sentence
     for place, cycle in enumerate(tables.get("fatigue") or ()):
         if bodies[cycle.body - 1].coating:
             sentence = f"body {cycle.body} has a coating: constants of fatigue are those of one material"
@@ -218,14 +222,6 @@ def _segments(loads: Sequence[Load]) -> Iterator[tuple[tuple[str | int, ...], Se
             yield ("load", place), load
         for number, segment in enumerate(load.path or ()):
             yield ("load", place, "path", number), segment
-
-
-def _turned(grid: Grid, loads: Sequence[Load]) -> Grid:
-    """Return a grid with a row along the first direction of rolling, unless the deck gives its direction."""
-    for _, segment in _segments(loads):
-        if segment.rolling is not None and grid.direction is None:
-            return grid.model_copy(update={"direction": segment.rolling_direction or 0.0})
-    return grid
 
 
 def _rolling_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
@@ -298,16 +294,6 @@ def rolling_fault(loads: Sequence[Load], spacing: Callable[[float], float]) -> M
     return None
 
 
-def _mistakes(tables: Mapping[str, Any], found: Found) -> Iterator[Mistake]:
-    """Yield mistakes with the values of their keys, unless these are absent or tables."""
-    for key, sentence in found:
-        value: Any = tables
-        for part in key:
-            value = value and value[part] if isinstance(part, int) else dict(value or {}).get(part)
-        plain = isinstance(value, str | bool | int | float | tuple)
-        yield Mistake(key, value if plain else MISSING, sentence)
-
-
 def _law_problems(tables: Mapping[str, Any], mu: float | None, algorithm: str) -> Found:
     """Yield conflicts of the law of friction with the interface and the algorithm."""
     solver, friction, layer = tables["solver"], tables["friction"], tables["interface"]
@@ -368,10 +354,10 @@ def _wear_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
         yield ("wear", "cycle"), "expected an entry of [[load]] before the cycle, which presses the bodies"
 
 
-def _field_problems(tables: Mapping[str, Any], algorithm: str) -> Found:
+def _field_problems(tables: Mapping[str, Any], solver: Solver) -> Found:
     """Yield fields that a run without friction, or without wear, does not have."""
     fields = tables["output"].fields or ()
-    known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
+    known = FRICTIONLESS_FIELDS if solver.algorithm == "frictionless" else FIELDS
     if missing := [name for name in fields if name not in known]:
         sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
         yield ("output", "fields"), sentence

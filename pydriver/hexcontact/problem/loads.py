@@ -173,14 +173,11 @@ AUTO = "auto"  # number of load steps of a segment that are chosen
 
 _WATCHED = [part / 16 for part in range(1, 17)]  # fractions of such a segment at which loads are checked
 
-START: dict[Motion, Target] = {
-    "z": Target("force", 0.0),
-    "x": Target("force", 0.0),
-    "y": Target("force", 0.0),
+_START: Mapping[Any, Any] = {
+    **dict.fromkeys(("z", "x", "y"), Target("force", 0.0)),
     "twist": Target("displacement", 0.0),
+    "bulk": (0.0, 0.0, 0.0),
 }
-
-
 _NO_CREEPAGE: dict[Motion, Target] = dict.fromkeys(("x", "y", "twist"), Target("displacement", 0.0))
 
 
@@ -202,7 +199,7 @@ class History:
         self._count = 0
         self._segments = 0
         self._rolled = False
-        self._now: Mapping[Any, Any] = {**START, "bulk": (0.0, 0.0, 0.0)}
+        self._now = _START
         self._problems: dict[tuple[str | int, ...], Mistake] = {}
 
     def append(self, load: Load) -> None:
@@ -220,7 +217,8 @@ class History:
         key, segment, label, carries_on = stretch
         if self._period:
             segment = segment.model_copy(update=self._period.driven(segment))
-        roll = _roll(segment)
+        distance = segment.rolling if isinstance(segment.rolling, float) else 0.0
+        roll = Roll(segment.rolling_direction or 0.0, distance) if segment.rolling else None
         if roll and not self._rolled:
             self._now = {**self._now, **_NO_CREEPAGE}
         elif self._rolled and not roll:
@@ -267,27 +265,23 @@ class History:
 
     def _in_newtons(self, key: tuple[str | int, ...], segment: Segment, normal: Target) -> Segment:
         """Return a segment with its shares of mu P at its end as forces."""
-        forces = {}
+        forces, mu = {}, self._mu or 0.0
         for name, value in segment:
             if isinstance(value, Share) and name not in MEANS:
                 mean = next((mean for mean in MEANS if getattr(segment, mean) is value), "")
-                units = "pascals" if mean else "newtons"
-                unknown = (
-                    f"expected nothing, {_FRICTION}"
-                    if self._mu is None
-                    else f"expected {units}, since friction.coefficient is inf"
-                    if math.isinf(self._mu)
-                    else f"expected {units}, since friction varies or has a bound, so that mu P is no number"
-                    if math.isnan(self._mu)
-                    else f"expected {units}, since the approach is given and not the normal load"
-                    if normal.control != "force"
-                    else "expected 0, since the normal load at the end of this segment is 0"
-                    if value.share and not normal.value
-                    else ""
+                since = f"expected {'pascals' if mean else 'newtons'}, since"
+                loaded = normal.value or not value.share
+                reasons = (
+                    (self._mu is None, f"expected nothing, {_FRICTION}"),
+                    (math.isinf(mu), f"{since} friction.coefficient is inf"),
+                    (math.isnan(mu), f"{since} friction varies or has a bound, so that mu P is no number"),
+                    (normal.control != "force", f"{since} the approach is given and not the normal load"),
+                    (not loaded, "expected 0, since the normal load at the end of this segment is 0"),
                 )
+                unknown = next((sentence for holds, sentence in reasons if holds), "")
                 if unknown:
                     self._complain(Mistake((*key, mean or name), str(value), unknown))
-                forces[name] = 0.0 if unknown else value.share * (self._mu or 0.0) * normal.value
+                forces[name] = 0.0 if unknown else value.share * mu * normal.value
         return segment.model_copy(update=forces) if forces else segment
 
     def _complain(self, problem: Mistake) -> None:
@@ -313,10 +307,9 @@ class History:
                     sentence += f", or a mean gap below {height}, that before loading"
             names = ("normal_load", "mean_gap", "mean_pressure")
             name = next((name for name in names if getattr(self._entries[0], name) is not None), None)
-            key, value = (
-                (("load", 0, name), getattr(self._entries[0], name)) if name else (("load",), MISSING)
-            )
-            return [Mistake(key, value, sentence)]  # from which sliding and unknown shares follow
+            given = getattr(self._entries[0], name) if name else MISSING
+            # sliding and unknown shares follow from this fault
+            return [Mistake(("load", 0, name) if name else ("load",), given, sentence)]
         return problems
 
 
@@ -331,14 +324,6 @@ def load_steps(
     for load in loads:
         history.append(load)
     return tuple(history.steps), history.problems
-
-
-def _roll(segment: Segment) -> Roll | None:
-    """Return the rolling of a segment."""
-    if segment.rolling is None:
-        return None
-    distance = segment.rolling if isinstance(segment.rolling, float) else 0.0
-    return Roll(segment.rolling_direction or 0.0, distance)
 
 
 def rolled_out(
@@ -368,19 +353,6 @@ def rolled_out(
 def cycle_entries(loads: Sequence[Load], label: str) -> list[Load]:
     """Return the last entries of [[load]], which have the label."""
     return [*reversed([*takewhile(lambda load: load.label == label, reversed(loads))])]
-
-
-def wearing_cycle(
-    loads: Sequence[Load],
-    friction_coefficient: float,
-    bulk: Bulk | None,
-    label: str,
-    period: Period | None = None,
-) -> tuple[LoadStep, ...]:
-    """Return the load steps of the last entries, which have the label, once more after the history."""
-    given = friction_coefficient, bulk, period
-    steps, _ = load_steps([*loads, *cycle_entries(loads, label)], *given)
-    return steps[len(load_steps(loads, *given)[0]) :]
 
 
 def _turn(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:

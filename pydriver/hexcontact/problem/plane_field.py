@@ -78,8 +78,7 @@ class PlaneField:
 
     `at_nodes`: it is an array over the nodes of one window; `given`: in Python, not as two surfaces; `map`:
     the map, if it is one; `maps`: those of measured surfaces, or itself; `heights`: those (m) of both
-    surfaces, none if only their sum is known, as are their `shapes`; `rollers`: those of these, which the
-    problem sets.
+    surfaces, none if only their sum is known, as are their `shapes` and the `rollers` among these.
     """
 
     def __init__(self, source: FieldSource, rule: Rule) -> None:
@@ -88,11 +87,11 @@ class PlaneField:
         self.map = source if isinstance(source, HeightMap) else None
         self.maps: tuple[Placed, ...] = (Placed(rule.key, self.map),) if self.map else ()
         self.heights: tuple[Callable[[Array, Array], Array], ...] = ()
-        self.rollers: list[Roller] = []
         self.shapes: tuple[Surface, ...] = ()
         if isinstance(source, Separation):
             self.maps, self.shapes = source.placed, source.shapes
             self.heights = tuple(one.height for one in source.surfaces)
+        self.rollers = [one for one in self.shapes if isinstance(one, Roller)]
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
@@ -174,20 +173,6 @@ class PlaneField:
             key = dotted(self.source.without_height(x[bad][:1], y[bad][:1]))
         raise DeckError(f"{key}: expected {self.rule.expected}; it is {shown} at {where}")
 
-    @property
-    def touch_fault(self) -> tuple[str, str]:
-        """Return a map that faces a flat and has its lowest point at its end, and the fault, or nothing."""
-        if isinstance(self.source, Separation) and not self.source.one_map:
-            return "", ""
-        faults = ((one.name, one.touch_fault) for one in self.maps)
-        return next((found for found in faults if found[1]), ("", ""))
-
-    def fault_near(self, lattice: Lattice, chosen: Mask) -> tuple[str, str]:
-        """Return a map near whose end or hole nodes in contact lie, and the fault, or nothing."""
-        x, y = lattice.x[chosen], lattice.y[chosen]
-        faults = ((one.name, one.fault_near(lattice.spacing, x, y)) for one in self.maps)
-        return next((found for found in faults if found[1]), ("", ""))
-
     def __eq__(self, other: object) -> bool:
         """Test whether two fields are the same; functions are if they are one object."""
         if not isinstance(other, PlaneField):
@@ -213,7 +198,12 @@ def given_coefficient(coefficient: Any, lattice: Lattice | None) -> Any:
     """Return a coefficient from Python as in a deck: a number, a text, or a `NodalCoefficient`."""
     if isinstance(coefficient, str | dict) or not (callable(coefficient) or has_entries(coefficient)):
         return coefficient
-    return NodalCoefficient(_of_few_points(given_field(coefficient, COEFFICIENT, lattice)))
+    source = given_field(coefficient, COEFFICIENT, lattice)
+    if (
+        isinstance(source, HeightMap) and source.gap.size > MOST_POINTS
+    ):  # more than the deck of a result holds
+        raise DeckError(f"{_NAME}: expected a map of at most {MOST_POINTS:,} points, not {source.gap.size:,}")
+    return NodalCoefficient(source)
 
 
 class FrictionField:
@@ -249,10 +239,3 @@ class FrictionField:
         """Return the law at the nodes of a window."""
         mu = self._coefficient
         return FrictionLaw(mu.over(lattice) if isinstance(mu, PlaneField) else mu, **self._numbers)
-
-
-def _of_few_points(source: Any) -> Any:
-    """Return a field; refuse a map of more points than the deck of a result can hold."""
-    if isinstance(source, HeightMap) and source.gap.size > MOST_POINTS:
-        raise DeckError(f"{_NAME}: expected a map of at most {MOST_POINTS:,} points, not {source.gap.size:,}")
-    return source

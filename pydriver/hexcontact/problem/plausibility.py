@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from ..core.measures import (
 )
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
-from ..deck.surfaces import Cone, Power
+from ..deck.surfaces import Cone
 from ..text import counted, listed, percent, quantity
 from ..variables import LOADS, spelled
 from .loads import LoadStep
@@ -193,26 +192,22 @@ _ROUNDED = 1e-6  # spacings by which a rolled distance may differ from a whole n
 
 def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     """Return the known expected values at the largest load, SI."""
-    mu = case.deck.friction.coefficient if case.deck.friction else 0.0
-    known = case.estimate if estimated else None
+    known, lattice = case.estimate if estimated else None, case.lattice
+    coarse = lattice.spacing * max(1.0, lattice.cell_ratio)
     found: dict[str, Any] = {}
-    if isinstance(mu, TwoCoefficients):
-        mu = max(mu.along, mu.across)
-    bodies = case.body_1, case.body_2
-    layers = [layer for body in bodies for layer in body.coating]
-    moduli = [*(body.young_modulus for body in bodies), *(layer.young_modulus for layer in layers)]
-    if known_moduli := [modulus for modulus in moduli if modulus]:
-        found["young_modulus"] = min(known_moduli)
+    layers = [layer for body in (case.body_1, case.body_2) for layer in body.coating]
+    solids: list[Any] = [case.body_1, case.body_2, *layers]
+    if moduli := [solid.young_modulus for solid in solids if solid.young_modulus]:
+        found["young_modulus"] = min(moduli)
     if layers:
-        thinnest = min(layer.thickness for layer in layers)
-        found["layer_spacings"] = thinnest / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio))
-    for part in () if case.gap_given else case.shapes:
-        if part.wave:
-            apart = max(case.lattice.apart(0.0), case.lattice.apart(math.pi / 2))
-            waves = getattr(part, part.wave) / apart
-            found["wave_spacings"] = min(found.get("wave_spacings", waves), waves)
+        found["layer_spacings"] = min(layer.thickness for layer in layers) / coarse
+    if waves := [getattr(part, part.wave) for part in case.shapes if part.wave]:
+        found["wave_spacings"] = min(waves) / max(lattice.apart(0.0), lattice.apart(math.pi / 2))
     if slopes := [one.rms[1] for one in case.shapes if isinstance(one, Rough)]:
         found["rms_slope"] = math.hypot(*slopes)
+    mu: Any = case.deck.friction.coefficient if case.deck.friction else 0.0
+    if isinstance(mu, TwoCoefficients):
+        mu = max(mu.along, mu.across)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     slipping, turning, ring = _sheared(case)
@@ -228,24 +223,19 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         "slope": max(known.slope, *known.body_slopes, 0.0),
         "gap_slope": known.slope,
         "is_full": math.isinf(known.breadth),
-        "spacings": min(
-            known.spacings(case.lattice),
-            known.breadth / (case.lattice.spacing * max(1.0, case.lattice.cell_ratio)),
-        ),
+        "spacings": min(known.spacings(lattice), known.breadth / coarse),
     }
     if math.isfinite(known.max_pressure):
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
-        along = np.array(
-            [
-                distance / case.lattice.apart(one.angle + axis * math.pi / 2)
-                for one in case.maps
-                for axis, distance in zip(one.axes, one.distances, strict=True)
-            ]
-        )
+        apart = [
+            distance / lattice.apart(one.angle + axis * math.pi / 2)
+            for one in case.maps
+            for axis, distance in zip(one.axes, one.distances, strict=True)
+        ]
         found |= {
-            "spacings_between_points": float(along.max()),
-            "points_between_nodes": float(1.0 / along.min()),
+            "spacings_between_points": float(max(apart)),
+            "points_between_nodes": float(1.0 / min(apart)),
             "holes_near_contact": case.holes_near(known),
         }
     if case.accuracy is None:
@@ -255,14 +245,12 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
             "needed_spacings": math.ceil(needed),
             **{f"{name}_error": error for name, error in errors._asdict().items()},
         }
-    if case.rollers and case.accuracy is None and not case.deck.interface:
-        found |= _ends_of_rollers(case)
-    if ring is not None and case.accuracy is None:
-        errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
-        found |= {
-            "ring_spacings": slip_ring(ring) * found["spacings"],
-            "ring_error": errors.dissipated_energy,
-        }
+        if case.rollers and not case.deck.interface:
+            found |= _ends_of_rollers(case)
+        if ring is not None:
+            errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
+            found["ring_spacings"] = slip_ring(ring) * found["spacings"]
+            found["ring_error"] = errors.dissipated_energy
     if named := [*_fatigue_at_surface(case)]:
         found |= {"edge_spacings": found["spacings"], "edge_tables": listed(named, "and")}
     if entering := list(_entering(case)):
@@ -273,15 +261,14 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
 
 def _ends_of_rollers(case: Problem) -> dict[str, float]:
     """Return cells along the axis of a logarithmic roller over those that resolve its ends; else nothing."""
-    found: dict[str, float] = {}
     load = max((drive.get("normal_load", 0.0) for drive in case.largest_drives), default=0.0)
+    found = []
     for roller in case.rollers:
         if roller.design_load and 0.0 < load < roller.design_load:
             width, _ = roller.plane_contact(case.pair.effective_modulus, roller.design_load)
             cell, needed = case.lattice.apart(roller.angle), (1.0 - load / roller.design_load) * width
-            if cell / needed > found.get("end_cells", 0.0):
-                found = {"end_cells": cell / needed, "end_cell": cell, "end_needed": needed}
-    return found
+            found.append((cell / needed, cell, needed))
+    return dict(zip(("end_cells", "end_cell", "end_needed"), max(found), strict=True)) if found else {}
 
 
 def _fatigue_at_surface(case: Problem) -> Iterator[str]:
@@ -367,27 +354,34 @@ def row(case: Problem) -> str:
     )
 
 
+_AT_TIPS = "the pressure is unbounded at a sharp tip: there its largest value grows as the spacing shrinks"
+
+
 def notes(case: Problem) -> dict[str, str]:
     """Return notes by their subjects: limits that are not judged, rounded distances, tips, equal seeds."""
     found = {"unjudged": unjudged(case), "rounded": rounded_distances(case)}
     if case.surfaces.curvature is None:
-        found |= {"tips": sharp_tips(case), "seeds": equal_seeds(case)}
+        sharp = [one for one in case.shapes if isinstance(one, Cone) or getattr(one, "exponent", 2.0) <= 1.0]
+        if sharp and not case.deck.interface:
+            found["tips"] = _AT_TIPS
+        waves = [(one.seed, one.sides, one.offset) for one in case.shapes if isinstance(one, Rough)]
+        if twice := [one for one in waves if waves.count(one) > 1]:
+            seed, *_ = twice[0]
+            found["seeds"] = f"two rough surfaces have {seed = }: their waves coincide, and peaks meet peaks"
     return {about: note for about, note in found.items() if note}
 
 
 def unjudged(case: Problem) -> str:
     """Return a note on limits that the warnings do not check, and on measured surfaces; empty without one."""
-    if not case.gap_given:
-        bodies = enumerate(case.surfaces.surfaces, 1) if case.maps else ()
-        words = (
-            one.notes(f"the {one.shape} of body {number}")
-            for number, surface in bodies
-            for one in surface.measured
+    if case.gap_given:
+        return (
+            "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
+            "of each body at the edge of the contact, also where surfaces conform"
         )
-        return "; ".join(chain(*words)) if bodies else ""
-    return (
-        "the slopes of the bodies are not judged, since only their gap is known: expected at most 0.1 "
-        "of each body at the edge of the contact, also where surfaces conform"
+    return "; ".join(
+        note
+        for number, shape in (case.surfaces.measured if case.maps else ())
+        for note in shape.notes(f"the {shape.shape} of body {number}")
     )
 
 
@@ -404,26 +398,6 @@ def rounded_distances(case: Problem) -> str:
                 f"{counted(len(rolled), 'spacing')} of the lattice, and not {quantity(given, 'm')}"
             )
     return "; ".join(words)
-
-
-def sharp_tips(case: Problem) -> str:
-    """Return a note on tips at which the pressure is unbounded; empty without one, or with an interface."""
-    shapes = () if case.gap_given or case.deck.interface else case.shapes
-    if not any(isinstance(one, Cone) or (isinstance(one, Power) and one.exponent <= 1) for one in shapes):
-        return ""
-    return "the pressure is unbounded at a sharp tip: there its largest value grows as the spacing shrinks"
-
-
-def equal_seeds(case: Problem) -> str:
-    """Return a note on rough surfaces whose waves coincide; empty without two of them."""
-    found = set()
-    for part in case.shapes:
-        if not isinstance(part, Rough):
-            continue
-        if (waves := (part.seed, part.sides, part.offset)) in found:
-            return f"two rough surfaces have seed = {part.seed}: their waves coincide, and peaks meet peaks"
-        found.add(waves)
-    return ""
 
 
 def _steepest(case: Problem, found: dict[str, Any]) -> dict[str, str]:
@@ -491,14 +465,9 @@ def _sheared(case: Problem) -> tuple[float, float | None, float | None]:
 
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
     """Yield the error by steps with nodes that enter the contact, these steps, and the needed number."""
-    solver, mu, beta = case.solver, case.friction_coefficient, abs(case.pair.beta)
-    if (
-        solver.algorithm != "incremental"
-        or solver.entry != "implicit"
-        or not mu
-        or case.adaptive
-        or case.rolls
-    ):
+    mu, beta = case.friction_coefficient, abs(case.pair.beta)
+    implicit = (case.solver.algorithm, case.solver.entry) == ("incremental", "implicit")
+    if not (implicit and mu) or case.adaptive or case.rolls:
         return
     coupled = beta > _ALIKE and not math.isnan(mu)
     growing = list(_growing(case))

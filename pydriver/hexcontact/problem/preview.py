@@ -10,7 +10,7 @@ import functools
 import math
 import os
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, get_args
 
@@ -95,7 +95,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "entry": solver.entry,
         "iteration": solver.iteration if solver.iteration != "newton" else None,
         "tolerance": solver.tolerance,
-        "measured_surfaces": None if case.gap_given or not case.maps else _measured(case),
+        "measured_surfaces": _measured(case) if case.maps and not case.gap_given else None,
         "bulk_state": deck.bulk and deck.bulk.state,
         "step_tolerance": solver.step_tolerance if case.adaptive else None,
         "cycle_tolerance": wear and wear.cycle_tolerance(solver.tolerance),
@@ -110,20 +110,16 @@ def parameters_of(case: Problem) -> dict[str, Any]:
 
 def _measured(case: Problem) -> str:
     """Return the files of measured surfaces, and how they are read."""
-    bodies = list(enumerate(case.surfaces.surfaces, 1))
-    measured = [(number, shape) for number, surface in bodies for shape in surface.measured]
-    return "; ".join(f"{shape.shape} of body {number}: {shape.points.about}" for number, shape in measured)
+    measured = case.surfaces.measured
+    return "; ".join(f"{one.shape} of body {number}: {one.points.about}" for number, one in measured)
 
 
 def _pair_parameters(case: Problem) -> dict[str, Any]:
     """Return the constants of two half-spaces, or the coatings and the fit of their kernels."""
     pair = case.pair
     if not isinstance(pair, CoatedPair):
-        return {
-            "effective_modulus": pair.effective_modulus,
-            "dundurs_beta": pair.beta,
-            "tangential_compliance_ratio": pair.gamma,
-        }
+        names = "effective_modulus", "dundurs_beta", "tangential_compliance_ratio"
+        return dict(zip(names, (pair.effective_modulus, pair.beta, pair.gamma), strict=True))
     layers = [
         f"body {number}: {_layer(layer)}"
         for number, body in enumerate((case.body_1, case.body_2), 1)
@@ -168,8 +164,12 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     rows = [
         ("body 1", _body(case.body_1)),
         ("body 2", _body(case.body_2)),
-        ("gap", str(case.height_map or "")),
-        *_maps(case),
+        ("gap", str(case.plane_gap.map or "")),
+        *(
+            (f"{one['shape']} of body {one['body']}" if not place else "", words)
+            for one in surfaces_in_words(case)
+            for place, words in enumerate(one["lines"])
+        ),
         ("pair", constants),
         ("interface", interface),
         ("friction", _friction(case)),
@@ -195,14 +195,12 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
 
 def _plane_contact(case: Problem) -> str:
     """Return half-width and pressure of plane contact beside a roller on a flat; empty for others."""
-    surfaces = case.surfaces.surfaces
-    curved = [surface for surface in surfaces if not surface.flat]
-    load = largest_loads(case)["normal_load"]
+    roller, load = case.surfaces.only_curved, largest_loads(case)["normal_load"]
     other = case.deck.interface or isinstance(case.pair, CoatedPair)
-    if len(curved) != 1 or not isinstance(curved[0], Roller) or not load or other:
+    if not isinstance(roller, Roller) or not load or other:
         return ""
-    half_width, pressure = curved[0].plane_contact(case.pair.effective_modulus, load)
-    by_length, width = quantity(load / curved[0].length, "N/m"), quantity(half_width, "m")
+    half_width, pressure = roller.plane_contact(case.pair.effective_modulus, load)
+    by_length, width = quantity(load / roller.length, "N/m"), quantity(half_width, "m")
     return f"{by_length}: half-width {width}, p_max {quantity(pressure, 'Pa')} between the ends"
 
 
@@ -218,11 +216,10 @@ def law_in_words(case: Problem) -> str:
 def _friction(case: Problem) -> str:
     if not case.frictional:
         return "none"
-    law = law_in_words(case)
-    goodman = ", shear does not move the pressure" * (case.solver.coupling == "goodman")
-    interpolated = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
-    entry = ", entry interpolated" * interpolated
-    return f"{law}, {case.solver.algorithm}{entry}{goodman}"
+    solver = case.solver
+    interpolated = solver.algorithm == "incremental" and solver.entry == "interpolated"
+    goodman = ", shear does not move the pressure" * (solver.coupling == "goodman")
+    return f"{law_in_words(case)}, {solver.algorithm}{', entry interpolated' * interpolated}{goodman}"
 
 
 def _bulk(bulk: Bulk, steps: Sequence[LoadStep]) -> str:
@@ -294,18 +291,10 @@ def _layer(layer: Coating) -> str:
 def surfaces_in_words(case: Problem) -> list[dict[str, Any]]:
     """Return how measured and rough surfaces are read: body, shape and lines of words."""
     return [
-        {"body": number, "shape": one.shape, "lines": lines}
-        for number, surface in enumerate(case.surfaces.surfaces, 1)
-        for one in surface.shapes
+        {"body": int(key[1]), "shape": one.shape, "lines": lines}
+        for key, one in case.surfaces.keyed
         if (lines := [*one.rows(case.lattice.apart)])
     ]
-
-
-def _maps(case: Problem) -> Iterator[Row]:
-    """Yield rows about measured and rough surfaces."""
-    for one in surfaces_in_words(case):
-        for place, words in enumerate(one["lines"]):
-            yield (f"{one['shape']} of body {one['body']}" if not place else "", words)
 
 
 def _surface(surface: Surface | None) -> str:

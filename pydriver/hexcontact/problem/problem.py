@@ -25,18 +25,16 @@ from ..deck.interface import FROM_PYTHON, coulomb
 from ..deck.keys import BULK_STATES, Accuracy, Grid
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.surfaces import Roller
 from ..deck.toml import as_toml, plain
 from ..errors import DeckError
 from ..text import counted, listed
 from ..variables import LOADS
 from . import checks, window
 from .arguments import Body
-from .beyond import Surroundings, missed_contact, surroundings
-from .checks import checked
-from .loads import LoadStep, rolled_out, wearing_cycle
+from .checks import checked, mistakes
+from .loads import LoadStep, cycle_entries, load_steps, rolled_out
 from .plane_field import GAP, FieldSource, FrictionField, PlaneField
-from .window import Estimate, NoContactFound
+from .window import Estimate, Found, NoContactFound, Surroundings, missed_contact, surroundings
 
 # Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
 MOST_DIRECT_NODES = 200
@@ -126,62 +124,56 @@ class Problem:
         self.period = repeating and repeating.period  # None: the window does not repeat
         deck = self.deck
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
-        one, two = (Body.model_construct(**dict(body)) for body in (deck.body.body_1, deck.body.body_2))
-        self.body_1, self.body_2 = one, two
+        bodies = deck.body.body_1, deck.body.body_2
+        self.body_1, self.body_2 = (Body.model_construct(**dict(body)) for body in bodies)
         self.friction_coefficient = coulomb(deck.friction, deck.interface) or 0.0
-        self._friction = FrictionField(deck.friction, deck.interface)
+        # the law of friction, and the gap before loading, at any point
+        self.plane_friction = FrictionField(deck.friction, deck.interface)
         self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
         self.surfaces = repeating.surfaces if repeating else deck.body.separation
-        self._gap = PlaneField(self.surfaces if gap is None else gap, GAP)
-        # a gap that was measured on a grid, or those of measured surfaces; whether it was given in Python
-        self.height_map, self.maps, self.gap_given = self._gap.map, self._gap.maps, self._gap.given
-        self.shapes, self.rollers = self.surfaces.shapes, self._gap.rollers
-        for part in self.shapes:
-            if isinstance(part, Roller):
-                self.rollers.append(part)
+        self.plane_gap = PlaneField(self.surfaces if gap is None else gap, GAP)
+        # gaps that were measured; whether the gap was given in Python
+        self.maps, self.gap_given = self.plane_gap.maps, self.plane_gap.given
+        self.shapes, self.rollers = self.plane_gap.shapes, self.plane_gap.rollers
+        self.moves = self.surfaces.moves  # whether surfaces move with the rolling bodies
         self.frictional = self.solver.algorithm != "frictionless"  # shear tractions are unknowns
         try:
-            self.pair = pair_of(one, two)
+            self.pair = pair_of(self.body_1, self.body_2)
         except DeckError as error:  # coatings that images do not describe
-            number = "1" if one.coating else "2"
-            fault = Mistake(("body", number, "coating"), MISSING, str(error))
-            raise deck_error([fault], given.source) from error
+            number = "1" if self.body_1.coating else "2"
+            wrong = Mistake(("body", number, "coating"), MISSING, str(error))
+            raise deck_error([wrong], given.source) from error
         # whether pressure and shear are coupled
         self.coupled = self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
-        self.full_contact = (
-            gap is None and bool(deck.interface) and deck.body.separation.flat and not deck.grid.periodic
-        )
+        between_flats = bool(deck.interface) and not self.gap_given and self.surfaces.flat
+        self.full_contact = between_flats and not deck.grid.periodic
         self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # if the window follows from it alone
         self.estimate: Estimate | None = None  # None for an array of gaps
-        self.lattice = repeating.lattice if repeating else self._size(deck.grid, given.source, lattice)
+        self.lattice = repeating.lattice if repeating else self._size(deck.grid, lattice)
         if self.rolls:
-            self._roll(given.source)
-        if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
+            if fault := checks.rolling_fault(deck.load, lambda direction: self.row_along(direction)[1]):
+                raise deck_error([fault], given.source)
+            self.load_steps = rolled_out(self.load_steps, self.row_along)
+        if self.plane_friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
             self.friction_law(self.lattice)
-        if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
-            raise deck_error(problems, given.source)
+        if self.accuracy:
+            self._refuse(self._refinement_problems(self.accuracy))
+
+    def _refuse(self, found: Found) -> None:
+        """Raise an error with a sentence for each mistake that a check found."""
+        if problems := [*mistakes(dict(self.deck), found)]:
+            raise deck_error(problems, self._given.source)
 
     @property
     def rolls(self) -> bool:
         """Whether the bodies roll: from the first step that does on, all do."""
         return bool(self.load_steps) and self.load_steps[-1].roll is not None
 
-    @cached_property
-    def moves(self) -> bool:
-        """Whether surfaces move with the rolling bodies."""
-        return not self.gap_given and self.surfaces.moves
-
     def row_along(self, direction: float) -> tuple[tuple[int, int], float]:
         """Return columns and rows to the node ahead along a row of the lattice, and its distance (m)."""
         col, row = friction.row_ahead(self.lattice, direction)
         return (col, row), float(np.linalg.norm([col, row] @ self.lattice.basis))
-
-    def _roll(self, source: Source) -> None:
-        """Unroll rolled distances into load steps of a spacing."""
-        if fault := checks.rolling_fault(self.deck.load, lambda direction: self.row_along(direction)[1]):
-            raise deck_error([fault], source)
-        self.load_steps = rolled_out(self.load_steps, self.row_along)
 
     @cached_property
     def deck_tables(self) -> dict[str, Any]:
@@ -189,11 +181,11 @@ class Problem:
         if self._given.text:
             return self._given.data
         data = plain(self._given.data)
-        if self._gap.given:
+        if self.plane_gap.given:
             # this shape is refused in a deck
             data["body"]["1"]["surface"] = {"shape": FROM_PYTHON}
-        if self._friction.varies:
-            data["friction"]["coefficient"] = self._friction.in_deck
+        if self.plane_friction.varies:
+            data["friction"]["coefficient"] = self.plane_friction.in_deck
         for number, body in (("1", self.body_1), ("2", self.body_2)):
             if body.surface and body.surface.measured:
                 data["body"][number]["surface"] = body.surface.written(defaults=False)
@@ -230,8 +222,9 @@ class Problem:
         """The load steps of the cycle that wears the surfaces, after the load history."""
         if (wear := self.deck.wear) is None:
             return ()
-        given = self.friction_coefficient, self.deck.bulk, wear.cycle, self.period
-        return wearing_cycle(self.deck.load, *given)
+        loads, given = self.deck.load, (self.friction_coefficient, self.deck.bulk, self.period)
+        steps, _ = load_steps([*loads, *cycle_entries(loads, wear.cycle)], *given)
+        return steps[len(load_steps(loads, *given)[0]) :]
 
     @property
     def solved_pair(self) -> ElasticPair:
@@ -259,20 +252,10 @@ class Problem:
         touching = np.isfinite(gap)
         return gap, np.broadcast_to(True, gap.shape) if touching.all() else touching
 
-    @property
-    def plane_gap(self) -> PlaneField:
-        """The gap before loading at any point."""
-        return self._gap
-
-    @property
-    def plane_friction(self) -> FrictionField:
-        """The law of friction at any point."""
-        return self._friction
-
     def gap_in(self, step: LoadStep | None) -> PlaneField:
         """Return the gap of a load step: docs/theory/rolling.md, (K8)."""
         if step is None or step.roll is None or not self.moves:
-            return self._gap
+            return self.plane_gap
         return PlaneField(self.surfaces.moved(-np.array(step.roll.way) @ self.lattice.basis), GAP)
 
     def friction_law(self, lattice: Lattice) -> FrictionLaw:
@@ -280,15 +263,16 @@ class Problem:
 
         DeckError if a coefficient is negative or NaN somewhere, or a map ends within the window.
         """
-        return self._friction.over(lattice)
+        return self.plane_friction.over(lattice)
 
     def check_contact(self, number: int, zones: Callable[[], Iterable[tuple[Lattice, NDArray[Any]]]]) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
         gap = self.gap_in(self.load_steps[number - 1] if self.moves else None)
         for rows, zone in zones() if gap.maps and self.period is None else ():
-            name, fault = gap.fault_near(rows, zone > 0)
-            if fault:
-                raise DeckError(f"{name}: the contact of load step {number} {fault}")
+            x, y = rows.x[zone > 0], rows.y[zone > 0]
+            for one in gap.maps:
+                if fault := one.fault_near(rows.spacing, x, y):
+                    raise DeckError(f"{one.name}: the contact of load step {number} {fault}")
 
     def check_beyond(self, step: Any) -> None:
         """Refuse a load step whose bodies also touch outside of a window that follows from the contact."""
@@ -296,7 +280,7 @@ class Problem:
         if simple or self._contact is None or self.moves:
             return
         if self._around is None or self._around[0] != step.lattice:
-            self._around = step.lattice, surroundings(self._gap, step.lattice)
+            self._around = step.lattice, surroundings(self.plane_gap, step.lattice)
         if fault := missed_contact(self._around[1], step, *self._moduli):
             raise DeckError(f"grid.extent: load step {step.number}: {fault}")
 
@@ -344,8 +328,9 @@ class Problem:
 
     def contact_nodes(self, lattice: Lattice) -> int:
         """Return the estimated number of nodes in contact at the largest load; all without an estimate."""
-        if self._gap.at_nodes and self.method_for(lattice) == "direct":
-            return window.nodes_in_contact(self.pair, self._gap.over(lattice), lattice, self.largest_drives)
+        if self.plane_gap.at_nodes and self.method_for(lattice) == "direct":
+            gap = self.plane_gap.over(lattice)
+            return window.nodes_in_contact(self.pair, gap, lattice, self.largest_drives)
         radius = math.inf if self.estimate is None else self.estimate.radius
         return math.ceil(min(math.pi * radius**2 / lattice.cell_area, lattice.size))
 
@@ -366,9 +351,9 @@ class Problem:
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """Return the same case with other values for some dotted keys of its deck; None removes one."""
         folder = self.deck_file.parent if self.deck_file else Path()
-        lattice = self.lattice if self._gap.at_nodes else None
+        lattice = self.lattice if self.plane_gap.at_nodes else None
         given = assemble(plain(self._given.data), folder=folder, overrides=changes)
-        case = self._made(given, self._gap.source if self._gap.given else None, lattice)
+        case = self._made(given, self.plane_gap.source if self.plane_gap.given else None, lattice)
         if lattice is not None and case.deck.grid != self.deck.grid:
             changed = listed([key for key in changes if key.partition(".")[0] == "grid"], "and")
             raise DeckError(
@@ -382,7 +367,7 @@ class Problem:
         """Test whether two cases are the same problem, with the same solver and output."""
         if not isinstance(other, Problem):
             return NotImplemented
-        mine, others = ((one._gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
+        mine, others = ((one.plane_gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
         return mine == others
 
     __hash__ = None  # type: ignore[assignment]
@@ -399,99 +384,83 @@ class Problem:
 
     # --- the window -----------------------------------------------------------------------------------------
 
-    def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
-        """Return the obstacles to a refinement of three lattices, which error estimates need."""
-        if self._gap.at_nodes:
+    def _refinement_problems(self, wanted: Accuracy) -> Found:
+        """Yield the obstacles to a refinement of three lattices, which error estimates need."""
+        if self.plane_gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
-            return [Mistake(("accuracy", "target"), wanted.target, sentence)]
-        if self.adaptive:
+            yield ("accuracy", "target"), sentence
+        elif self.adaptive:
             sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
-            return [Mistake(("accuracy", "target"), wanted.target, sentence)]
-        third = self.refined(LEAST_LEVELS - 1).lattice.size
-        if third <= wanted.max_nodes:
-            return []
-        sentence = (
-            f"expected at least {third}, the nodes of the third lattice, or a coarser grid to begin with"
-        )
-        return [Mistake(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
+            yield ("accuracy", "target"), sentence
+        elif (third := self.refined(LEAST_LEVELS - 1).lattice.size) > wanted.max_nodes:
+            least = f"expected at least {third}, the nodes of the third lattice"
+            yield ("accuracy", "max_nodes"), f"{least}, or a coarser grid to begin with"
 
-    def _size(self, grid: Grid, source: Source, lattice: Lattice | None) -> Lattice:
+    def _size(self, grid: Grid, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact if there is one."""
-        if self._gap.at_nodes and lattice is not None:
+        if self.plane_gap.at_nodes and lattice is not None:
             self.initial_gap(lattice)
-            self._check_interface(source, lattice)
+            self._check_interface(lattice)
             return lattice
-        if lattice is None and not grid.center:
-            name, fault = self._gap.touch_fault
-            if fault:
-                raise DeckError(f"{name}: {fault}")
-        touch = self._gap.first_touch or (0.0, 0.0)
+        if lattice is None and not grid.center and (self.gap_given or self.surfaces.one_map):
+            for one in self.maps:
+                if one.touch_fault:
+                    raise DeckError(f"{one.name}: {one.touch_fault}")
+        touch = self.plane_gap.first_touch or (0.0, 0.0)
         center = grid.center or touch
-        self._center = center if self._gap.given else touch
+        self._center = center if self.plane_gap.given else touch
         if self.full_contact:
             assert grid.length is not None  # checked, as the window is
             assert grid.window is not None
             lattice = window.pattern_of(grid).centered(grid.length, center, grid.window)
-            self._check_interface(source, lattice)
+            self._check_interface(lattice)
             return lattice
         try:
-            self._check_interface(source)
+            self._check_interface()
             self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
         except NoContactFound as error:
             soft = ", or the interface is too soft" if self.deck.interface else ""
             sentence = f"no window can be found: {error}{soft}"
             key: tuple[str, ...] = ("grid",)
-            if not (self._gap.given or grid.center):
-                shapes = [one.shape for one in self.surfaces.surfaces]
-                at = int(shapes[0] == "flat")
-                key = ("body", "12"[at], "surface", *("expression",) * (shapes[at] == "formula"))
+            if not (self.plane_gap.given or grid.center):
+                key = (self.surfaces.key_of("2" if self.surfaces.surface_1.shape == "flat" else "1"),)
                 sentence = f"{error}{soft}; expected a shape of finite heights that bounds the contact"
                 if any(part.wave for part in self.shapes):
                     sentence += ', or a window that repeats, grid.boundary = "periodic"'
-            raise deck_error([Mistake(key, MISSING, sentence)], source) from None
+            raise deck_error([Mistake(key, MISSING, sentence)], self._given.source) from None
         # by force, and by approach
-        self.estimate = estimate = functools.reduce(Estimate.joined, self._estimates.values())
+        estimate = functools.reduce(Estimate.joined, self._estimates.values())
         if grid.fits and lattice is None:
             # once more, on cells as slender as the contact: the bounds of the window are in their coordinates
             pattern = estimate.fitted(window.pattern_of(grid), grid.direction)
             again = (self.estimated(pattern, **d) for d in self.largest_drives)
             bounds = functools.reduce(Estimate.joined, again)
-            self.estimate = estimate = estimate._replace(
-                lower=bounds.lower, upper=bounds.upper, cell=bounds.cell
-            )
+            estimate = estimate._replace(lower=bounds.lower, upper=bounds.upper, cell=bounds.cell)
+        self.estimate = estimate
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
-        problems = window.check(grid, lattice, estimate)
-        if self.window_fixed and not self.gap_given:
-            problems += window.check_maps(grid, lattice, self.maps)
-        if self.maps and not self.gap_given:
-            problems += window.check_ends(estimate, lattice, self.maps)
-        if problems:
-            raise deck_error(problems, source)
+        self._refuse(window.check(grid, lattice, estimate, () if self.gap_given else self.maps))
         return lattice
 
-    def _check_interface(self, source: Source, lattice: Lattice | None = None) -> None:
+    def _check_interface(self, lattice: Lattice | None = None) -> None:
         """Refuse an interface far softer than the bodies; the contact is as large as the window, if given."""
         for drive in self.largest_drives if self.deck.interface else ():
             if lattice is None:
-                size = window.starting_half_size(self.pair, self._gap.at, self._center, **drive)
+                size = window.starting_half_size(self.pair, self.plane_gap.at, self._center, **drive)
             else:
                 size = math.sqrt(lattice.size * lattice.cell_area)
             ratios, problems = window.check_interface(
                 self.interface, self.pair, size, self.full_contact, **drive
             )
-            if problems:
-                raise deck_error(problems, source)
+            self._refuse(iter(problems))
             self._stiffest = max(self._stiffest, *ratios)
 
     def estimated(self, pattern: Pattern | None = None, /, **drive: Any) -> Estimate:
         """Estimate the contact under a normal load (N) or at an approach (m)."""
-        place = self._center, pattern or window.pattern_of(self.deck.grid)
-        share = self._gap.share if self.rollers else None
-        return window.estimate_contact(
-            self.pair, self._gap.at, *place, self.interface, self._gap.heights, share, **drive
-        )
+        gap, place = self.plane_gap, (self._center, pattern or window.pattern_of(self.deck.grid))
+        share = gap.share if self.rollers else None
+        return window.estimate_contact(self.pair, gap.at, *place, self.interface, gap.heights, share, **drive)
 
     @cached_property
     def growth(self) -> float:

@@ -1,4 +1,4 @@
-"""The window of lattice nodes of a case: that of the deck, else from an estimate of the contact.
+"""The window of lattice nodes of a case, by its deck or an estimate of the contact, with its faults.
 
 The core searches for the contact under the largest load of the history on coarse lattices without friction
 (fortran/path/contact_search.f90). All bounds are in lattice coordinates (lengths along the two basis
@@ -8,9 +8,9 @@ vectors), since the window is a parallelogram.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,12 +20,16 @@ from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
 from ..core.steps import ACCEPTED, PENDING
-from ..deck.faults import MISSING, Mistake
-from ..deck.height_map import BEYOND_MAP, Placed, along_axes
+from ..deck.faults import Mistake
+from ..deck.height_map import BEYOND_MAP, Placed, along_axes, place
 from ..deck.keys import Grid
 from ..deck.kinds import MOST_SLENDER
 from ..deck.units import readable
+from ..errors import DeckError
+from .plane_field import PlaneField
 
+Found = Iterator[tuple[tuple[str | int, ...], str]]
+"""Key and sentence of each mistake in a deck."""
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
 
@@ -35,6 +39,14 @@ _FULL = 0.8  # share of its ellipse from which a contact is neither a ring nor s
 ROUND = 0.95  # ratio of the semi-axes from which a contact has no direction
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 MOST_NODES_PER_SIDE = 100_000
+# Search for contact outside of a window.
+_TRIED = 121  # points along a side of a grid
+_GRIDS = 7  # about a window; their widths double
+_LOWEST = 200  # points about which lower ones are looked for
+_HALVINGS = 3  # of their distances
+_ROUNDED = 1e-9  # of places, in spacings
+_LOADS = 24  # along a side of a window, in place of the pressure
+_OVERLAP = 0.99  # share of the penetration that counts, since displacements are those of the pressure alone
 # Decimal logarithms of the stiffness of an interface over that of the bodies.
 SOFTEST, STIFFEST = -30.0, 12.0
 DEEPEST = 12.0  # ... of the penetration under a normal load over the size of the contact
@@ -227,7 +239,7 @@ def check_interface(
     full: bool,
     normal_load: float | None = None,
     approach: float = 0.0,
-) -> tuple[list[float], list[Mistake]]:
+) -> tuple[list[float], list[tuple[tuple[str, str], str]]]:
     """Compare the stiffness of an interface with that of the bodies, E*/size.
 
     That of the interface is dp/dψ at the pressure P/size^2, or at a penetration as large as the approach.
@@ -252,7 +264,7 @@ def check_interface(
             sentence = (
                 f"expected at {limit}: the interface has 1e{ratio:.0f} times the stiffness of the bodies"
             )
-            problems.append(Mistake(("interface", key), given, sentence))
+            problems.append((("interface", key), sentence))
     return [ratio for _, _, ratio, _, _ in found], problems
 
 
@@ -351,7 +363,8 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     nodes = grid.nodes_across or 0  # one of the three is always given
     shape = (nodes, nodes)
     if isinstance(grid.extent, tuple):
-        lower, upper = _corners(center, grid.extent, pattern)
+        corners = np.stack(pattern.coordinates(*_rectangle(center, grid.extent)))
+        lower, upper = corners.min(axis=1), corners.max(axis=1)
         margin = 0
     else:
         center_coordinates = (lower + upper) / 2
@@ -365,8 +378,8 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     return lattice
 
 
-def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
-    """Return the faults of a given window that reaches beyond maps of heights."""
+def _beyond_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> Found:
+    """Yield the faults of a given window that reaches beyond maps of heights."""
     if isinstance(grid.extent, tuple):
         key, center = "extent", grid.center
         middle = lattice.origin + np.array([np.mean(lattice.cols), np.mean(lattice.rows)]) @ lattice.basis
@@ -374,7 +387,6 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
     else:
         key, (col, row) = "window", np.meshgrid(lattice.cols[[0, -1]], lattice.rows[[0, -1]])
         x, y = (lattice.origin + np.stack([col.ravel(), row.ravel()], axis=1) @ lattice.basis).T
-    problems = []
     for one in maps:
         at, own = np.stack(one.own(x, y)), (one.map.x, one.map.y)
         beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
@@ -394,20 +406,7 @@ def check_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> list[Mis
             f"the window is larger than the map of {one.name}: {theirs}, the map {ours} only; expected "
         )
         sentence += "a smaller one, or heights of a larger part" + "; are x and y swapped?" * bool(swapped)
-        problems.append(Mistake(("grid", key), getattr(grid, key), sentence))
-    return problems
-
-
-def check_ends(estimate: Estimate, lattice: Lattice, maps: Sequence[Placed]) -> list[Mistake]:
-    """Return the faults of an estimated contact that maps of heights do not bound."""
-    middle = lattice.origin + estimate.bounds.mean(axis=1) / lattice.spacing @ lattice.basis
-    x, y = _rectangle(tuple(middle), tuple(estimate.size))
-    ended = [
-        one for one in maps if math.isinf(estimate.max_pressure) and one.is_near_end(estimate.cell, x, y)
-    ]
-    return [
-        Mistake(tuple(one.name.split(".")), MISSING, f"the estimated contact {BEYOND_MAP}") for one in ended
-    ]
+        yield ("grid", key), sentence
 
 
 def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tuple[Array, Array]:
@@ -415,14 +414,6 @@ def _rectangle(center: tuple[float, float], extent: tuple[float, float]) -> tupl
     x = center[0] + extent[0] / 2 * np.array([-1, 1, -1, 1])
     y = center[1] + extent[1] / 2 * np.array([-1, -1, 1, 1])
     return x, y
-
-
-def _corners(
-    center: tuple[float, float], extent: tuple[float, float], pattern: Pattern
-) -> tuple[Array, Array]:
-    """Return the bounds of a rectangle in lattice coordinates."""
-    coordinates = np.stack(pattern.coordinates(*_rectangle(center, extent)))
-    return coordinates.min(axis=1), coordinates.max(axis=1)
 
 
 def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
@@ -435,9 +426,8 @@ def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
     )
 
 
-def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
-    """Return the faults of a window: too coarse or too small for the contact, or too many nodes."""
-    problems = []
+def check(grid: Grid, lattice: Lattice, estimate: Estimate, maps: Sequence[Placed]) -> Found:
+    """Yield the faults of a window, and of maps of heights that end within it or within the contact."""
     given = (
         "spacing" if grid.spacing is not None else "nodes_across" if grid.nodes_across else "nodes_in_radius"
     )
@@ -446,13 +436,13 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
         least = readable(lattice.spacing * max(lattice.shape) / MOST_NODES_PER_SIDE * 1.01)
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}: "
         sentence += f"a spacing of {least} or more"
-        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
+        yield ("grid", given), sentence
     if estimate.spacings(lattice) < 1.0:
         sentence = f"the spacing of {readable(lattice.spacing)} is larger than the contact: "
         fitting = readable(estimate.half_width / GOOD_SPACINGS)
         sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}, "
         sentence += f'such as "{fitting}"'
-        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
+        yield ("grid", given), sentence
     if is_fixed(grid) and _outside(lattice, estimate.lower, estimate.upper):
         if size == "extent":
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
@@ -463,5 +453,107 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"
         )
-        problems.append(Mistake(("grid", size), getattr(grid, size, MISSING), sentence))
-    return problems
+        yield ("grid", size), sentence
+    if is_fixed(grid):
+        yield from _beyond_maps(grid, lattice, maps)
+    if not maps or math.isfinite(estimate.max_pressure):
+        return
+    middle = lattice.origin + estimate.bounds.mean(axis=1) / lattice.spacing @ lattice.basis
+    x, y = _rectangle(tuple(middle), tuple(estimate.size))
+    for one in maps:
+        if one.is_near_end(estimate.cell, x, y):
+            yield tuple(one.name.split(".")), f"the estimated contact {BEYOND_MAP}"
+
+
+# --- contact that a window misses ---------------------------------------------------------------------------
+
+
+class Surroundings(NamedTuple):
+    """Points outside of a window, and the smallest gap within it."""
+
+    points: Array  # x, y and the gap (m) in rows
+    lowest: float  # gap (m)
+
+
+def surroundings(gap: PlaneField, lattice: Lattice) -> Surroundings:
+    """Return points where other contacts may lie: of grids, and of lower places between their points."""
+    size = np.array([lattice.n_col, lattice.n_row])
+    first = np.array([lattice.col_first, lattice.row_first])
+    middle = lattice.origin + (first + (size - 1) / 2) @ lattice.basis
+    half = np.maximum(size - 1, 1)[:, None] / 2 * lattice.basis
+    sides = np.linspace(-1.0, 1.0, _TRIED)
+    square = np.stack(np.meshgrid(sides, sides), axis=-1)
+    grids = [middle + square @ (half * 2.0**level) for level in range(_GRIDS)]
+    grids += [one.offset + one.detail * square for one in gap.shapes if one.detail]
+    grids += [one.lowest_points(_TRIED, middle) for one in gap.maps]
+    found, valleys, cells = [np.empty((3, 0))], [np.empty((3, 0))], [np.empty((0, 2, 2))]
+    for grid in grids:
+        try:
+            points = np.stack([*np.moveaxis(grid, -1, 0), gap.at(grid[..., 0], grid[..., 1])])
+        except (DeckError, ValueError):  # it is known near the window only
+            continue
+        found.append(points.reshape(3, -1))
+        valleys.append(points[:, 1:-1, 1:-1][:, _is_valley(points[2])])
+        cell = (grid[-1, 0] - grid[0, 0]) / (len(grid) - 1), (grid[0, -1] - grid[0, 0]) / (grid.shape[1] - 1)
+        cells.append(np.broadcast_to(np.stack(cell), (valleys[-1].shape[1], 2, 2)))
+    low = np.concatenate(valleys, axis=1)
+    if low.size:
+        chosen = np.argsort(low[2])[:_LOWEST]
+        found.append(_lower(gap, low[:, chosen], np.concatenate(cells)[chosen]))
+    points = np.concatenate(found, axis=1)
+    along = np.stack(lattice.pattern.coordinates(*points[:2]), axis=1) / lattice.spacing
+    inside = ((along > first - _ROUNDED) & (along < first + size - 1 + _ROUNDED)).all(axis=1)
+    return Surroundings(points[:, ~inside], float(points[2, inside].min(initial=math.inf)))
+
+
+def _is_valley(gap: Array) -> Mask:
+    """Return which inner points of a grid no neighbor is lower than; of equal ones along a row, the first."""
+    rows, cols = (count - 2 for count in gap.shape)
+    inner = gap[1:-1, 1:-1]
+    around = [gap[i : i + rows, j : j + cols] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    return np.isfinite(inner) & (inner <= np.minimum.reduce(around)) & (inner < around[3])
+
+
+def _lower(gap: PlaneField, points: Array, cells: Array) -> Array:
+    """Return lower points near those of grids whose cells have two sides (n, 2, 2) [m]."""
+    sides = np.linspace(-1.0, 1.0, 5)
+    square = np.stack(np.meshgrid(sides, sides), axis=-1).reshape(-1, 2)
+    for _ in range(_HALVINGS):
+        near = points[:2].T[:, None] + square @ cells
+        height = gap.at(near[..., 0], near[..., 1])
+        least = np.arange(len(near)), height.argmin(axis=1)
+        points, cells = np.stack([*near[least].T, height[least]]), cells / 2
+    return points
+
+
+def missed_contact(around: Surroundings, step: Any, moduli: tuple[float, float], reach: float) -> str:
+    """Return the fault of bodies that also touch outside of the window of a load step; empty without one.
+
+    Within the reach (m) of a load the first of the moduli E* (Pa) holds, beyond it the second. The bodies
+    overlap where the gap is below the approach less the displacement by the pressure
+    (fortran/path/beyond_window.f90).
+    """
+    approach = around.lowest + _OVERLAP * (float(step.approach) - around.lowest)
+    near = around.points[:, around.points[2] < approach].T
+    if not near.size or around.lowest == math.inf:
+        return ""
+    window = step.lattice
+    # loads are about as far apart across and along a slender window
+    slender = math.sqrt(window.n_col / (window.n_row * window.cell_ratio))
+    counts = [
+        max(min(round(_LOADS * ratio), n), 1)
+        for ratio, n in ((slender, window.n_col), (1.0 / slender, window.n_row))
+    ]
+    loads = sum(
+        flat.point_loads(rows, band, rows.row_first - window.row_first, window.n_row, *counts)
+        for rows, band in step.bands("pressure")
+    )
+    most = flat.overlap_beyond(near, loads, approach, moduli, reach)
+    if not most:
+        return ""
+    x, y, _ = near[most - 1]
+    there = place(float(x), float(y))
+    return (
+        f"the bodies also touch outside of the window, near {there}; expected lengths that hold all of the "
+        "contact, and center in its middle"
+    )

@@ -10,13 +10,7 @@ from typing import Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 
-from ..analytic.hertz_gap import (
-    QuadraticGap,
-    friction_of,
-    is_moving,
-    is_worn,
-    pressure_is_frictionless,
-)
+from ..analytic.hertz_gap import friction_of, is_moving, is_worn, pressure_is_frictionless, quadratic
 from ..arrays import Array, Dataset, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.lattice import Lattice, linear
@@ -65,7 +59,7 @@ class StepView:
         self.lattice = lattice_of(dataset)
         self.spacing, self.basis = self.lattice.spacing, self.lattice.basis  # basis vectors as rows
         self.start = self.lattice.start  # position of the first node of the window, m
-        gap, load = QuadraticGap.of(dataset), float(self.data["normal_load"])
+        gap, load = quadratic(dataset), float(self.data["normal_load"])
         if gap is None:
             weight = max(float(self.pressure.sum()), np.finfo(float).tiny)
             x, y = (float((self.pressure * place).sum() / weight) for place in (self.x, self.y))

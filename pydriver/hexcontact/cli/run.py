@@ -35,7 +35,7 @@ def run(
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..core import ranks
     from ..result.store import Store
-    from ..solve import log
+    from ..solve import events
     from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
@@ -48,7 +48,7 @@ def run(
         with messages.logging(deck, *([output] if output else [])):
             case = frame.case_of(deck, settings)
             target = frame.target_of(case, deck, output)
-            log.refuse_same(log_file, [target])
+            events.refuse_as_log(log_file, [target])
             if plot:  # refuses before the run
                 picture_beside(target)
             if again and _was_begun(target, case):

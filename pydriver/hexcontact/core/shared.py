@@ -18,10 +18,9 @@ from ..arrays import Array, Banded
 from ..variables import WORN
 from . import ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
-from .friction import FrictionalContact
+from .friction import AHEAD, FrictionalContact
 from .lattice import Lattice
 from .measures import measures, unbounded
-from .steps import AHEAD
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""

@@ -17,9 +17,9 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..core import flat
 from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
+from ..core.friction import ACCEPTED, PENDING
 from ..core.lattice import Lattice, Pattern
 from ..core.measures import is_unbounded
-from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import MISSING, Mistake
 from ..deck.height_map import BEYOND_MAP, Placed, along_axes
 from ..deck.keys import Grid

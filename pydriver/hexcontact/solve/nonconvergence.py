@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.friction import FrictionLaw
+from ..core.friction import LEAST, FrictionLaw
 from ..core.lattice import Lattice
 from ..core.measures import nodal_residuals
-from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem

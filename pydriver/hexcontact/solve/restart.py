@@ -25,8 +25,7 @@ from ..result.store import Store, open_result
 from ..text import counted
 from .events import Listener
 from .run import checked, listeners, metadata_of, run_into, write_stresses
-from .steps import check_step
-from .wear import lacks_ends
+from .steps import check_step, lacks_ends
 
 _PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
 _NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not

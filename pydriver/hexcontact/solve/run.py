@@ -19,8 +19,7 @@ from ..result.netcdf import missing_stresses, require_free
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import quantity, visible
-from .events import Callback, Listener, Listeners, Stopped, reporter
-from .log import Log
+from .events import Callback, Listener, Listeners, Log, Stopped, reporter
 from .memory_needed import require_memory
 from .steps import steps
 

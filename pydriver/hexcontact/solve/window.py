@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..core import ranks
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
-from ..core.friction import ContactState, FrictionalContact, Rolling
+from ..core.flat import WearSettings
+from ..core.friction import ContactState, CyclesOfWear, FrictionalContact, Rolling
 from ..core.lattice import Lattice
 from ..core.measures import measures, unbounded
 from ..core.shared import (
@@ -28,7 +29,6 @@ from ..core.shared import (
     operator_part,
     rigid,
 )
-from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem

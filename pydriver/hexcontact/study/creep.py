@@ -29,8 +29,7 @@ from ..files import replacing, text_of
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
 from ..solve import steps as solving
-from ..solve.events import Listener, Listeners
-from ..solve.log import Log
+from ..solve.events import Listener, Listeners, Log
 from ..solve.window import FrictionWindow
 from ..text import quantity
 from ..variables import CONVENTIONS, CREEPAGES, VARIABLES

@@ -24,8 +24,7 @@ from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
 from ..errors import DeckError
-from ..solve.events import Bar, Lines, Listener, Listeners
-from ..solve.log import Log
+from ..solve.events import Bar, Lines, Listener, Listeners, Log
 from ..text import counted, quantity
 from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool

@@ -25,9 +25,9 @@ from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
 from hexcontact.core import contact, flat, friction, memory
 from hexcontact.core.contact import ElasticPair, HeldState
+from hexcontact.core.flat import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
-from hexcontact.core.measures import area_radius
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
     ConvergenceError,

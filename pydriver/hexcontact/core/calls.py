@@ -57,8 +57,7 @@ def shaped(values: NDArray[Any], points: tuple[int, ...]) -> NDArray[Any]:
 
 def record(kind: Callable[..., Any], numbers: NDArray[Any]) -> Any:
     """Return numbers of the core as a record."""
-    types = kind.__annotations__.values()
-    return kind(*(as_type(number) for as_type, number in zip(types, numbers.tolist(), strict=True)))
+    return kind(*map(operator.call, kind.__annotations__.values(), numbers.tolist()))
 
 
 # --- arguments ----------------------------------------------------------------------------------------------

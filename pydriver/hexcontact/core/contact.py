@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
@@ -241,6 +241,10 @@ class HeldState:
             self._slip = weakref.ref(owner)
         return self._array(name, owner)
 
+    def views(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return fields by their names, which are no copies."""
+        return {name: self.view(name) for name in names}
+
     def _array(self, name: str, owner: Any) -> NDArray[Any]:
         number, kind = (ctypes.c_int8, "i1") if name == "zone" else (ctypes.c_double, "f8")
         memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
@@ -417,9 +421,9 @@ class Contact(Handle):
         """Return the solution behind a handle, with views of its fields."""
         held = HeldState(handle, self.own.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
-        found |= {"zone": held.view("zone"), "stopped": STOPPED[found["stopped"]]}
+        found["stopped"] = STOPPED[found["stopped"]]
         names = [field.name for field in fields(kind)]
-        found |= {name: held.view(name) for name in names if name not in found}
+        found |= held.views(name for name in names if name not in found)
         return kind(**{name: found[name] for name in names}).behind(held)
 
     def _warn_of_rim(self, found: NormalSolution) -> None:

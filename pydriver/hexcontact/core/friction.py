@@ -235,9 +235,7 @@ class FrictionalContact(Contact):
         """Return the state before the first load: nothing touches, nothing is displaced."""
         gap, zero = self.initial_gap, np.broadcast_to(0.0, self.own.shape)
         held = HeldState.copied(dict.fromkeys(_FIELDS, zero) | {"gap": gap, "zone": zero}, {})
-        fields: dict[str, Any] = {name: held.view(name) for name in _FIELDS}
-        zone = np.zeros(self.own.shape, np.int8)
-        return self._masked(ContactState(**fields, zone=zone).behind(held))
+        return self._masked(ContactState(**held.views((*_FIELDS, "zone"))).behind(held))
 
     def advance(
         self,
@@ -394,7 +392,7 @@ class FrictionalContact(Contact):
         At new nodes the relative displacement follows from the tractions and the rigid motions.
         """
         start = state.held
-        handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
+        handle = flat.extend_state(self, lattice.first, lattice.extent, start.handle)
         found = self.solution(handle)
         fields = {name: getattr(found, name) for name in (*_FIELDS, "zone")}
         return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)

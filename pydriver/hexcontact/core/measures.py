@@ -15,21 +15,6 @@ from ..arrays import Array, Mask
 from ..variables import VARIABLES
 from . import flat
 from .contact import Contact, ElasticPair, Interface, NormalSolution
-from .flat import Ellipse as Ellipse
-from .flat import LatticeErrors as LatticeErrors
-from .flat import area_radius as area_radius
-from .flat import boundary as boundary
-from .flat import boundary_circle as boundary_circle
-from .flat import bulk_strain as bulk_strain
-from .flat import edge_ellipse as edge_ellipse
-from .flat import edge_radius as edge_radius
-from .flat import expected_lattice_errors as expected_lattice_errors
-from .flat import is_unbounded as is_unbounded
-from .flat import moment_ellipse as moment_ellipse
-from .flat import pressure_center as pressure_center
-from .flat import slip_ring as slip_ring
-from .flat import turning_errors as turning_errors
-from .flat import unresolved_slip_zones as unresolved_slip_zones
 from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
 
@@ -48,7 +33,7 @@ def unbounded(share: Array, state: Any, *n_row: int) -> list[str]:
     fields = {"max_pressure": state.pressure}
     if hasattr(state, "traction_x"):
         fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
-    return [name for name, field in fields.items() if is_unbounded(share, field, *n_row)]
+    return [name for name, field in fields.items() if flat.is_unbounded(share, field, *n_row)]
 
 
 def limits_of_error(

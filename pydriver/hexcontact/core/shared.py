@@ -7,7 +7,9 @@ together, in the order of the first one.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -18,7 +20,8 @@ from ..arrays import Array, Banded
 from ..variables import WORN
 from . import ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
-from .friction import AHEAD, FrictionalContact
+from .flat import WearSettings
+from .friction import AHEAD, CyclesOfWear, FrictionalContact, FrictionLaw
 from .lattice import Lattice
 from .measures import measures, unbounded
 
@@ -32,6 +35,7 @@ class Layout(NamedTuple):
 
     lattice: Lattice
     by_rows: bool
+    shared: bool = True  # False: the window is on the first rank alone
 
     def nodes(self, rank: int | None = None) -> Lattice:
         """Return the nodes of the arrays of a rank, by default this one."""
@@ -87,8 +91,9 @@ def gap_in_rows(field: Any, layout: Layout) -> Rows:
 
 def _over(field: Any, lattice: Lattice) -> Array:
     """Return a gap in some rows, NaN where nothing can touch."""
-    values = field.over(lattice)
-    return np.where(np.isfinite(values), values, np.nan)
+    values: Array = field.over(lattice)
+    touching = np.isfinite(values)
+    return values if touching.all() else np.where(touching, values, np.nan)
 
 
 # --- the part of this rank ----------------------------------------------------------------------------------
@@ -98,14 +103,16 @@ class _Part(Contact):
     """The part of this rank of a contact, its rows or all, from gap and friction as fields over the plane."""
 
     def __init__(self, layout: Layout, gap: Any, **given: Any) -> None:
+        self._rollers, self._share = gap.rollers, gap.share
+        self._lent: weakref.ref[Array] | None = None
         own = layout.nodes()
-        with ranks.agreed():
+        with ranks.agreed() if layout.shared else contextlib.nullcontext():
             values = _over(gap, own)
-            if "friction_coefficient" in given:
-                self.law = given["friction_coefficient"] = given["friction_coefficient"].over(own)
-            given |= {"candidate": np.isfinite(values), "rim_warning": False, "own": own}
-            super().__init__(layout.lattice, initial_gap=values, **given)
-        self.share = gap.share
+            if law := given.get("friction_coefficient"):
+                law = law if isinstance(law, FrictionLaw) else law.over(own)
+                self.law = given["friction_coefficient"] = law
+            given |= {"candidate": np.isfinite(values), "rim_warning": False}
+            super().__init__(layout.lattice, initial_gap=values, own=own if layout.shared else None, **given)
         # all ranks have come this far
         super()._create(*vars(self).pop("_arguments"))
 
@@ -114,16 +121,22 @@ class _Part(Contact):
 
     def measured(self, state: NormalSolution) -> tuple[dict[str, float], list[str]]:
         """Return the measures of a state, and the names of those that rise to an end of the surface."""
-        share = self.share(self._mask, self.own)
-        return measures(self, state), unbounded(share, state, self.lattice.n_row)
+        found = measures(self, state)
+        if self.own is self.lattice and self._mask.all() and not self._rollers:  # no end, on any rank
+            return found, []
+        return found, unbounded(self._share(self._mask, self.own), state, self.lattice.n_row)
 
     def grown(self, state: NormalSolution) -> Lattice:
         """Return a window that grows with the contact of a state."""
         return self.lattice.grown(state.zone > 0)
 
     def gap_rows(self) -> Array:
-        """Return own rows of the gap before loading, NaN where the bodies cannot touch."""
-        return np.where(self._mask, self.initial_gap, np.nan)
+        """Return own rows of the gap before loading, NaN where nothing can touch: one copy while in use."""
+        gap = self._lent() if self._lent else None
+        if gap is None:
+            gap = self.initial_gap if self._mask.all() else np.where(self._mask, self.initial_gap, np.nan)
+            self._lent = weakref.ref(gap)
+        return gap
 
     def friction_rows(self) -> Array:
         """Return own rows of the coefficient of friction."""
@@ -259,7 +272,7 @@ class SharedState(_Shared):
     def known(self, state: Any) -> SharedState:
         """Return the state with its numbers, from its rows on this rank."""
         fields, self._numbers = state.parts()
-        self._kind, self._fields = type(state), [*fields]
+        self.kind, self._fields = type(state), [*fields]
         vars(self).update(self._numbers)
         return self
 
@@ -272,10 +285,28 @@ class SharedState(_Shared):
         start: SharedState | None = self.call("as_start")
         return start
 
-    def gathered(self) -> Any:
-        """Return the state with its fields on this rank."""
-        fields, numbers = self.parts()
-        return self._kind(**{**fields, **numbers})
+
+def on_ranks(layout: Layout, kind: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """Return an object that all ranks share, or one of this rank, by its layout."""
+    if layout.shared:
+        return SharedObject(layout, kind, layout, *arguments, **named)
+    return kind(layout, *arguments, **named)
+
+
+def rows_of(owner: Any, name: str) -> Any:
+    """Return a field, or the result of a method, of an object: an array, or its rows on all ranks."""
+    if isinstance(owner, _Shared):
+        return owner.rows(name)
+    found = getattr(owner, name)
+    return found() if callable(found) else found
+
+
+def gathered(state: Any) -> Any:
+    """Return a state with its fields on this rank."""
+    if not isinstance(state, SharedState):
+        return state
+    fields, numbers = state.parts()
+    return state.kind(**{**fields, **numbers})
 
 
 class Later:
@@ -310,6 +341,13 @@ class SharedCycles(SharedObject):
             return np.asarray(found.reshape(shape))
 
         return cycles, motions, Later(shape, "f4", tractions)
+
+
+def cycles_of(settings: WearSettings, pair: ElasticPair, steps: Any, state: Any) -> Any:
+    """Return cycles that wear the surfaces from a state."""
+    if isinstance(state, SharedState):
+        return SharedCycles(state.layout, CyclesOfWear, settings, pair, steps, state)
+    return CyclesOfWear(settings, pair, steps, state)
 
 
 def _worn_rows(number: int, contact: int, name: str) -> Array:

@@ -19,7 +19,6 @@ from ..core import flat
 from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
 from ..core.friction import ACCEPTED, PENDING
 from ..core.lattice import Lattice, Pattern
-from ..core.measures import is_unbounded
 from ..deck.faults import MISSING, Mistake
 from ..deck.height_map import BEYOND_MAP, Placed, along_axes
 from ..deck.keys import Grid
@@ -144,7 +143,7 @@ def estimate_contact(
     slope, *body_slopes = (_steepest(each, lattice, pressure > 0) for each in surfaces)
     inside = np.isfinite(height)
     ends = share(inside, lattice) if share else inside.astype(float)
-    unbounded = interface == UNILATERAL and is_unbounded(ends, pressure)
+    unbounded = interface == UNILATERAL and flat.is_unbounded(ends, pressure)
     xx, yy, xy = search.moment_xx, search.moment_yy, search.moment_xy
     # the principal second moments, with the inertia of a cell itself
     mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12

@@ -76,9 +76,11 @@ def run(
 
 def checked(result: Result) -> Result:
     """Warn if a result misses an accuracy that its case asks for."""
-    steps = [{"step_limited": limited} for limited in result.dataset.get("step_limited", [])]
-    limited = limited_steps(steps, float(result.dataset.attrs.get("step_tolerance", 0.0)))
-    for sentence in filter(None, (result.shortfall, limited)):
+    sentences = [result.shortfall]
+    if "step_limited" in result.dataset:
+        histories = [{"step_limited": limited} for limited in result.dataset["step_limited"]]
+        sentences.append(limited_steps(histories, float(result.dataset.attrs.get("step_tolerance", 0.0))))
+    for sentence in filter(None, sentences):
         warn(sentence, AccuracyWarning)
     return result
 

@@ -12,7 +12,6 @@ import dataclasses
 import logging
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from ..core import flat, ranks
 from ..core import friction as core
 from ..core.friction import CONTROLS, ContactState
 from ..core.lattice import Lattice
-from ..core.shared import joined
+from ..core.shared import cycles_of, joined
 from ..errors import DeckError, PathWarning, warn
 from ..problem import plausibility
 from ..problem.loads import LoadStep
@@ -60,6 +59,7 @@ class GivenPath:
 
     def run(self, targets: Iterable[LoadStep]) -> Iterator[Step]:
         """Solve load steps, given ones or segments of chosen ones."""
+        said, static = self.window.listener.said, self.case.solver.algorithm == "static"
         for target in targets:
             if target.segment != self._segment:
                 self._segment, self._begun = target.segment, self._now
@@ -67,7 +67,11 @@ class GivenPath:
             while not done:
                 touching = self.state is not None and self.state.normal_load > 0.0
                 step, reached, done = self._step(target)
-                _warn_of_path(self.case, step, touching, self.window.listener)
+                if step.history.get("cuts") and (static or not touching):  # nothing prescribes its path
+                    in_parts = float(step.history["residual_tangential"]) > self.case.solver.tolerance
+                    words = unasked_path([step.number], in_parts)
+                    said("halved", level=logging.WARNING, step=step.number, warning=words)
+                    warn(words, PathWarning)
                 self.state, self._now = reached.as_start(), _standing(step.history)
                 yield step
                 del step, reached  # the next step has no use of them
@@ -256,7 +260,7 @@ class WearPath(GivenPath):
             )
             for target in self._targets
         ]
-        cycles = self.window.cycles(settings, steps, state)
+        cycles = cycles_of(settings, self.case.pair, steps, state)
         if last is not None:
             fields = {name: np.array(last.fields[name]) for name in WORN}
             if core.AHEAD in last.companion:
@@ -295,7 +299,6 @@ class WearPath(GivenPath):
         """Return a cycle as a load step, with the restart data of the next; `spent`: energy before it."""
         cycles, now = self._cycles, self._progress
         fields = cycles.fields(self.window.contact)
-        self.window.remember_wear(fields)
         last = self._targets[0]
         target = dataclasses.replace(last, index=self.number, segment=last.segment + 1, label=LABEL)
         step = self.window.step(target, self.state, spent, started)
@@ -376,17 +379,19 @@ def steps(
     started, done = time.perf_counter(), len(before)
     _announce(case, lattice, done, listener)
     held = len(case.load_steps) if in_memory else 0
-    kind = WearPath if case.deck.wear else AdaptivePath if case.adaptive else GivenPath
-    path = (kind if targets is None else GivenPath)(case, window_over(case, lattice, held, listener), before)
+    kind: type[GivenPath] = GivenPath
+    if targets is None:
+        kind = WearPath if case.deck.wear else AdaptivePath if case.adaptive else GivenPath
+    path = kind(case, window_over(case, lattice, held, listener), before)
     if before and isinstance(before, list) and ranks.count > 1:  # each rank has its rows of the last step
         before[-1] = before[-1].head
     for step in path.run(case.load_steps[path.position :] if targets is None else targets):
-        case.check_contact(step.number, partial(step.bands, "zone"))
+        case.check_contact(step)
         case.check_beyond(step)
         yield step
         if ranks.count > 1:
             ranks.obey_signals()
-        done = step.number
+        done += 1
         del step
     listener.said("finished", steps=done, seconds=time.perf_counter() - started)
 
@@ -410,16 +415,6 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
         listener.said(about, f"note: {note}", note=note)
     for sentence in [] if case.trial else plausibility.warnings(case):
         listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
-
-
-def _warn_of_path(case: Problem, step: Step, touching: bool, listener: Listener) -> None:
-    """Warn of a load step that was halved where nothing prescribes the path of its parts."""
-    static = case.solver.algorithm == "static"
-    if step.history.get("cuts") and (static or not touching):
-        in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
-        words = unasked_path([step.number], in_parts)
-        listener.said("halved", level=logging.WARNING, step=step.number, warning=words)
-        warn(words, PathWarning)
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:

@@ -24,7 +24,7 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve.events import Lines
-from hexcontact.solve.restart import resume
+from hexcontact.solve.run import resume
 from hexcontact.solve.window import FrictionWindow
 
 SPHERE = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}

@@ -11,7 +11,6 @@ from ..solve.interruption import signal_pipe
 from . import frame
 
 if TYPE_CHECKING:
-    from ..problem.problem import Problem
     from .solving import Messages
 
 
@@ -36,7 +35,7 @@ def run(
     from ..core import ranks
     from ..result.store import Store
     from ..solve import events
-    from ..solve.run import metadata_of
+    from ..solve.run import metadata_of, was_begun
     from .solving import Messages, overview, picture_beside, solved
 
     if again and overwrite:
@@ -51,7 +50,7 @@ def run(
             events.refuse_as_log(log_file, [target])
             if plot:  # refuses before the run
                 picture_beside(target)
-            if again and _was_begun(target, case):
+            if again and was_begun(target, case):
                 return _resumed(target, plot, messages, case=case)
             with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
                 extent = solved(case, store, pipe, deck.stem, messages)
@@ -87,19 +86,12 @@ def resume(
             return _resumed(file, plot, messages, overrides=dict(map(frame.setting, settings or ())))
 
 
-def _was_begun(target: Path, case: Problem) -> bool:
-    """Return whether a run left finished steps or a result."""
-    from ..solve.restart import was_begun
-
-    return was_begun(target, case)
-
-
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
-    """Resume the run of an output, with the case or the overrides of `restart.reopened`."""
-    from ..solve import restart
+    """Resume the run of an output, with the case or the overrides of `reopened`."""
+    from ..solve.run import output_of, reopened
     from .solving import overview, picture_beside, solved, with_tables
 
-    with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
+    with signal_pipe() as pipe, reopened(file, **changes) as again:
         if again is not None:
             if plot:
                 picture_beside(again.store.path)
@@ -107,7 +99,7 @@ def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> fram
                 frame.print_error(f"warning: {again.warning}")
             extent = solved(again.case, again.store, pipe, file.stem, messages, again.before)
         else:
-            with_tables(restart.output_of(file), pipe, messages)
+            with_tables(output_of(file), pipe, messages)
     path = again.store.path if again is not None else file
     path = path if file.is_absolute() else Path(os.path.relpath(path))
     picture = overview(path) if plot else None

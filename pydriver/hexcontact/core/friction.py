@@ -288,8 +288,9 @@ class FrictionalContact(Contact):
             reason) and ``touches_rim`` (contact at the rim of the window, also in a part of the step, where
             the advance ends without convergence: repeat it from the first state on a larger window).
         """
-        known = isinstance(control, list | tuple) and len(control) == 4
-        if not known or not all(isinstance(kind, str) and kind in CONTROLS for kind in control):
+        given = control if isinstance(control, list | tuple) else ()
+        kinds = [CONTROLS.get(kind) if isinstance(kind, str) else None for kind in given]
+        if len(kinds) != 4 or None in kinds:
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
         targets, _, *limits = checked(
             value=value, entry=entry, tolerance=tolerance, max_sweeps=max_sweeps, max_cuts=max_cuts
@@ -302,7 +303,7 @@ class FrictionalContact(Contact):
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.own.shape)), [*guess[1]])
         handle = self.called(
-            *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
+            *(flat.advance, kinds, [*targets, *strain], static),
             *(entry == "interpolated", *limits),
             *(ahead, rolling is not None and rolling.steady, self._held(state)),
         )

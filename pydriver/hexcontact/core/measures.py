@@ -1,4 +1,4 @@
-"""Measures of a state by the core: nodal residuals, areas, energy, sizes of zones, expected errors.
+"""Measures of a state and of a history by the core: areas, energy, sizes of zones, turns, expected errors.
 
 Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
 """
@@ -14,9 +14,8 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..variables import VARIABLES
 from . import flat
-from .contact import Contact, ElasticPair, Interface, NormalSolution
-from .friction import ContactState, FrictionLaw
-from .lattice import Lattice
+from .contact import Contact, NormalSolution
+from .friction import ContactState
 
 NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
@@ -26,14 +25,6 @@ def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
     major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
     return (major, minor) if minor < ROUND * major else None
-
-
-def unbounded(share: Array, state: Any, *n_row: int) -> list[str]:
-    """Return the names of largest values of a state that rise to an end of the surface."""
-    fields = {"max_pressure": state.pressure}
-    if hasattr(state, "traction_x"):
-        fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
-    return [name for name, field in fields.items() if flat.is_unbounded(share, field, *n_row)]
 
 
 def limits_of_error(
@@ -62,22 +53,6 @@ def expected_entry_error(
     ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
     entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
     return entry, steps, needed
-
-
-def nodal_residuals(
-    lattice: Lattice,
-    pair: ElasticPair,
-    friction: FrictionLaw,
-    interface: Interface,
-    solution: NormalSolution,
-    *,
-    tangential: bool,
-) -> Array:
-    """Return the residuals at the nodes, R_n or, tangential, R_t: docs/theory/residuals.md."""
-    if tangential:
-        # a copy: the slip may be that of several parts of the step
-        return np.asarray(flat.tangential_residual(lattice, pair, interface, friction, solution.copied()))
-    return np.asarray(flat.normal_residual(lattice, pair, interface, solution.pressure, solution.gap))
 
 
 def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:

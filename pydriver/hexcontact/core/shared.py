@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Banded
 from ..variables import WORN
-from . import ranks
+from . import flat, ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
 from .flat import WearSettings
-from .friction import AHEAD, CyclesOfWear, FrictionalContact, FrictionLaw
+from .friction import AHEAD, ContactState, CyclesOfWear, FrictionalContact, FrictionLaw
 from .lattice import Lattice
-from .measures import measures, unbounded
+from .measures import measures
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
@@ -124,7 +124,11 @@ class _Part(Contact):
         found = measures(self, state)
         if self.own is self.lattice and self._mask.all() and not self._rollers:  # no end, on any rank
             return found, []
-        return found, unbounded(self._share(self._mask, self.own), state, self.lattice.n_row)
+        share, fields = self._share(self._mask, self.own), {"max_pressure": state.pressure}
+        if isinstance(state, ContactState):
+            fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
+        rows = self.lattice.n_row
+        return found, [name for name, field in fields.items() if flat.is_unbounded(share, field, rows)]
 
     def grown(self, state: NormalSolution) -> Lattice:
         """Return a window that grows with the contact of a state."""

@@ -51,11 +51,12 @@ class GivenPath:
         self.position = self.number  # of the next load step in the history of the case
         # from which the next load step starts; the only reference to it
         self.state: Any = window.restored(before[-1]) if before else None
-        last: Mapping[str, Any] = before[-1].history if before else {}
-        earlier = [step.history for step in before if step.history["segment"] != last["segment"]]
-        self._segment = int(last.get("segment", 0)) - 1
         # loads and motions at the beginning of the segment, and now
-        self._begun, self._now = _standing(earlier[-1] if earlier else {}), _standing(last)
+        self._segment, self._begun, self._now = -1, _standing({}), _standing({})
+        for step in before:
+            if step.history["segment"] != self._segment + 1:
+                self._segment, self._begun = int(step.history["segment"]) - 1, self._now
+            self._now = _standing(step.history)
 
     def run(self, targets: Iterable[LoadStep]) -> Iterator[Step]:
         """Solve load steps, given ones or segments of chosen ones."""

@@ -394,7 +394,7 @@ class Contact(Handle):
         rim_warning: bool,
         own: Lattice | None = None,
     ) -> None:
-        self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
+        self.lattice, self._rim_warning = lattice, rim_warning
         self.own = lattice if own is None else own  # the nodes of the arrays
         self._mask: Mask = np.broadcast_to(True, self.own.shape)  # takes no memory
         if candidate is not None:

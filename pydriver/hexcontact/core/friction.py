@@ -81,15 +81,6 @@ class FrictionLaw:
         mu = self.coefficient
         return dataclasses.replace(self, coefficient=mu[part]) if isinstance(mu, np.ndarray) else self
 
-    def at_nodes(self, lattice: Lattice) -> FrictionLaw:
-        """Return the law with a coefficient for each node, unless the limit is mu p."""
-        plain = (self.shear_limit, self.power, self.ratio) == (math.inf, 1.0, 1.0)
-        if plain or isinstance(self.coefficient, np.ndarray):
-            return self
-        return dataclasses.replace(
-            self, coefficient=np.full(lattice.shape, min(self.coefficient, _UNBOUNDED))
-        )
-
     @property
     def limits(self) -> tuple[float | Array, float] | None:
         """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
@@ -226,7 +217,7 @@ class FrictionalContact(Contact):
         own: Lattice | None = None,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
-        law = _checked_law(friction_coefficient, shear_limit, self.own).at_nodes(self.own)
+        law = _checked_law(friction_coefficient, shear_limit, self.own)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
         given = *vars(self).pop("_surfaces"), law, springs, own is not None, count, coupling == "goodman"
         self._create(flat.create_sheared, method_code(method, iteration), *given)
@@ -302,12 +293,9 @@ class FrictionalContact(Contact):
         ahead = [0, 0] if rolling is None else rolling.ahead(self.lattice)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.own.shape)), [*guess[1]])
-        handle = self.called(
-            *(flat.advance, kinds, [*targets, *strain], static),
-            *(entry == "interpolated", *limits),
-            *(ahead, rolling is not None and rolling.steady, self._held(state)),
-        )
-        found = self.solution(handle)
+        steady = rolling is not None and rolling.steady
+        how = static, entry == "interpolated", *limits, ahead, steady
+        found = self.solution(self.called(flat.advance, kinds, [*targets, *strain], *how, self._held(state)))
         self._warn_of_rim(found)
         return found
 
@@ -327,10 +315,9 @@ class FrictionalContact(Contact):
         """
         motions = reals(creepages, "creepages", (len(np.atleast_1d(creepages)), 3))
         kinds = [CONTROLS[control], *[CONTROLS["displacement"]] * 3]
-        loads, work, solved, handle = self.called(
-            *(flat.creep_loads, kinds, [value, *[0.0] * 6], motions, *checked(tolerance=tolerance)),
-            *(MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice), self._held(state)),
-        )
+        how = *checked(tolerance=tolerance), MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice)
+        given = flat.creep_loads, kinds, [value, *[0.0] * 6], motions, *how, self._held(state)
+        loads, work, solved, handle = self.called(*given)
         return loads[:solved], work[:solved], self.solution(handle)
 
     def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> ContactState:
@@ -399,19 +386,20 @@ class FrictionalContact(Contact):
         return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)
 
 
-def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: Lattice) -> FrictionLaw:
-    """Return the law of friction of arguments."""
-    if isinstance(coefficient, FrictionLaw):
-        law = _checked_law(coefficient.coefficient, coefficient.shear_limit, lattice)
-        return dataclasses.replace(coefficient, coefficient=law.coefficient)
-    checked(shear_limit=limit)
-    if has_entries(coefficient):
-        mu = checked_field(coefficient, lattice, "friction_coefficient")
+def _checked_law(coefficient: Any, limit: float, lattice: Lattice) -> FrictionLaw:
+    """Return a law of friction, with a coefficient for each node unless its limit is mu p."""
+    law = coefficient if isinstance(coefficient, FrictionLaw) else FrictionLaw(coefficient, limit)
+    checked(shear_limit=law.shear_limit)
+    mu: Any = law.coefficient
+    if has_entries(mu):
+        mu = checked_field(mu, lattice, "friction_coefficient")
         if (mu < 0.0).any():
             raise DeckError(f"friction_coefficient: expected numbers of at least 0, not {mu.min():g}")
-        return FrictionLaw(mu, limit)
-    [found] = checked(friction_coefficient=coefficient)
-    return FrictionLaw(found, limit)
+    else:
+        [mu] = checked(friction_coefficient=mu)
+        if (law.shear_limit, law.power, law.ratio) != (math.inf, 1.0, 1.0):
+            mu = np.full(lattice.shape, min(mu, _UNBOUNDED))
+    return dataclasses.replace(law, coefficient=mu)
 
 
 # --- paths: fortran/path ------------------------------------------------------------------------------------
@@ -485,3 +473,12 @@ class CyclesOfWear(Handle):
         """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
         cycles, motions, tractions = flat.wear_end(self, place, contact.own.size)
         return cycles, motions, np.asarray(tractions).reshape(2, 3, *contact.own.shape)
+
+    def field(self, contact: FrictionalContact, name: str) -> Array:
+        """Return one of the `fields`."""
+        return self.fields(contact)[name]
+
+    def traction(self, place: int, contact: FrictionalContact, component: int) -> Array:
+        """Return a component of the tractions, or of their rates, of `end`."""
+        values: Array = self.end(place, contact)[2].reshape(6, *contact.own.shape)[component]
+        return values

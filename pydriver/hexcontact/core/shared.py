@@ -206,10 +206,10 @@ def _each(found: Any) -> tuple[Any, ...]:
     return found if type(found) is tuple else (found,)
 
 
-def _rows(number: int, name: str) -> Array:
-    """Return own rows of a field of a state, or the result of a method."""
+def _rows(number: int, name: str, arguments: Sequence[Any]) -> Array:
+    """Return own rows of a field of an object, or of the result of a method."""
     found = getattr(ranks.held[number], name)
-    return np.asarray(found() if callable(found) else found).astype(float, copy=False)
+    return np.asarray(found(*_here(arguments)) if callable(found) else found).astype(float, copy=False)
 
 
 # --- on the first rank --------------------------------------------------------------------------------------
@@ -242,13 +242,10 @@ class _Shared:
             return self.layout.given(value)
         return value
 
-    def rows(self, name: str) -> Rows:
-        """Return the rows of a field, or of the result of a method."""
-        return self.asked(_rows, name)
-
-    def asked(self, procedure: Callable[..., Array], *arguments: Any) -> Rows:
-        """Return the rows that a procedure returns on each rank; they keep the object."""
-        return lambda rank, shape: ranks.ask(rank, procedure, self.number, *arguments, shape=shape)
+    def rows(self, name: str, *arguments: Any) -> Rows:
+        """Return the rows of a field, or of the result of a method, on each rank; they keep the object."""
+        sent = [*map(self._sent, arguments)]
+        return lambda rank, shape: ranks.ask(rank, _rows, self.number, name, sent, shape=shape)
 
 
 class SharedObject(_Shared):
@@ -328,19 +325,18 @@ class SharedCycles(SharedObject):
 
     def fields(self, contact: SharedObject) -> SharedFields:
         """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
-        taken = {name: self.asked(_worn_rows, contact.number, name) for name in (*WORN, AHEAD)}
+        taken = {name: self.rows("field", contact, name) for name in (*WORN, AHEAD)}
         return SharedFields(contact.layout, taken)
 
     def end(self, place: int, contact: SharedObject) -> tuple[float, Array, Any]:
         """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
         cycles, motions, _ = ranks.held[self.number].end(place, ranks.held[contact.number])
-
         shape = 2, 3, *contact.layout.lattice.shape
 
         def tractions() -> Array:
             found = np.empty((6, *shape[2:]), np.float32)
             for component, values in enumerate(found):
-                taken = self.asked(_end_rows, contact.number, place, component)
+                taken = self.rows("traction", place, contact, component)
                 values[:] = SharedFields(contact.layout, {"end": taken})["end"]
             return np.asarray(found.reshape(shape))
 
@@ -352,15 +348,3 @@ def cycles_of(settings: WearSettings, pair: ElasticPair, steps: Any, state: Any)
     if isinstance(state, SharedState):
         return SharedCycles(state.layout, CyclesOfWear, settings, pair, steps, state)
     return CyclesOfWear(settings, pair, steps, state)
-
-
-def _worn_rows(number: int, contact: int, name: str) -> Array:
-    """Return own rows of a field of the last cycle that wore."""
-    found: Array = ranks.held[number].fields(ranks.held[contact])[name]
-    return found
-
-
-def _end_rows(number: int, contact: int, place: int, component: int) -> Array:
-    """Return own rows of a traction, or of its rate, at the end of a load step."""
-    _, _, tractions = ranks.held[number].end(place, ranks.held[contact])
-    return np.asarray(tractions).reshape(6, *tractions.shape[2:])[component].astype(float)

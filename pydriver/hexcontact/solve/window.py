@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import ranks
-from ..core.contact import ElasticPair, NormalSolution, pair_of
+from ..core.contact import NormalSolution, pair_of
 from ..core.friction import ContactState, Rolling
 from ..core.lattice import Lattice
 from ..core.shared import (
@@ -174,16 +174,17 @@ class Window:
     def _displaced(self, solution: Any) -> dict[str, Any]:
         """Return the displacements of the surfaces that the deck names."""
         found: dict[str, Any] = {}
-        for body in (1, 2):
-            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            if names and (pair := _pair_of_body(self.case, body)):
-                if body not in self._bodies:
-                    self._bodies[body] = on_ranks(self.layout, operator_part, pair)
-                goodman = self.case.solver.coupling == "goodman"
-                moved = self._bodies[body].displacement(solution, body, goodman)
-                found |= {name: rows_of(moved, name[-1]) for name in names}
-            elif names:
+        for number, body in enumerate((self.case.body_1, self.case.body_2), start=1):
+            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{number}")]
+            if body.rigid and not body.coating:
                 found |= dict.fromkeys(names, rigid if self.layout.shared else np.zeros(self.lattice.shape))
+            elif names:
+                if number not in self._bodies:
+                    pair = pair_of(*((body, None) if number == 1 else (None, body)))  # against a rigid one
+                    self._bodies[number] = on_ranks(self.layout, operator_part, pair)
+                goodman = self.case.solver.coupling == "goodman"
+                moved = self._bodies[number].displacement(solution, number, goodman)
+                found |= {name: rows_of(moved, name[-1]) for name in names}
         return found
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
@@ -218,14 +219,6 @@ def window_over(
 ) -> Window:
     """Return a case on a window, for the algorithm that it needs; arguments as of `Window`."""
     return (FrictionWindow if case.frictional else Window)(case, lattice, steps_held, listener)
-
-
-def _pair_of_body(case: Problem, number: int) -> ElasticPair | None:
-    """Return the compliances of one body against a rigid one; None if it is rigid, too."""
-    body = case.body_1 if number == 1 else case.body_2
-    if body.rigid and not body.coating:
-        return None
-    return pair_of(*((body, None) if number == 1 else (None, body)))
 
 
 class FrictionWindow(Window):

@@ -1,7 +1,4 @@
-"""Measures of a state and of a history by the core: areas, energy, sizes of zones, turns, expected errors.
-
-Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
-"""
+"""Measures of a load history by the core: half-axes, turns, cycles, directions, expected errors."""
 
 from __future__ import annotations
 
@@ -12,10 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..variables import VARIABLES
 from . import flat
-from .contact import Contact, NormalSolution
-from .friction import ContactState
 
 NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
@@ -53,20 +47,6 @@ def expected_entry_error(
     ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
     entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
     return entry, steps, needed
-
-
-def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:
-    """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
-    frictional, periodic = isinstance(solution, ContactState), contact.lattice.periodic
-    found = (flat.measure_friction if frictional else flat.measure_pressure)(contact, solution)
-    known = {name: (value, VARIABLES[name]) for name, value in found._asdict().items()}
-    return {
-        name: value
-        for name, (value, variable) in known.items()
-        if (frictional or not variable.frictional)
-        # a window that repeats has no edges, and no place of a zone
-        and not (periodic and math.isnan(value) and not variable.required)
-    }
 
 
 def turning_points(values: Array) -> list[int]:

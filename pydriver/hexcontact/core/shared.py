@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -17,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Banded
-from ..variables import WORN
+from ..variables import VARIABLES, WORN
 from . import flat, ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
 from .flat import WearSettings
 from .friction import AHEAD, ContactState, CyclesOfWear, FrictionalContact, FrictionLaw
 from .lattice import Lattice
-from .measures import measures
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
@@ -120,8 +120,19 @@ class _Part(Contact):
         self._arguments = arguments
 
     def measured(self, state: NormalSolution) -> tuple[dict[str, float], list[str]]:
-        """Return the measures of a state, and the names of those that rise to an end of the surface."""
-        found = measures(self, state)
+        """Return the measures of a state, by the names of `hexcontact.variables`, and the unbounded ones.
+
+        These rise to an end of the surface.
+        """
+        frictional, periodic = isinstance(state, ContactState), self.lattice.periodic
+        measured = (flat.measure_friction if frictional else flat.measure_pressure)(self, state)
+        found = {
+            name: value
+            for name, value in measured._asdict().items()
+            if (frictional or not VARIABLES[name].frictional)
+            # a window that repeats has no edges, and no place of a zone
+            and not (periodic and math.isnan(value) and not VARIABLES[name].required)
+        }
         if self.own is self.lattice and self._mask.all() and not self._rollers:  # no end, on any rank
             return found, []
         share, fields = self._share(self._mask, self.own), {"max_pressure": state.pressure}

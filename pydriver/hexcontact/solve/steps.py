@@ -68,6 +68,7 @@ class GivenPath:
             while not done:
                 touching = self.state is not None and self.state.normal_load > 0.0
                 step, reached, done = self._step(target)
+                self.number += 1
                 if step.history.get("cuts") and (static or not touching):  # nothing prescribes its path
                     in_parts = float(step.history["residual_tangential"]) > self.case.solver.tolerance
                     words = unasked_path([step.number], in_parts)
@@ -182,7 +183,6 @@ class AdaptivePath(GivenPath):
 
     def _placed(self, step: Step) -> Step:
         """Return a load step with the restart data of the next one."""
-        self.number += 1
         count, fraction = len(self.case.load_steps), self._steps.fraction
         done = (self.position + fraction) / count
         whole = int(fraction >= 1.0)
@@ -237,12 +237,12 @@ class WearPath(GivenPath):
                 warn(words, PathWarning)
             spent, self.state = self._spent(), self._cycles.reached(self.window.contact)
             yield self._recorded(spent, started)
+            self.number += 1
             started, done = time.perf_counter(), now.cycles
 
     def _step(self, target: LoadStep) -> tuple[Step, Any, bool]:
         """Solve a load step before the first cycle that wears."""
         step, reached, done = super()._step(target)
-        self.number += 1
         control = self._control([-1.0] * len(self._targets), np.zeros((len(self._targets), 2, 7)))
         return dataclasses.replace(step, control=control, load_fraction=0.0), reached, done
 
@@ -315,7 +315,6 @@ class WearPath(GivenPath):
         }
         if now.rejected >= 0:
             history |= {"rejected_steps": now.rejected, "step_limited": int(now.verdict == core.LIMITED)}
-        self.number += 1
         ends = [cycles.end(place, self.window.contact) for place in range(1, len(self._targets) + 1)]
         beside = {f"{_END}{place}": end[2] for place, end in enumerate(ends) if end[0] >= 0.0}
         if now.until > now.cycles:
@@ -338,7 +337,7 @@ class WearPath(GivenPath):
         return {
             "end_cycles": list(cycles),
             "end_numbers": motions.tolist(),
-            "position": min(self.number, count),
+            "position": min(self.number + 1, count),
             "fraction": done,
             "load_steps": count,
             "done": done,

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array, reals
 from .core import flat
-from .core.calls import broadcast, integer, number, word
+from .core.calls import integer, number, points, word
 from .errors import DeckError
 
 __all__ = [
@@ -117,7 +117,7 @@ def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k
     3.525494
     """
     exponents = {name: integer(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
-    return np.asarray(flat.triangle_integral(_vertices(vertices), *_points(x=x, y=y), **exponents))
+    return np.asarray(flat.triangle_integral(_vertices(vertices), *points(x=x, y=y), **exponents))
 
 
 def triangle_displacement(
@@ -142,17 +142,9 @@ def triangle_displacement(
         G [Pa] and nu of the body.
     """
     k, m = _DEGREES[word(load, "load", _DEGREES)]
-    found = flat.triangle_displacement(
-        *(
-            _vertices(vertices),
-            *_points(x=x, y=y),
-            _DIRECTIONS[word(direction, "direction", _DIRECTIONS)],
-            k,
-            m,
-        ),
-        *(number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")),
-    )
-    return Displacement(*_components(found))
+    given = _vertices(vertices), *points(x=x, y=y), _DIRECTIONS[word(direction, "direction", _DIRECTIONS)]
+    moduli = number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")
+    return Displacement(*_components(flat.triangle_displacement(*given, k, m, *moduli)))
 
 
 def linear_load_displacement(
@@ -171,7 +163,7 @@ def linear_load_displacement(
     """
     loads = reals(traction, "traction", (3, 3), ": x, y, z at each corner")
     moduli = number(shear_modulus, "shear_modulus"), number(poisson_ratio, "poisson_ratio")
-    given = _vertices(vertices), *_points(x=x, y=y), loads
+    given = _vertices(vertices), *points(x=x, y=y), loads
     return Displacement(*_components(flat.linear_triangle_displacement(*given, *moduli)))
 
 
@@ -182,7 +174,7 @@ def pyramid_kernels(x: ArrayLike, y: ArrayLike) -> PyramidKernels:
     directions 0, 60, ..., 300 degrees. For a spacing l_e the kernels are l_e K(x/l_e, y/l_e). The error stays
     below 1e-13 of K1, which bounds all five, from 0 to 1e5 spacings.
     """
-    return PyramidKernels(*_components(flat.pyramid_kernels(*_points(x=x, y=y))))
+    return PyramidKernels(*_components(flat.pyramid_kernels(*points(x=x, y=y))))
 
 
 def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> PyramidFunctions:
@@ -206,7 +198,7 @@ def pyramid_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: floa
     spacings. The result has the shape (..., 3, 6): by a pressure and by tractions along x and y on the body,
     each 1 at the node, the components xx, yy, zz, xy, yz, xz, positive in tension.
     """
-    return np.asarray(flat.pyramid_fields(*_points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[1])
+    return np.asarray(flat.pyramid_fields(*points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[1])
 
 
 def pyramid_displacement(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio: float) -> Array:
@@ -214,7 +206,7 @@ def pyramid_displacement(x: ArrayLike, y: ArrayLike, z: ArrayLike, poisson_ratio
 
     Arguments as of `pyramid_stress`; the result has the shape (..., 3, 3): by each load along x, y, z.
     """
-    return np.asarray(flat.pyramid_fields(*_points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[0])
+    return np.asarray(flat.pyramid_fields(*points(x=x, y=y, z=z), number(poisson_ratio, "poisson_ratio"))[0])
 
 
 def triangle_stress(
@@ -270,11 +262,6 @@ def mesh_displacement(
     return _mesh_below(vertices, tractions, poisson_ratio, x=x, y=y, z=z)[0]
 
 
-def _points(**coordinates: ArrayLike) -> list[Array]:
-    """Return points as arrays of one shape."""
-    return list(broadcast(**coordinates).values())
-
-
 def _components(found: Array) -> Array:
     """Return components first, then the axes of the points."""
     return np.ascontiguousarray(np.moveaxis(found, -1, 0))
@@ -286,28 +273,24 @@ def _vertices(vertices: ArrayLike) -> Array:
 
 
 def _triangle_below(
-    vertices: ArrayLike, load: ArrayLike, poisson_ratio: float, **points: ArrayLike
+    vertices: ArrayLike, load: ArrayLike, poisson_ratio: float, **at: ArrayLike
 ) -> tuple[Array, Array]:
     """Return displacement and stress by a linear load on a triangle."""
-    given = _shaped(vertices, "vertices", (3, 2)), _shaped(load, "load", (3,)), *_points(**points)
+    given = _shaped(vertices, "vertices", (3, 2)), _shaped(load, "load", (3,)), *points(**at)
     found: tuple[Array, Array] = flat.triangle_interior(*given, number(poisson_ratio, "poisson_ratio"))
     return found
 
 
 def _mesh_below(
-    vertices: ArrayLike, tractions: ArrayLike, poisson_ratio: float, **points: ArrayLike
+    vertices: ArrayLike, tractions: ArrayLike, poisson_ratio: float, **at: ArrayLike
 ) -> tuple[Array, Array]:
     """Return displacement and stress by tractions on triangles."""
     corners = reals(vertices, "vertices")
     if corners.ndim != 3 or not corners.size:
         raise DeckError(f"vertices: an array of shape {corners.shape}, expected (n, 3, 2): three points each")
-    given = [
-        _shaped(values, name, (len(corners), 3, axes))
-        for values, name, axes in ((corners, "vertices", 2), (tractions, "tractions", 3))
-    ]
-    found: tuple[Array, Array] = flat.mesh_interior(
-        *given, *_points(**points), number(poisson_ratio, "poisson_ratio")
-    )
+    n = len(corners)
+    given = _shaped(corners, "vertices", (n, 3, 2)), _shaped(tractions, "tractions", (n, 3, 3)), *points(**at)
+    found: tuple[Array, Array] = flat.mesh_interior(*given, number(poisson_ratio, "poisson_ratio"))
     return found
 
 

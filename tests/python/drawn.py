@@ -74,7 +74,7 @@ def is_field(axes: Axes, view: StepView, values: np.ndarray, label: str, bar: Ax
     a, b = (
         np.stack([x[corners[:, k]] - x[corners[:, 0]], y[corners[:, k]] - y[corners[:, 0]]]) for k in (1, 2)
     )
-    assert 0.5 * (a[0] * b[1] - a[1] * b[0]).sum() == pytest.approx(view.edges().contact().area)
+    assert 0.5 * (a[0] * b[1] - a[1] * b[0]).sum() == pytest.approx(view.edges().edge().area)
     nodes = places(view.x[view.contact], view.y[view.contact], view)
     at_node = np.array([at in nodes for at in pairs(x, y, view)])
     assert at_node.sum() == view.contact.sum()
@@ -101,7 +101,7 @@ def are_zones(axes: Axes, view: StepView, to_length: float | None = None) -> Non
     """Check that a map fills the areas of contact and stick to their edges, each in its color."""
     factor = to_length or units(axes.get_xlabel() or axes.get_ylabel())
     stick = view.contact & view.stick
-    areas = {SLIP: view.edges().contact().area, STICK: view.edges().stick(stick, view.reserve).area}
+    areas = {SLIP: view.edges().edge().area, STICK: view.edges().edge(stick, view.reserve).area}
     patches = {colors.to_hex(patch.get_facecolor()): patch for patch in axes.patches}
     zones = {SLIP: view.contact, STICK: stick}
     assert {name.lower() for name, nodes in zones.items() if nodes.any()} <= patches.keys()
@@ -116,7 +116,7 @@ def are_zones(axes: Axes, view: StepView, to_length: float | None = None) -> Non
         for polygon in polygons:
             inside ^= Outline(polygon).contains_points(points).reshape(nodes.shape)
         edges = view.edges()
-        away = edges.contact_distances() if color == SLIP else edges.stick_distances(stick, view.reserve)
+        away = edges.distances() if color == SLIP else edges.distances(stick, view.reserve)
         beside = np.abs(away) > 1e-6  # not on the edge itself
         np.testing.assert_array_equal(inside[beside], nodes[beside])
 

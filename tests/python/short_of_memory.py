@@ -13,7 +13,8 @@ import numpy as np
 from hexcontact import ContactState, FrictionalContact, Lattice, NormalContact, ResourceError
 from hexcontact.core import flat, kernel_cache
 from hexcontact.core.contact import ElasticPair
-from hexcontact.core.steps import ACCEPTED, PENDING, CyclesOfWear, WearSettings
+from hexcontact.core.flat import WearSettings
+from hexcontact.core.friction import ACCEPTED, PENDING, CyclesOfWear
 
 PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
 SPACING = 2e-6

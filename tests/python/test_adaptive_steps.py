@@ -14,7 +14,7 @@ from validation.hard_problems import errors_over_bounds
 from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import printed
 from hexcontact.core import friction
-from hexcontact.core.steps import LEAST
+from hexcontact.core.friction import LEAST
 from hexcontact.deck.json_schema import deck_schema
 from hexcontact.problem import preview
 from hexcontact.result import history_words as history
@@ -24,7 +24,7 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve.events import Lines
-from hexcontact.solve.restart import resume
+from hexcontact.solve.run import resume
 from hexcontact.solve.window import FrictionWindow
 from hexcontact.text import Table
 

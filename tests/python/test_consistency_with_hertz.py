@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hexcontact import Case, analytic
-from hexcontact.core import measures
+from hexcontact.core import flat
 from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, Sphere
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -45,7 +45,7 @@ def test_sphere_of_any_materials(first: dict, second: dict, method: str) -> None
     assert float(step["approach"]) / hertz.approach - 1 == pytest.approx(-2.557e-4, abs=6e-8)
     exact = hertz.pressure(np.hypot(x, y))
     assert np.linalg.norm(p - exact) / np.linalg.norm(exact) == pytest.approx(0.01373, abs=1e-6)
-    edge = measures.edge_radius(x, y, p, 1e-3 / 14, case.lattice.cell_area)
+    edge = flat.edge_radius(x, y, p, 1e-3 / 14, case.lattice.cell_area)
     assert edge == pytest.approx(1.0037e-3, rel=1.4e-6)
     # the load is the sum of the nodal pressures over their cells
     assert p.sum() * np.sqrt(0.75) * (1e-3 / 14) ** 2 == pytest.approx(hertz.normal_load, rel=1e-8)
@@ -82,7 +82,7 @@ def test_sphere_anywhere_on_the_lattice() -> None:
         exact = hertz.pressure(np.hypot(x - center[0], y - center[1]))
         assert np.linalg.norm(p - exact) / np.linalg.norm(exact) < 0.0105
         assert float(step["approach"]) == pytest.approx(hertz.approach, rel=1.8e-4)
-        edge = measures.edge_radius(x, y, p, 1e-3 / 20, case.lattice.cell_area, center)
+        edge = flat.edge_radius(x, y, p, 1e-3 / 20, case.lattice.cell_area, center)
         assert edge == pytest.approx(1e-3, rel=2.1e-3)
         # the pressure is centered where the sphere is
         assert (p * x).sum() / p.sum() == pytest.approx(center[0], abs=3.5e-8)
@@ -109,7 +109,7 @@ def test_paraboloid_at_any_angle(radii: tuple[float, float], angle: int) -> None
     assert p.max() == pytest.approx(ellipse.max_pressure, rel=2.5e-4)
     assert float(step["approach"]) == pytest.approx(ellipse.approach, rel=3e-4)
     assert np.linalg.norm(p - exact) / np.linalg.norm(exact) < 0.0131
-    fit = measures.edge_ellipse(x, y, p, ellipse.semi_minor / 16)
+    fit = flat.edge_ellipse(x, y, p, ellipse.semi_minor / 16)
     assert fit.semi_major == pytest.approx(ellipse.semi_major, rel=2.6e-3)
     assert fit.semi_minor == pytest.approx(ellipse.semi_minor, rel=2.6e-3)
     if radii[0] != radii[1]:
@@ -183,7 +183,7 @@ def test_flat_punch() -> None:
         body_1={**RIGID, "surface": Punch(radius=1e-3)}, body_2=CORK, spacing=1e-3 / 30.25, normal_load=5.0
     )
     x, y, p, step = last(case)
-    radius = measures.area_radius(p > 0, np.sqrt(0.75) * (1e-3 / 30.25) ** 2)
+    radius = flat.area_radius(p > 0, np.sqrt(0.75) * (1e-3 / 30.25) ** 2)
     punch = analytic.flat_punch(modulus(CORK), radius, normal_load=5.0)
     assert float(step["approach"]) == pytest.approx(punch.approach, rel=2.1e-3)
     r = np.hypot(x, y)

@@ -37,22 +37,22 @@ def test_zones_without_an_edge() -> None:
     basis = Lattice(0.5, 0, 0, 5, 6).basis
     cell = 0.25 * np.sqrt(0.75)
     empty = ContactEdges(0.0 * one, one, nowhere, everywhere, basis)
-    for edge in (empty.contact(), empty.stick(nowhere, 0.0 * one)):
+    for edge in (empty.edge(), empty.edge(nowhere, 0.0 * one)):
         assert (edge.area, edge.radius, edge.length, edge.segments.shape) == (0.0, 0.0, 0.0, (0, 2, 2))
     # a contact that ends where nothing can touch has the cells of its nodes
     full = ContactEdges(one, 0.0 * one, everywhere, everywhere, basis)
-    assert full.contact().area == pytest.approx(30 * cell)
-    assert full.contact().segments.shape == (0, 2, 2)
-    assert full.stick(everywhere, one).area == pytest.approx(30 * cell)
-    assert full.stick(nowhere, one).area == 0.0
+    assert full.edge().area == pytest.approx(30 * cell)
+    assert full.edge().segments.shape == (0, 2, 2)
+    assert full.edge(everywhere, one).area == pytest.approx(30 * cell)
+    assert full.edge(nowhere, one).area == 0.0
     # so has one whose rim lies within the window
     single = nowhere.copy()
     single[2, 3] = True
     punch = ContactEdges(one * single, one * ~single, single, single, basis)
-    assert punch.contact().area == pytest.approx(cell)
-    assert punch.contact().segments.shape == (0, 2, 2)
+    assert punch.edge().area == pytest.approx(cell)
+    assert punch.edge().segments.shape == (0, 2, 2)
     # a single node has no slopes: its edge is about half way to its neighbors
-    edge = ContactEdges(one * single, one * ~single, single, everywhere, basis).contact()
+    edge = ContactEdges(one * single, one * ~single, single, everywhere, basis).edge()
     assert 0.6 * cell < edge.area < cell
     assert edge.segments.shape == (6, 2, 2)
     middle = Lattice(0.5, 0, 0, 5, 6)
@@ -67,9 +67,9 @@ def test_a_ring() -> None:
     p, gap = np.sqrt(np.maximum(inside, 0.0)), 3.0 * np.maximum(-inside, 0.0) ** 1.5
     edges = ContactEdges(p, gap, p > 0.0, p >= 0.0, lattice.basis, (lattice.x[0, 0], lattice.y[0, 0]))
     area = np.pi * ((30.7 + 0.04) ** 2 - (10.2 - 0.04) ** 2)
-    assert edges.contact().area == pytest.approx(area, abs=1e-4 * 2.0 * np.pi * 41)
-    assert edges.contact().length == pytest.approx(2.0 * np.pi * 40.9, rel=1.3e-4)
-    away = np.hypot(*np.moveaxis(edges.contact().segments, 2, 0))
+    assert edges.edge().area == pytest.approx(area, abs=1e-4 * 2.0 * np.pi * 41)
+    assert edges.edge().length == pytest.approx(2.0 * np.pi * 40.9, rel=1.3e-4)
+    away = np.hypot(*np.moveaxis(edges.edge().segments, 2, 0))
     assert np.minimum(abs(away - 30.7), abs(away - 10.2)).max() < 0.052
 
 
@@ -87,7 +87,7 @@ def test_spheres_anywhere_on_the_lattice(nodes: tuple[int, int], within: float) 
         lattice = window(spacing, 1.4, 1.4, rng)
         gap = (lattice.x**2 + lattice.y**2) / (2.0 * RADIUS)
         solution = NormalContact(lattice, RIGID_PARTNER, gap).solve(normal_load=hertz.normal_load)
-        edge = edges_of(lattice, solution).contact()
+        edge = edges_of(lattice, solution).edge()
         counted.append((np.sqrt((solution.zone > 0).sum() * lattice.cell_area / np.pi) - 1.0) / spacing)
         found.append((edge.radius - 1.0) / spacing)
         # not only in the mean: each piece of the edge, and their length
@@ -116,7 +116,7 @@ def test_ellipses(ratio: float, angle: int) -> None:
         points = np.stack([lattice.x, lattice.y], axis=-1)
         gap = 0.5 * np.einsum("jia,ab,jib->ji", points, hessian, points)
         solution = NormalContact(lattice, RIGID_PARTNER, gap).solve(normal_load=0.01)
-        edge = edges_of(lattice, solution).contact()
+        edge = edges_of(lattice, solution).edge()
         assert edge.area == pytest.approx(np.pi * a * b, abs=0.04 * around * spacing)
 
 
@@ -137,7 +137,7 @@ def test_the_patches_of_a_rough_surface() -> None:
             gap = z - z[np.hypot(x, y) < 0.4].min()
             can = np.hypot(x, y) < 0.4
             s = NormalContact(lattice, RIGID_PARTNER, np.where(can, gap, 1.0), can).solve(normal_load=0.004)
-            edge = ContactEdges(s.pressure, s.gap, s.zone > 0, can, lattice.basis).contact()
+            edge = ContactEdges(s.pressure, s.gap, s.zone > 0, can, lattice.basis).edge()
             area += [(edge.area, (s.zone > 0).sum() * lattice.cell_area)]
         found.append(area[1][0] / area[0][0] - 1.0)
         counted.append(area[1][1] / area[0][0] - 1.0)
@@ -236,12 +236,12 @@ def test_stick_of_cattaneo_and_mindlin(steps: int) -> None:
         lattice, state, mu = sheared(spacing, ratio, rng.uniform(0.0, np.pi), steps, rng)
         stick = state.zone == 1
         reserve = mu * state.pressure - np.hypot(state.traction_x, state.traction_y)
-        edge = edges_of(lattice, state).stick(stick, reserve)
+        edge = edges_of(lattice, state).edge(stick, reserve)
         found.append((edge.radius - ratio) / spacing)
         counted.append((np.sqrt(stick.sum() * lattice.cell_area / np.pi) - ratio) / spacing)
         assert edge.length == pytest.approx(2.0 * np.pi * ratio, abs=0.29 * spacing)
         # the edge of the contact is where it was
-        assert edges_of(lattice, state).contact().radius == pytest.approx(1.0, abs=0.011 * spacing)
+        assert edges_of(lattice, state).edge().radius == pytest.approx(1.0, abs=0.011 * spacing)
     assert np.abs(found).max() < 0.05
     assert np.abs(found).mean() < 0.5 * np.abs(counted).mean()
 
@@ -257,7 +257,7 @@ def test_small_stick_areas() -> None:
         solution = NormalContact(lattice, RIGID_PARTNER, gap).solve(normal_load=hertz.normal_load)
         everywhere = np.ones(lattice.shape, dtype=bool)
         edges = ContactEdges(0.0 * gap + 1.0, 0.0 * gap, everywhere, everywhere, lattice.basis)
-        edge = edges.stick(solution.zone > 0, solution.pressure)
+        edge = edges.edge(solution.zone > 0, solution.pressure)
         assert edge.radius == pytest.approx(1.0, abs=0.027 * spacing)
 
 
@@ -270,7 +270,7 @@ def test_reserve_with_another_power() -> None:
         r = np.hypot(lattice.x, lattice.y)
         stick, reserve = r < c, np.maximum(c - r, 0.0) ** 1.5
         by_nodes = np.sqrt(stick.sum() * lattice.cell_area / np.pi)
-        assert edges.stick(stick, reserve).radius == pytest.approx(by_nodes, abs=0.006)
+        assert edges.edge(stick, reserve).radius == pytest.approx(by_nodes, abs=0.006)
 
 
 def test_stick_up_to_the_edge_of_the_contact() -> None:

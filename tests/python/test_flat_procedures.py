@@ -13,7 +13,7 @@ import pytest
 from hexcontact import HexcontactError
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.core import flat
-from hexcontact.core.handles import HeldState
+from hexcontact.core.contact import HeldState
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "fortran/python"

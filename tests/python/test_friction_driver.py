@@ -23,12 +23,11 @@ from hexcontact.analytic.hertz_gap import against_hertz
 from hexcontact.case import Case
 from hexcontact.cli import printed, report
 from hexcontact.cli.app import app
-from hexcontact.core import contact, flat, friction, handles, memory
-from hexcontact.core.contact import ElasticPair
+from hexcontact.core import contact, flat, friction, memory
+from hexcontact.core.contact import ElasticPair, HeldState
+from hexcontact.core.flat import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
-from hexcontact.core.handles import HeldState
 from hexcontact.core.lattice import Lattice
-from hexcontact.core.measures import area_radius
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import (
     ConvergenceError,
@@ -723,7 +722,7 @@ def test_a_warning_that_is_an_error_does_not_leave_a_state_behind(monkeypatch: p
     problem, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.3)
     monkeypatch.setattr(friction, "HeldState", Counted)
     monkeypatch.setattr(contact, "HeldState", Counted)
-    monkeypatch.setattr(handles.kernel_cache, "warn_of_faults", fault)
+    monkeypatch.setattr(contact.kernel_cache, "warn_of_faults", fault)
     with pytest.raises(KernelFolderWarning):
         problem.advance(problem.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0])
     gc.collect()

@@ -22,7 +22,7 @@ from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
 from hexcontact.result.store import open_result
-from hexcontact.solve import log
+from hexcontact.solve import events as log
 
 DECK = """
 title = "A \\"sphere\\"\\nof steel"
@@ -165,7 +165,7 @@ def test_nobody_hears_it_who_does_not_listen(tmp_path: Path) -> None:
         "import hexcontact\n"
         f"case = hexcontact.Case.from_text({DECK!r})\n"
         "case.run()\n"
-        "from hexcontact.solve import log\n"
+        "from hexcontact.solve import events as log\n"
         "log.logger.error('an error')\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=ENVIRONMENT)
@@ -245,7 +245,7 @@ def test_a_message_of_several_lines_is_one_in_the_log(
     time.tzset()
     before = time.time()
     try:
-        with log.kept(tmp_path / "log", None):
+        with log.log_to(tmp_path / "log", None):
             log.logger.warning("one\ntwo")
     finally:
         monkeypatch.undo()
@@ -393,7 +393,7 @@ def test_level_names_are_those_of_the_option() -> None:
     from hexcontact.cli.frame import LogLevel
 
     assert all(hasattr(logging, level.value.upper()) for level in LogLevel)
-    with pytest.raises(DeckError, match="cannot be written"), log.kept(Path("/no/folder/x"), None):
+    with pytest.raises(DeckError, match="cannot be written"), log.log_to(Path("/no/folder/x"), None):
         pass
 
 

@@ -16,7 +16,8 @@ from hexcontact import AccuracyWarning, Case, ElasticPair, PlausibilityWarning, 
 from hexcontact.analytic import hertz_ellipse, hertz_sphere
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.cli.app import app
-from hexcontact.core.measures import NO_VALUE, expected_entry_error, expected_lattice_errors
+from hexcontact.core.flat import expected_lattice_errors
+from hexcontact.core.measures import NO_VALUE, expected_entry_error
 from hexcontact.deck.toml import STARTERS, starter
 from hexcontact.problem import plausibility
 

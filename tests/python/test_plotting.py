@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 
 from hexcontact import Case, Result, analytic, plotting
 from hexcontact.analytic import EllipticContact
-from hexcontact.core import measures
+from hexcontact.core import flat
 from hexcontact.plotting import maps as plotting_maps
 from hexcontact.plotting.registry import entries
 from hexcontact.plotting.style import new_figure, set_title
@@ -304,7 +304,7 @@ def test_boundary_shows_the_nodes_in_contact(make: str) -> None:
     result = RESULTS[make]()
     view = StepView(result, -1)
     axes = plotting.contact_boundary(result).axes[0]
-    rim = measures.boundary(view.contact)
+    rim = flat.boundary(view.contact)
     lines = drawn.by_label(axes)
     scale = drawn.units(axes.get_xlabel())
     for label, nodes in (("in contact", view.contact & ~rim), ("boundary node", rim)):
@@ -424,7 +424,7 @@ def test_section_at_an_angle_follows_the_ellipse() -> None:
 def test_boundary_names_the_fitted_circle() -> None:
     result = sphere()
     one = result.sel(step=2)
-    fit = measures.boundary_circle(one["x"].values, one["y"].values, one["pressure"].values > 0, 0.1)
+    fit = flat.boundary_circle(one["x"].values, one["y"].values, one["pressure"].values > 0, 0.1)
     [legend] = plotting.contact_boundary(result, 2).legends
     texts = [text.get_text() for text in legend.get_texts()]
     assert f"fitted circle, a = {worded(fit.radius, 'm')}" in texts

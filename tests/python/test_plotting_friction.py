@@ -544,7 +544,7 @@ def test_outline_encloses_the_nodes_of_the_zone(kinds: np.ndarray, has_rims: boo
     """Kinds of nodes: 0 outside, 1 in contact, 2 where nothing can touch."""
     zone, candidate = kinds == 1, kinds < 2 if has_rims else kinds < 3
     edges = ContactEdges(1.0 * zone, 1.0 * ~zone, zone, candidate, BASIS, (3.0, -2.0))
-    mesh = edges.contact_mesh(np.ones(zone.shape), vanishes=False)
+    mesh = edges.mesh(np.ones(zone.shape), vanishes=False)
     polygons, at = mesh.outlines(), np.stack([mesh.x, mesh.y], axis=-1)
     a, b = (at[mesh.triangles[:, k]] - at[mesh.triangles[:, 0]] for k in (1, 2))
     areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
@@ -553,7 +553,7 @@ def test_outline_encloses_the_nodes_of_the_zone(kinds: np.ndarray, has_rims: boo
     # In triangles at a rim a third counts for each node, and the mesh is straight between the middles of
     # links: it has a quarter of one with one node inside, and three quarters of one with two. It goes to 0.54
     # of a link, not to half of it, where these fields let the edge run between other nodes: up to 0.77.
-    whole = edges.contact().area
+    whole = edges.edge().area
     assert (0.75 - 1e-9) * whole <= area(polygons) <= 1.16 * whole
     row, col = np.indices(zone.shape)
     nodes = np.array([3.0, -2.0]) + np.stack([col, row], axis=-1) @ BASIS
@@ -660,12 +660,12 @@ def test_outlines_of_stick_areas() -> None:
     for line, step in zip(sticks, (2, 3), strict=True):
         enclosed = area([np.stack(line.get_data(), axis=1) * factor])
         view = StepView(result, step)
-        assert enclosed == pytest.approx(view.edges().stick(view.stick, view.reserve).area)
+        assert enclosed == pytest.approx(view.edges().edge(view.stick, view.reserve).area)
     contacts = [line for line in axes.lines if str(line.get_label()).startswith("_")]
     assert len(contacts) == 2
     for line in contacts:
         enclosed = area([np.stack(line.get_data(), axis=1) * factor])
-        assert enclosed == pytest.approx(view.edges().contact().area)
+        assert enclosed == pytest.approx(view.edges().edge().area)
     slid = made([PRESSED, Made(history={"tangential_load_x": SLIDING})])
     assert "step 2, $Q/\\mu P$ = 1.00 (no stick)" in by_label(plotting.outlines(slid).axes[0])
 

@@ -34,7 +34,7 @@ from hexcontact.plotting.history import study as draw_study
 from hexcontact.problem.problem import Problem
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback, Listener
-from hexcontact.solve.run import metadata_of, run_into
+from hexcontact.solve.run import metadata_of, solve_into
 from hexcontact.study import backend as backend_registry
 from hexcontact.study import backends
 from hexcontact.study import study as study_module
@@ -613,7 +613,7 @@ def test_a_case_that_was_interrupted_goes_on_after_its_last_step(folder: Path, n
     assert whole.exit_code == 0
     case = Case.from_text(SHEARED, "0001.nc")
     with pytest.raises(KeyboardInterrupt), Store(folder / name, metadata_of(case), overwrite=True) as store:
-        run_into(case, store, Callback(stop_after_third))
+        solve_into(case, store, Callback(stop_after_third))
     again = solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=name != "0001.nc")
     assert again.exit_code == 0, again.message
     assert sorted(path.name for path in folder.glob("0001*")) == ["0001.nc"]
@@ -627,7 +627,7 @@ def test_an_attempt_that_is_still_under_way_or_damaged_is_left_alone(folder: Pat
     case = Case.from_text(SHEARED, "0001.nc")
     with Store(folder / "0001.0123abcd.nc", metadata_of(case), overwrite=True) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_into(case, store, Callback(stop_after_third))
+            solve_into(case, store, Callback(stop_after_third))
         (folder / "0001.ffffffff.nc.d").mkdir()
         assert solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=True).exit_code == 0
         assert len(store.heads) == 3

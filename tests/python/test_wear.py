@@ -13,7 +13,7 @@ from hexcontact.cli.printed import Summary
 from hexcontact.deck.toml import starter
 from hexcontact.result.history_words import energy_table, step_rows
 from hexcontact.result.journal import Journal, journal_of
-from hexcontact.solve import wear as solving
+from hexcontact.solve import steps as solving
 from hexcontact.text import cycle_count
 
 MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14

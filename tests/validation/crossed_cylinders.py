@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from hexcontact import analytic
-from hexcontact.core import measures
+from hexcontact.core import flat
 from hexcontact.deck.surfaces import Cylinder
 
 from .normal import ellipse_error
@@ -71,8 +71,8 @@ def _against_converged(found: Comparison, last: State, phi: int, mu: float, mesh
     where = f"{phi}°, μ = {mu:g}, b/l_e = {mesh}, " + ("static" if steps == 1 else f"{steps} steps")
     how = "single step" if steps == 1 else f"incremental {steps} steps"
     case = f"9.3 phi={phi} mu={mu:g} {how} b/le={mesh}"
-    edge = measures.edge_ellipse(last.x, last.y, last.pressure, last.spacing)
-    stick = measures.moment_ellipse(last.x, last.y, last.stick)
+    edge = flat.edge_ellipse(last.x, last.y, last.pressure, last.spacing)
+    stick = flat.moment_ellipse(last.x, last.y, last.stick)
     # p_max to all printed digits; the ellipse of p = 0 is fitted otherwise than for the table; four nodes
     # of some thousand may be between stick and slip
     nodes = 2.0 * last.two_nodes * last.stick_radius / last.area_radius
@@ -95,8 +95,8 @@ def _against_converged(found: Comparison, last: State, phi: int, mu: float, mesh
 def _on_printed_mesh(found: Comparison, last: State, phi: int, mu: float) -> None:
     """Show the ellipses of Figure 9.4, with the spacing of the text."""
     hertz, where = _hertz(phi), f"{phi}°, μ = {mu:g}, l_e = 0.225 mm, 10 steps"
-    contact = measures.moment_ellipse(last.x, last.y, last.contact)
-    stick = measures.moment_ellipse(last.x, last.y, last.stick)
+    contact = flat.moment_ellipse(last.x, last.y, last.contact)
+    stick = flat.moment_ellipse(last.x, last.y, last.stick)
     for name, ellipse, zone in (("contact", contact, last.contact), ("stick", stick, last.stick)):
         found.add(where, f"a, {name}, moments", "mm", ellipse.semi_major)
         found.add(where, f"b, {name}, moments", "mm", ellipse.semi_minor)

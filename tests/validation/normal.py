@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.core import measures
+from hexcontact.core import flat
 from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
 
 from .reference import Comparison, reference
@@ -50,13 +50,13 @@ class Solved:
     @property
     def area_radius(self) -> float:
         """a_A."""
-        return measures.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
+        return flat.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
 
     @property
     def edge_radius(self) -> float:
         """A from p^2 at the edge, about x = y = 0."""
         cell = np.sqrt(0.75) * self.spacing**2
-        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
+        return flat.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
 
 
 def solve(body_1: Mapping[str, Any], body_2: Mapping[str, Any], **arguments: Any) -> Solved:
@@ -118,7 +118,7 @@ def table_9_2(meshes: Sequence[str] = tuple(MESHES_9_2)) -> Comparison:
             found.add(where, "approach", "um", s.approach, row=reference(case, "delta"), relative=1e-6)
         apart = float(np.abs(direct.pressure - fft.pressure).max()) / fft.peak
         found.add(name, "max |p_direct - p_fft|/p_max", "-", apart, analytic=0.0, absolute=1e-8)
-        fit = measures.boundary_circle(fft.x, fft.y, fft.contact, spacing)
+        fit = flat.boundary_circle(fft.x, fft.y, fft.contact, spacing)
         row = reference(case, "a by (9.1)-(9.2)")
         found.add(name, "a of (9.1)-(9.2)", "um", fit.radius, row=row, relative=1e-6)
         row = reference(case, "a area-equivalent")
@@ -192,7 +192,7 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
         s = solve(first, second, spacing=0.225e-3, normal_load=1e4)
         where, case = f"{phi}°, l_e = 0.225 mm", f"9.3 phi={phi} mu=0 mesh le=0.225 mm"
-        nodes = measures.moment_ellipse(s.x, s.y, s.contact)
+        nodes = flat.moment_ellipse(s.x, s.y, s.contact)
         for letter, value in (("a", nodes.semi_major), ("b", nodes.semi_minor)):
             row = reference(case, f"{letter} (moment ellipse of contact nodes)")
             found.add(where, f"{letter}, moments of the nodes", "mm", value, row=row, relative=1e-6)
@@ -201,7 +201,7 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
         s = solve(first, second, spacing=hertz.semi_minor / 24, normal_load=1e4)
         where, case = f"{phi}°, b/l_e = 24", f"9.3 phi={phi} mu=0"
-        fit = measures.edge_ellipse(s.x, s.y, s.pressure, s.spacing)
+        fit = flat.edge_ellipse(s.x, s.y, s.pressure, s.spacing)
         for quantity, name, unit, value, exact, allowed in (
             ("p_max", "p0", "MPa", s.peak, hertz.max_pressure, 2e-4),
             ("approach", "delta", "um", s.approach, hertz.approach, 2e-4),
@@ -224,10 +224,10 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
 
 
 def ellipse_error(
-    x: Array, y: Array, zone: NDArray[np.bool_], spacing: float, ellipse: measures.Ellipse
+    x: Array, y: Array, zone: NDArray[np.bool_], spacing: float, ellipse: flat.Ellipse
 ) -> float:
     """E_e: mean distance from the ellipse of the boundary nodes, moved out by l_e/2, divided by b."""
-    rim = measures.boundary(zone)
+    rim = flat.boundary(zone)
     x, y = x[rim] - ellipse.x, y[rim] - ellipse.y
     cosine, sine = math.cos(ellipse.angle), math.sin(ellipse.angle)
     u, v = (x * cosine + y * sine) / ellipse.semi_major, (y * cosine - x * sine) / ellipse.semi_minor

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.core import measures
+from hexcontact.core import flat
 from hexcontact.core.contact import ElasticPair
 from hexcontact.deck.surfaces import Sphere, Surface
 from hexcontact.result.result import Result
@@ -68,18 +68,18 @@ class State:
     @property
     def area_radius(self) -> float:
         """a_A."""
-        return measures.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
+        return flat.area_radius(self.contact, math.sqrt(0.75) * self.spacing**2)
 
     @property
     def stick_radius(self) -> float:
         """c_A."""
-        return measures.area_radius(self.stick, math.sqrt(0.75) * self.spacing**2)
+        return flat.area_radius(self.stick, math.sqrt(0.75) * self.spacing**2)
 
     @property
     def edge_radius(self) -> float:
         """A from p^2 at the edge, about x = y = 0."""
         cell = np.sqrt(0.75) * self.spacing**2
-        return measures.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
+        return flat.edge_radius(self.x, self.y, self.pressure, self.spacing, cell)
 
     @property
     def stick_fraction(self) -> float:
@@ -95,7 +95,7 @@ class State:
         """Semi-axes (m) of the stick zone along x and y, to a fraction of the spacing.
 
         (mu p - |q|)^2 is linear in x^2 and y^2 inside the edge of the zone, as p^2 is at the edge of the
-        contact; the line is fitted to the same rings of nodes as in `measures.edge_radius`.
+        contact; the line is fitted to the same rings of nodes as in `flat.edge_radius`.
         """
         reserve = friction_coefficient * self.pressure - self.traction
         around, r = self.stick_radius, np.hypot(self.x, self.y)

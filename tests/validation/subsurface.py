@@ -189,7 +189,7 @@ def below_edges() -> Iterator[tuple[str, dict[str, Array]]]:
         coarse = _solved(surface, body_2, None, loads)
         h = coarse.lattice.spacing
         fine = _solved(surface, body_2, h / _FINER, loads)
-        pieces = _edges(fine.lattice, nodal_tractions([fine.fields])[0], fine.fields).contact().segments
+        pieces = _edges(fine.lattice, nodal_tractions([fine.fields])[0], fine.fields).edge().segments
         turned = np.arctan2(pieces[:, 0, 1], pieces[:, 0, 0])
         places = pieces[[abs(turned - angle).argmin() for angle in np.linspace(-3, 3, _ANGLES)], 0]
         points = np.array([[(x, y, k * h) for x, y in places] for k in _DEPTHS])

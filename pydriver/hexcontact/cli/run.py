@@ -34,8 +34,8 @@ def run(
 ) -> frame.Content:
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
-    from ..solve import log
-    from ..solve.run import metadata_of
+    from ..solve import events
+    from ..solve.run import metadata_of, was_begun
     from .solving import Messages, overview, picture_beside, solved
 
     if again and overwrite:
@@ -44,14 +44,11 @@ def run(
     with messages.of_all_ranks(deck, *([output] if output else [])):
         case = frame.case_of(deck, settings)
         target = frame.target_of(case, deck, output)
-        log.refuse_same(log_file, [target])
+        events.refuse_as_log(log_file, [target])
         if plot:  # refuses before the run
             picture_beside(target)
-        if again:
-            from ..solve.restart import was_begun
-
-            if was_begun(target, case):
-                return _resumed(target, plot, messages, case=case)
+        if again and was_begun(target, case):
+            return _resumed(target, plot, messages, case=case)
         with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
             extent = solved(case, store, pipe, deck.stem, messages)
         return messages.conclude(case, store, extent, target, overview(target) if plot else None)
@@ -87,13 +84,13 @@ def resume(
 
 
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
-    """Resume the run of an output, with the case or the overrides of `restart.reopened`."""
-    from ..solve import restart
+    """Resume the run of an output, with the case or the overrides of `reopened`."""
+    from ..solve.run import output_of, reopened
     from .solving import overview, picture_beside, solved, with_tables
 
-    with signal_pipe() as pipe, restart.reopened(file, **changes) as again:
+    with signal_pipe() as pipe, reopened(file, **changes) as again:
         if again is None:
-            with_tables(restart.output_of(file), pipe, messages)
+            with_tables(output_of(file), pipe, messages)
         else:
             if plot:
                 picture_beside(again.store.path)

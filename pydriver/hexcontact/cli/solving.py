@@ -19,7 +19,7 @@ from ..result.history_words import Extent, extent_of
 from ..result.netcdf import missing_stresses, stress_files
 from ..result.step import Step
 from ..result.store import Store, open_result
-from ..solve import log
+from ..solve import events
 from ..solve import run as solving
 from ..solve.events import Listener, reporter
 from ..solve.interruption import Interrupted, in_background
@@ -44,7 +44,7 @@ class Messages:
 
     def logging(self, *spare: Path) -> contextlib.AbstractContextManager[None]:
         """Write the log, but not into the files `spare` that the command reads or writes."""
-        return log.kept(self.log_file, self.log_level, spare)
+        return events.log_to(self.log_file, self.log_level, spare)
 
     @contextlib.contextmanager
     def of_all_ranks(self, *spare: Path) -> Iterator[None]:
@@ -64,8 +64,8 @@ class Messages:
         """Report the saved steps after a signal and end the process, also while the core computes."""
         message = f"interrupted; {saved}"
         with contextlib.suppress(OSError):  # standard error may be closed
-            log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))
-            log.logger.disabled = True  # for threads that still run
+            events.logger.error(events.words("stopped", reason=f"interrupted ({signaled.name})", **about))
+            events.logger.disabled = True  # for threads that still run
             print_error(message)
             if self.as_json:
                 write_json(self.command, Report(message, signaled.exit_code).content())

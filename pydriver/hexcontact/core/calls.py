@@ -57,18 +57,17 @@ def shaped(values: NDArray[Any], points: tuple[int, ...]) -> NDArray[Any]:
 
 def record(kind: Callable[..., Any], numbers: NDArray[Any]) -> Any:
     """Return numbers of the core as a record."""
-    types = kind.__annotations__.values()
-    return kind(*(as_type(number) for as_type, number in zip(types, numbers.tolist(), strict=True)))
+    return kind(*map(operator.call, kind.__annotations__.values(), numbers.tolist()))
 
 
 # --- arguments ----------------------------------------------------------------------------------------------
 
 
-def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
-    """Return arguments as arrays of real numbers of one shape, by their names."""
+def points(**coordinates: ArrayLike) -> list[NDArray[np.float64]]:
+    """Return arguments as arrays of real numbers of one shape."""
     arrays = {name: reals(values, name) for name, values in coordinates.items()}
     try:
-        return dict(zip(arrays, np.broadcast_arrays(*arrays.values()), strict=True))
+        return [*np.broadcast_arrays(*arrays.values())]
     except ValueError as error:
         shapes = " and ".join(str(array.shape) for array in arrays.values())
         raise DeckError(f"{' and '.join(arrays)}: arrays of shapes {shapes} do not broadcast") from error

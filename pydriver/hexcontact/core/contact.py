@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import ctypes
+import math
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal, NamedTuple, TypeVar, get_args
+from typing import Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, Mask, reals
 from ..errors import DeckError, RimWarning, warn
 from ..text import counted
+from ..variables import CORE
 from . import flat, kernel_cache
 from .calls import checked
-from .handles import Handle, HeldState, Solved
 from .lattice import Lattice
 
 Method = Literal["direct", "fft"]
@@ -196,6 +199,98 @@ def pair_of(one: Any, two: Any) -> ElasticPair:
     return ElasticPair.from_materials(*below[0], *below[1])
 
 
+class Handle:
+    """An object of the core, which is freed with its Python object."""
+
+    _handle: int
+
+    def _create(self, procedure: Callable[..., int], *arguments: Any) -> None:
+        kernel_cache.take_settings()
+        self._handle = procedure(*arguments)
+        weakref.finalize(self, flat.free_object, self._handle)
+        kernel_cache.warn_of_faults()
+
+
+class _Slip:
+    """The slip of the last step in a state, which is freed with the last array that is a view of it."""
+
+    def __init__(self, state: HeldState) -> None:
+        self.state = state
+        weakref.finalize(self, flat.free_slip, state.handle).atexit = False
+
+
+class HeldState:
+    """A state in the memory of the core, which is freed with the last array that is a view of it."""
+
+    def __init__(self, handle: int, shape: tuple[int, ...]) -> None:
+        self.handle, self.shape = handle, shape
+        self._slip: weakref.ref[_Slip] | None = None
+        # at the end of the process arrays may still be in use
+        weakref.finalize(self, flat.free_object, handle).atexit = False
+
+    @property
+    def held(self) -> HeldState:
+        """The state itself, where a solution may stand."""
+        return self
+
+    def view(self, name: str) -> NDArray[Any]:
+        """Return a field, which is no copy."""
+        owner: Any = self
+        if name.startswith("slip_increment"):
+            owner = (self._slip and self._slip()) or _Slip(self)
+            self._slip = weakref.ref(owner)
+        return self._array(name, owner)
+
+    def views(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return fields by their names, which are no copies."""
+        return {name: self.view(name) for name in names}
+
+    def _array(self, name: str, owner: Any) -> NDArray[Any]:
+        number, kind = (ctypes.c_int8, "i1") if name == "zone" else (ctypes.c_double, "f8")
+        memory: Any = (number * math.prod(self.shape)).from_address(flat.place_of_field(self, name))
+        memory.held = owner
+        return np.frombuffer(memory, dtype=kind).reshape(self.shape)
+
+    @classmethod
+    def copied(cls, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, float]) -> HeldState:
+        """Return a copy of a state."""
+        shape = fields["pressure"].shape
+        history = flat.History(**{name: numbers.get(name, 0.0) for name in CORE["numbers"]})
+        held = cls(flat.new_state(shape[1], shape[0], history), shape)
+        for name, field in fields.items():
+            held._array(name, held)[:] = field
+        return held
+
+
+class Solved:
+    """A solution, and its state in the core, unless it was made or changed in Python."""
+
+    __slots__ = ("_held",)
+
+    def behind(self, held: HeldState | None) -> Self:
+        """Return the solution with the state that it is the record of."""
+        object.__setattr__(self, "_held", held)
+        return self
+
+    @property
+    def held(self) -> HeldState:
+        """Its state in the core, or a copy there."""
+        return self.copied() if self.known is None else self.known
+
+    def copied(self) -> HeldState:
+        """Return a copy of its state in the core."""
+        names = [name for name in (*CORE["fields"], *CORE["zone"]) if name in vars(self)]
+        return HeldState.copied({name: vars(self)[name] for name in names}, vars(self))
+
+    @property
+    def known(self) -> HeldState | None:
+        """Its state in the core."""
+        return getattr(self, "_held", None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self)
+
+
 class FlexibilityOperator(Handle):
     """Operator from tractions on the lattice to relative surface displacements.
 
@@ -299,7 +394,7 @@ class Contact(Handle):
         rim_warning: bool,
         own: Lattice | None = None,
     ) -> None:
-        self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
+        self.lattice, self._rim_warning = lattice, rim_warning
         self.own = lattice if own is None else own  # the nodes of the arrays
         self._mask: Mask = np.broadcast_to(True, self.own.shape)  # takes no memory
         if candidate is not None:
@@ -326,9 +421,9 @@ class Contact(Handle):
         """Return the solution behind a handle, with views of its fields."""
         held = HeldState(handle, self.own.shape)
         found: dict[str, Any] = flat.numbers_of_state(held)._asdict()
-        found |= {"zone": held.view("zone"), "stopped": STOPPED[found["stopped"]]}
+        found["stopped"] = STOPPED[found["stopped"]]
         names = [field.name for field in fields(kind)]
-        found |= {name: held.view(name) for name in names if name not in found}
+        found |= held.views(name for name in names if name not in found)
         return kind(**{name: found[name] for name in names}).behind(held)
 
     def _warn_of_rim(self, found: NormalSolution) -> None:

@@ -6,7 +6,7 @@ Lattice arrays have shape (n_row, n_col).
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,6 @@ _MARGIN = 6  # nodes about a contact from which its edge follows, at most, and o
 _Part = tuple[slice, slice]
 Source = Literal["edges", "nodes"]
 _FRICTIONLESS = FrictionLaw(0.0)
-_Zone = tuple[Mask, Array, bool]  # nodes, reserve of friction, whether it is the stick area
 
 
 class Edge(NamedTuple):
@@ -126,29 +125,30 @@ class ContactEdges:
         self.nodes = Nodes(basis, start, pressure.shape)
         self.pressure, self.gap, self.touching, self.candidate = pressure, gap, contact, candidate
 
-    def contact(self) -> Edge:
-        """Return the contact area."""
-        return self._edge(self._whole)
+    def edge(self, *stick: Any) -> Edge:
+        """Return the contact area; or the part that sticks, by its nodes and the reserve mu p - |q| there."""
+        zone = self._zone(*stick)
+        edge, segments, count = flat.edge_of_zone(self, *zone, flat.count_cut_triangles(zone[0]))
+        return Edge(**edge._asdict(), segments=segments[:count])
 
-    def stick(self, stick: Mask, reserve: Array) -> Edge:
-        """Return the part of the contact area that sticks, with the reserve of friction mu p - |q| there."""
-        return self._edge((stick, reserve, True))
+    def mesh(self, field: Array, vanishes: bool, *stick: Any) -> ZoneMesh:
+        """Return a mesh of an area as of `edge`, with a field up to its edge, where tractions vanish."""
+        zone = self._zone(*stick)
+        nodes, cut = int(zone[0].sum()), flat.count_cut_triangles(zone[0])
+        room = nodes + 3 * cut, 2 * nodes + 3 * cut  # a cut triangle has at most three points and parts
+        points, values, triangles, (n_point, n_triangle) = flat.mesh_of_zone(
+            self, *zone, field, vanishes, *room
+        )
+        x, y = points[:n_point].T
+        return ZoneMesh(x, y, values[:n_point], triangles[:n_triangle].astype(np.intp) - 1)
 
-    def contact_mesh(self, field: Array, vanishes: bool) -> ZoneMesh:
-        """Return a mesh of the contact area, with a field up to its edge, where tractions vanish."""
-        return self._mesh(self._whole, field, vanishes)
+    def distances(self, *stick: Any) -> Array:
+        """Return the distances of the nodes from an edge as of `edge`, in spacings, positive inside."""
+        return np.asarray(flat.distances_of_zone(self, *self._zone(*stick)))
 
-    def stick_mesh(self, stick: Mask, reserve: Array) -> ZoneMesh:
-        """Return a mesh of the part of the contact area that sticks, see `stick`."""
-        return self._mesh((stick, reserve, True), reserve, False)
-
-    def contact_distances(self) -> Array:
-        """Return the distances of the nodes from the edge of the contact, in spacings, positive inside."""
-        return np.asarray(flat.distances_of_zone(self, *self._whole))
-
-    def stick_distances(self, stick: Mask, reserve: Array) -> Array:
-        """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
-        return np.asarray(flat.distances_of_zone(self, stick, reserve, True))
+    def _zone(self, *stick: Any) -> tuple[Mask, Array, bool]:
+        """Return nodes, reserve of friction (pressure of a contact), and whether it is the stick area."""
+        return (stick[0], stick[1], True) if stick else (self.touching, self.pressure, False)
 
     def field(
         self, shear: Array | None = None, stick: Mask | None = None, friction: FrictionLaw | None = None
@@ -210,20 +210,3 @@ class ContactEdges:
         given = stick, friction, np.stack([self.pressure, *shear]), corrected
         found: tuple[Array, float] = flat.stress_to_edges(self, *given, body, poisson_ratio, points)
         return found
-
-    @property
-    def _whole(self) -> _Zone:
-        return self.touching, self.pressure, False
-
-    def _edge(self, zone: _Zone) -> Edge:
-        edge, segments, count = flat.edge_of_zone(self, *zone, flat.count_cut_triangles(zone[0]))
-        return Edge(**edge._asdict(), segments=segments[:count])
-
-    def _mesh(self, zone: _Zone, field: Array, vanishes: bool) -> ZoneMesh:
-        nodes, cut = int(zone[0].sum()), flat.count_cut_triangles(zone[0])
-        room = nodes + 3 * cut, 2 * nodes + 3 * cut  # a cut triangle has at most three points and parts
-        points, values, triangles, (n_point, n_triangle) = flat.mesh_of_zone(
-            self, *zone, field, vanishes, *room
-        )
-        x, y = points[:n_point].T
-        return ZoneMesh(x, y, values[:n_point], triangles[:n_triangle].astype(np.intp) - 1)

@@ -1,4 +1,4 @@
-"""The compiled frictional contact as Python objects, with checks of arrays and exceptions for failures."""
+"""Contact with friction in the compiled core as Python objects: laws, states, load steps, cycles of wear."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, has_entries, reals
 from ..errors import DeckError
-from ..variables import BULK_STRAIN, CORE
+from ..variables import BULK_STRAIN, CORE, WORN
 from . import flat
 from .calls import checked, numbers
 from .contact import (
     UNILATERAL,
     Contact,
     ElasticPair,
+    Handle,
+    HeldState,
     Interface,
     Iteration,
     Method,
@@ -28,8 +30,7 @@ from .contact import (
     method_code,
     shaped,
 )
-from .flat import AdaptiveSteps
-from .handles import HeldState
+from .flat import AdaptiveSteps, WearProgress, WearSettings
 from .lattice import Lattice
 
 Coupling = Literal["full", "goodman"]
@@ -41,6 +42,18 @@ CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS = CORE["fields"]
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
+
+
+REJECTED, ACCEPTED, LIMITED, FAILED, OUTGROWN, PENDING = range(6)
+"""Verdicts on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones do
+not help; the smallest one did not converge; the contact reached the rim of its window; it is not solved to
+its end."""
+
+AHEAD = "ahead"
+"""Energy of a cycle by which the second of two jumps wears (J/m2), among the fields of a cycle."""
+
+LEAST = 1e-3
+"""Smallest adaptive load step, as a part of its segment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +80,6 @@ class FrictionLaw:
         """Return the law at a part of the nodes."""
         mu = self.coefficient
         return dataclasses.replace(self, coefficient=mu[part]) if isinstance(mu, np.ndarray) else self
-
-    def at_nodes(self, lattice: Lattice) -> FrictionLaw:
-        """Return the law with a coefficient for each node, unless the limit is mu p."""
-        plain = (self.shear_limit, self.power, self.ratio) == (math.inf, 1.0, 1.0)
-        if plain or isinstance(self.coefficient, np.ndarray):
-            return self
-        return dataclasses.replace(
-            self, coefficient=np.full(lattice.shape, min(self.coefficient, _UNBOUNDED))
-        )
 
     @property
     def limits(self) -> tuple[float | Array, float] | None:
@@ -213,7 +217,7 @@ class FrictionalContact(Contact):
         own: Lattice | None = None,
     ) -> None:
         super().__init__(lattice, pair, initial_gap, candidate, rim_warning, own)
-        law = _checked_law(friction_coefficient, shear_limit, self.own).at_nodes(self.own)
+        law = _checked_law(friction_coefficient, shear_limit, self.own)
         _, springs, count = checked(coupling=coupling, interface=interface, threads=threads)
         given = *vars(self).pop("_surfaces"), law, springs, own is not None, count, coupling == "goodman"
         self._create(flat.create_sheared, method_code(method, iteration), *given)
@@ -222,9 +226,7 @@ class FrictionalContact(Contact):
         """Return the state before the first load: nothing touches, nothing is displaced."""
         gap, zero = self.initial_gap, np.broadcast_to(0.0, self.own.shape)
         held = HeldState.copied(dict.fromkeys(_FIELDS, zero) | {"gap": gap, "zone": zero}, {})
-        fields: dict[str, Any] = {name: held.view(name) for name in _FIELDS}
-        zone = np.zeros(self.own.shape, np.int8)
-        return self._masked(ContactState(**fields, zone=zone).behind(held))
+        return self._masked(ContactState(**held.views((*_FIELDS, "zone"))).behind(held))
 
     def advance(
         self,
@@ -277,8 +279,9 @@ class FrictionalContact(Contact):
             reason) and ``touches_rim`` (contact at the rim of the window, also in a part of the step, where
             the advance ends without convergence: repeat it from the first state on a larger window).
         """
-        known = isinstance(control, list | tuple) and len(control) == 4
-        if not known or not all(isinstance(kind, str) and kind in CONTROLS for kind in control):
+        given = control if isinstance(control, list | tuple) else ()
+        kinds = [CONTROLS.get(kind) if isinstance(kind, str) else None for kind in given]
+        if len(kinds) != 4 or None in kinds:
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
         targets, _, *limits = checked(
             value=value, entry=entry, tolerance=tolerance, max_sweeps=max_sweeps, max_cuts=max_cuts
@@ -290,12 +293,9 @@ class FrictionalContact(Contact):
         ahead = [0, 0] if rolling is None else rolling.ahead(self.lattice)
         if guess is not None:
             flat.set_guess(self, np.reshape(guess[0], (3, *self.own.shape)), [*guess[1]])
-        handle = self.called(
-            *(flat.advance, [CONTROLS[word] for word in control], [*targets, *strain], static),
-            *(entry == "interpolated", *limits),
-            *(ahead, rolling is not None and rolling.steady, self._held(state)),
-        )
-        found = self.solution(handle)
+        steady = rolling is not None and rolling.steady
+        how = static, entry == "interpolated", *limits, ahead, steady
+        found = self.solution(self.called(flat.advance, kinds, [*targets, *strain], *how, self._held(state)))
         self._warn_of_rim(found)
         return found
 
@@ -315,10 +315,9 @@ class FrictionalContact(Contact):
         """
         motions = reals(creepages, "creepages", (len(np.atleast_1d(creepages)), 3))
         kinds = [CONTROLS[control], *[CONTROLS["displacement"]] * 3]
-        loads, work, solved, handle = self.called(
-            *(flat.creep_loads, kinds, [value, *[0.0] * 6], motions, *checked(tolerance=tolerance)),
-            *(MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice), self._held(state)),
-        )
+        how = *checked(tolerance=tolerance), MAX_SWEEPS, MAX_CUTS, rolling.ahead(self.lattice)
+        given = flat.creep_loads, kinds, [value, *[0.0] * 6], motions, *how, self._held(state)
+        loads, work, solved, handle = self.called(*given)
         return loads[:solved], work[:solved], self.solution(handle)
 
     def assembled(self, fields: Mapping[str, NDArray[Any]], numbers: Mapping[str, Any]) -> ContactState:
@@ -381,22 +380,105 @@ class FrictionalContact(Contact):
         At new nodes the relative displacement follows from the tractions and the rigid motions.
         """
         start = state.held
-        handle = flat.extend_state(self, lattice.first, [lattice.n_col, lattice.n_row], start.handle)
+        handle = flat.extend_state(self, lattice.first, lattice.extent, start.handle)
         found = self.solution(handle)
         fields = {name: getattr(found, name) for name in (*_FIELDS, "zone")}
         return dataclasses.replace(state, **fields, touches_rim=False).behind(found.known)
 
 
-def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: Lattice) -> FrictionLaw:
-    """Return the law of friction of arguments."""
-    if isinstance(coefficient, FrictionLaw):
-        law = _checked_law(coefficient.coefficient, coefficient.shear_limit, lattice)
-        return dataclasses.replace(coefficient, coefficient=law.coefficient)
-    checked(shear_limit=limit)
-    if has_entries(coefficient):
-        mu = checked_field(coefficient, lattice, "friction_coefficient")
+def _checked_law(coefficient: Any, limit: float, lattice: Lattice) -> FrictionLaw:
+    """Return a law of friction, with a coefficient for each node unless its limit is mu p."""
+    law = coefficient if isinstance(coefficient, FrictionLaw) else FrictionLaw(coefficient, limit)
+    checked(shear_limit=law.shear_limit)
+    mu: Any = law.coefficient
+    if has_entries(mu):
+        mu = checked_field(mu, lattice, "friction_coefficient")
         if (mu < 0.0).any():
             raise DeckError(f"friction_coefficient: expected numbers of at least 0, not {mu.min():g}")
-        return FrictionLaw(mu, limit)
-    [found] = checked(friction_coefficient=coefficient)
-    return FrictionLaw(found, limit)
+    else:
+        [mu] = checked(friction_coefficient=mu)
+        if (law.shear_limit, law.power, law.ratio) != (math.inf, 1.0, 1.0):
+            mu = np.full(lattice.shape, min(mu, _UNBOUNDED))
+    return dataclasses.replace(law, coefficient=mu)
+
+
+# --- paths: fortran/path ------------------------------------------------------------------------------------
+
+_CHOOSER = ("size", "first", "stick", "traction")
+_MEMORY = {"stick": "past_stick", "traction": "past_traction", "spent": "spent", "turned": "turned"}
+
+
+def record_of(steps: Any) -> dict[str, Any]:
+    """Return the control of load steps, or of jumps, in the record of a step."""
+    memory = {name: getattr(steps, number) for name, number in _MEMORY.items()}
+    return {**{name: getattr(steps, name) for name in _CHOOSER}, "memory": memory}
+
+
+def restored(steps: Any, record: Mapping[str, Any]) -> Any:
+    """Return the control of load steps, or of jumps, from the record of a step."""
+    memory = {number: record["memory"][name] for name, number in _MEMORY.items()}
+    return steps._replace(**{name: record[name] for name in _CHOOSER}, **memory)
+
+
+class CyclesOfWear(Handle):
+    """Cycles that wear the surfaces, from the end of a load history: fortran/path/wear_path.f90.
+
+    A load step has the numbers of controls, values with bulk strains, shares of the values at the beginning
+    of its segment that add to them, and the number of the segment. The first one is that onto the worn gap.
+    """
+
+    def __init__(
+        self,
+        settings: WearSettings,
+        pair: ElasticPair,
+        steps: Sequence[tuple[Sequence[int], Sequence[float], Sequence[float], int]],
+        state: ContactState,
+    ) -> None:
+        self._create(flat.create_wear, settings, pair, *map(list, zip(*steps, strict=True)), state)
+
+    def advance(self, contact: FrictionalContact) -> WearProgress:
+        """Solve the next load step of a cycle."""
+        progress: WearProgress = contact.called(flat.advance_wear, self)
+        return progress
+
+    def carry(self, contact: FrictionalContact, smaller: Lattice) -> None:
+        """Go on with a contact on a larger window."""
+        flat.carry_wear(contact, self, smaller.first, smaller.extent)
+
+    def reached(self, contact: FrictionalContact) -> ContactState:
+        """Return the end of the last cycle, or the solution that failed or reached the rim of the window."""
+        return contact.solution(flat.state_of_wear(self))
+
+    def fields(self, contact: FrictionalContact) -> dict[str, Array]:
+        """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
+        depth, change, energy, path, ahead = flat.fields_of_wear(self, *contact.own.extent)
+        return dict(zip((*WORN, AHEAD), (depth, change, energy, 0.25 * path, ahead), strict=True))
+
+    def restore(
+        self, state: ContactState, fields: Mapping[str, Array], cycles: float, until: float, spent: float
+    ) -> None:
+        """Go on from a solved cycle: its fields as of `fields`, numbers as of `WearProgress`."""
+        depth, change, energy, amplitude = (np.asarray(fields[name]) for name in WORN)
+        ahead = fields.get(AHEAD)
+        values = [depth, change, energy, 4.0 * amplitude, 0.0 * depth if ahead is None else ahead]
+        flat.restore_wear(self, state, values, cycles, until, spent, ahead is not None)
+
+    def restore_end(
+        self, place: int, contact: FrictionalContact, cycles: float, motions: Array, tractions: Array
+    ) -> None:
+        """Set the last solution of a load step, from 1 on; see `end`."""
+        flat.restore_wear_end(self, place, cycles, motions, tractions.reshape(2, 3, -1))
+
+    def end(self, place: int, contact: FrictionalContact) -> tuple[float, Array, Array]:
+        """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
+        cycles, motions, tractions = flat.wear_end(self, place, contact.own.size)
+        return cycles, motions, np.asarray(tractions).reshape(2, 3, *contact.own.shape)
+
+    def field(self, contact: FrictionalContact, name: str) -> Array:
+        """Return one of the `fields`."""
+        return self.fields(contact)[name]
+
+    def traction(self, place: int, contact: FrictionalContact, component: int) -> Array:
+        """Return a component of the tractions, or of their rates, of `end`."""
+        values: Array = self.end(place, contact)[2].reshape(6, *contact.own.shape)[component]
+        return values

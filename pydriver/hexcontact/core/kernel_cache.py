@@ -140,7 +140,7 @@ def statistics() -> Statistics:
 def limit_growth(spare: int) -> None:
     """Limit the growth of the cache to `spare` bytes until the next call, or shrink it; its bound remains."""
     take_settings()
-    flat.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
+    flat.limit_kernels(max(0, min(_settings.bound or 0, flat.kernel_statistics()[0] + spare)))
 
 
 def take_settings() -> None:

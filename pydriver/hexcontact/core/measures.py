@@ -1,7 +1,4 @@
-"""Measures of a state by the core: nodal residuals, areas, energy, sizes of zones, expected errors.
-
-Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
-"""
+"""Measures of a load history by the core: half-axes, turns, cycles, directions, expected errors."""
 
 from __future__ import annotations
 
@@ -12,26 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..variables import VARIABLES
 from . import flat
-from .contact import Contact, ElasticPair, Interface, NormalSolution
-from .flat import Ellipse as Ellipse
-from .flat import LatticeErrors as LatticeErrors
-from .flat import area_radius as area_radius
-from .flat import boundary as boundary
-from .flat import boundary_circle as boundary_circle
-from .flat import bulk_strain as bulk_strain
-from .flat import edge_ellipse as edge_ellipse
-from .flat import edge_radius as edge_radius
-from .flat import expected_lattice_errors as expected_lattice_errors
-from .flat import is_unbounded as is_unbounded
-from .flat import moment_ellipse as moment_ellipse
-from .flat import pressure_center as pressure_center
-from .flat import slip_ring as slip_ring
-from .flat import turning_errors as turning_errors
-from .flat import unresolved_slip_zones as unresolved_slip_zones
-from .friction import ContactState, FrictionLaw
-from .lattice import Lattice
 
 NO_VALUE = 0.65  # the largest expected error of a lattice: the quantity may be wrong altogether
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
@@ -41,14 +19,6 @@ def half_axes(history: Mapping[str, Any]) -> tuple[float, float] | None:
     """Return the half-axes (m) of the contact of a load step; None if it is a circle, or they are unknown."""
     major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
     return (major, minor) if minor < ROUND * major else None
-
-
-def unbounded(share: Array, state: Any, *n_row: int) -> list[str]:
-    """Return the names of largest values of a state that rise to an end of the surface."""
-    fields = {"max_pressure": state.pressure}
-    if hasattr(state, "traction_x"):
-        fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
-    return [name for name, field in fields.items() if is_unbounded(share, field, *n_row)]
 
 
 def limits_of_error(
@@ -77,36 +47,6 @@ def expected_entry_error(
     ratio, most = -1.0 if load_ratio is None else load_ratio, np.finfo(float).max
     entry, steps, needed = flat.expected_entry_errors(before, after, min(stick, most), ratio, goal)
     return entry, steps, needed
-
-
-def nodal_residuals(
-    lattice: Lattice,
-    pair: ElasticPair,
-    friction: FrictionLaw,
-    interface: Interface,
-    solution: NormalSolution,
-    *,
-    tangential: bool,
-) -> Array:
-    """Return the residuals at the nodes, R_n or, tangential, R_t: docs/theory/residuals.md."""
-    if tangential:
-        # a copy: the slip may be that of several parts of the step
-        return np.asarray(flat.tangential_residual(lattice, pair, interface, friction, solution.copied()))
-    return np.asarray(flat.normal_residual(lattice, pair, interface, solution.pressure, solution.gap))
-
-
-def measures(contact: Contact, solution: NormalSolution) -> dict[str, float]:
-    """Return the measures of a state in the load history, by the names of `hexcontact.variables`."""
-    frictional, periodic = isinstance(solution, ContactState), contact.lattice.periodic
-    found = (flat.measure_friction if frictional else flat.measure_pressure)(contact, solution)
-    known = {name: (value, VARIABLES[name]) for name, value in found._asdict().items()}
-    return {
-        name: value
-        for name, (value, variable) in known.items()
-        if (frictional or not variable.frictional)
-        # a window that repeats has no edges, and no place of a zone
-        and not (periodic and math.isnan(value) and not variable.required)
-    }
 
 
 def turning_points(values: Array) -> list[int]:

@@ -7,7 +7,10 @@ together, in the order of the first one.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import math
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Banded
-from ..variables import WORN
-from . import ranks
+from ..variables import VARIABLES, WORN
+from . import flat, ranks
 from .contact import Contact, Displacement, ElasticPair, FlexibilityOperator, NormalContact, NormalSolution
-from .friction import FrictionalContact
+from .flat import WearSettings
+from .friction import AHEAD, ContactState, CyclesOfWear, FrictionalContact, FrictionLaw
 from .lattice import Lattice
-from .measures import measures, unbounded
-from .steps import AHEAD
 
 Rows = Callable[[int, tuple[int, int]], Array]
 """The rows of a quantity on a rank, of a shape."""
@@ -33,6 +35,7 @@ class Layout(NamedTuple):
 
     lattice: Lattice
     by_rows: bool
+    shared: bool = True  # False: the window is on the first rank alone
 
     def nodes(self, rank: int | None = None) -> Lattice:
         """Return the nodes of the arrays of a rank, by default this one."""
@@ -88,8 +91,9 @@ def gap_in_rows(field: Any, layout: Layout) -> Rows:
 
 def _over(field: Any, lattice: Lattice) -> Array:
     """Return a gap in some rows, NaN where nothing can touch."""
-    values = field.over(lattice)
-    return np.where(np.isfinite(values), values, np.nan)
+    values: Array = field.over(lattice)
+    touching = np.isfinite(values)
+    return values if touching.all() else np.where(touching, values, np.nan)
 
 
 # --- the part of this rank ----------------------------------------------------------------------------------
@@ -99,14 +103,16 @@ class _Part(Contact):
     """The part of this rank of a contact, its rows or all, from gap and friction as fields over the plane."""
 
     def __init__(self, layout: Layout, gap: Any, **given: Any) -> None:
+        self._rollers, self._share = gap.rollers, gap.share
+        self._lent: weakref.ref[Array] | None = None
         own = layout.nodes()
-        with ranks.agreed():
+        with ranks.agreed() if layout.shared else contextlib.nullcontext():
             values = _over(gap, own)
-            if "friction_coefficient" in given:
-                self.law = given["friction_coefficient"] = given["friction_coefficient"].over(own)
-            given |= {"candidate": np.isfinite(values), "rim_warning": False, "own": own}
-            super().__init__(layout.lattice, initial_gap=values, **given)
-        self.share = gap.share
+            if law := given.get("friction_coefficient"):
+                law = law if isinstance(law, FrictionLaw) else law.over(own)
+                self.law = given["friction_coefficient"] = law
+            given |= {"candidate": np.isfinite(values), "rim_warning": False}
+            super().__init__(layout.lattice, initial_gap=values, own=own if layout.shared else None, **given)
         # all ranks have come this far
         super()._create(*vars(self).pop("_arguments"))
 
@@ -114,17 +120,38 @@ class _Part(Contact):
         self._arguments = arguments
 
     def measured(self, state: NormalSolution) -> tuple[dict[str, float], list[str]]:
-        """Return the measures of a state, and the names of those that rise to an end of the surface."""
-        share = self.share(self._mask, self.own)
-        return measures(self, state), unbounded(share, state, self.lattice.n_row)
+        """Return the measures of a state, by the names of `hexcontact.variables`, and the unbounded ones.
+
+        These rise to an end of the surface.
+        """
+        frictional, periodic = isinstance(state, ContactState), self.lattice.periodic
+        measured = (flat.measure_friction if frictional else flat.measure_pressure)(self, state)
+        found = {
+            name: value
+            for name, value in measured._asdict().items()
+            if (frictional or not VARIABLES[name].frictional)
+            # a window that repeats has no edges, and no place of a zone
+            and not (periodic and math.isnan(value) and not VARIABLES[name].required)
+        }
+        if self.own is self.lattice and self._mask.all() and not self._rollers:  # no end, on any rank
+            return found, []
+        share, fields = self._share(self._mask, self.own), {"max_pressure": state.pressure}
+        if isinstance(state, ContactState):
+            fields["max_traction"] = np.hypot(state.traction_x, state.traction_y)
+        rows = self.lattice.n_row
+        return found, [name for name, field in fields.items() if flat.is_unbounded(share, field, rows)]
 
     def grown(self, state: NormalSolution) -> Lattice:
         """Return a window that grows with the contact of a state."""
         return self.lattice.grown(state.zone > 0)
 
     def gap_rows(self) -> Array:
-        """Return own rows of the gap before loading, NaN where the bodies cannot touch."""
-        return np.where(self._mask, self.initial_gap, np.nan)
+        """Return own rows of the gap before loading, NaN where nothing can touch: one copy while in use."""
+        gap = self._lent() if self._lent else None
+        if gap is None:
+            gap = self.initial_gap if self._mask.all() else np.where(self._mask, self.initial_gap, np.nan)
+            self._lent = weakref.ref(gap)
+        return gap
 
     def friction_rows(self) -> Array:
         """Return own rows of the coefficient of friction."""
@@ -190,10 +217,10 @@ def _each(found: Any) -> tuple[Any, ...]:
     return found if type(found) is tuple else (found,)
 
 
-def _rows(number: int, name: str) -> Array:
-    """Return own rows of a field of a state, or the result of a method."""
+def _rows(number: int, name: str, arguments: Sequence[Any]) -> Array:
+    """Return own rows of a field of an object, or of the result of a method."""
     found = getattr(ranks.held[number], name)
-    return np.asarray(found() if callable(found) else found).astype(float, copy=False)
+    return np.asarray(found(*_here(arguments)) if callable(found) else found).astype(float, copy=False)
 
 
 # --- on the first rank --------------------------------------------------------------------------------------
@@ -226,13 +253,10 @@ class _Shared:
             return self.layout.given(value)
         return value
 
-    def rows(self, name: str) -> Rows:
-        """Return the rows of a field, or of the result of a method."""
-        return self.asked(_rows, name)
-
-    def asked(self, procedure: Callable[..., Array], *arguments: Any) -> Rows:
-        """Return the rows that a procedure returns on each rank; they keep the object."""
-        return lambda rank, shape: ranks.ask(rank, procedure, self.number, *arguments, shape=shape)
+    def rows(self, name: str, *arguments: Any) -> Rows:
+        """Return the rows of a field, or of the result of a method, on each rank; they keep the object."""
+        sent = [*map(self._sent, arguments)]
+        return lambda rank, shape: ranks.ask(rank, _rows, self.number, name, sent, shape=shape)
 
 
 class SharedObject(_Shared):
@@ -260,7 +284,7 @@ class SharedState(_Shared):
     def known(self, state: Any) -> SharedState:
         """Return the state with its numbers, from its rows on this rank."""
         fields, self._numbers = state.parts()
-        self._kind, self._fields = type(state), [*fields]
+        self.kind, self._fields = type(state), [*fields]
         vars(self).update(self._numbers)
         return self
 
@@ -273,10 +297,28 @@ class SharedState(_Shared):
         start: SharedState | None = self.call("as_start")
         return start
 
-    def gathered(self) -> Any:
-        """Return the state with its fields on this rank."""
-        fields, numbers = self.parts()
-        return self._kind(**{**fields, **numbers})
+
+def on_ranks(layout: Layout, kind: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """Return an object that all ranks share, or one of this rank, by its layout."""
+    if layout.shared:
+        return SharedObject(layout, kind, layout, *arguments, **named)
+    return kind(layout, *arguments, **named)
+
+
+def rows_of(owner: Any, name: str) -> Any:
+    """Return a field, or the result of a method, of an object: an array, or its rows on all ranks."""
+    if isinstance(owner, _Shared):
+        return owner.rows(name)
+    found = getattr(owner, name)
+    return found() if callable(found) else found
+
+
+def gathered(state: Any) -> Any:
+    """Return a state with its fields on this rank."""
+    if not isinstance(state, SharedState):
+        return state
+    fields, numbers = state.parts()
+    return state.kind(**{**fields, **numbers})
 
 
 class Later:
@@ -294,32 +336,26 @@ class SharedCycles(SharedObject):
 
     def fields(self, contact: SharedObject) -> SharedFields:
         """Return the fields of the last cycle, with the energy of a second jump, `AHEAD`, 0 without one."""
-        taken = {name: self.asked(_worn_rows, contact.number, name) for name in (*WORN, AHEAD)}
+        taken = {name: self.rows("field", contact, name) for name in (*WORN, AHEAD)}
         return SharedFields(contact.layout, taken)
 
     def end(self, place: int, contact: SharedObject) -> tuple[float, Array, Any]:
         """Return the last solution of a load step: cycle (negative: none), motions, tractions."""
         cycles, motions, _ = ranks.held[self.number].end(place, ranks.held[contact.number])
-
         shape = 2, 3, *contact.layout.lattice.shape
 
         def tractions() -> Array:
             found = np.empty((6, *shape[2:]), np.float32)
             for component, values in enumerate(found):
-                taken = self.asked(_end_rows, contact.number, place, component)
+                taken = self.rows("traction", place, contact, component)
                 values[:] = SharedFields(contact.layout, {"end": taken})["end"]
             return np.asarray(found.reshape(shape))
 
         return cycles, motions, Later(shape, "f4", tractions)
 
 
-def _worn_rows(number: int, contact: int, name: str) -> Array:
-    """Return own rows of a field of the last cycle that wore."""
-    found: Array = ranks.held[number].fields(ranks.held[contact])[name]
-    return found
-
-
-def _end_rows(number: int, contact: int, place: int, component: int) -> Array:
-    """Return own rows of a traction, or of its rate, at the end of a load step."""
-    _, _, tractions = ranks.held[number].end(place, ranks.held[contact])
-    return np.asarray(tractions).reshape(6, *tractions.shape[2:])[component].astype(float)
+def cycles_of(settings: WearSettings, pair: ElasticPair, steps: Any, state: Any) -> Any:
+    """Return cycles that wear the surfaces from a state."""
+    if isinstance(state, SharedState):
+        return SharedCycles(state.layout, CyclesOfWear, settings, pair, steps, state)
+    return CyclesOfWear(settings, pair, steps, state)

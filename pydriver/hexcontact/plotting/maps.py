@@ -276,7 +276,7 @@ def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
     tractions vanish at the edge.
     """
     stride = _stride(view.contact)
-    return view.edges(stride).contact_mesh(view.every(values, stride), vanishes)
+    return view.edges(stride).mesh(view.every(values, stride), vanishes)
 
 
 def _whole_mesh(view: StepView, values: Array) -> ZoneMesh:

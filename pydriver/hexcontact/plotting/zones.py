@@ -16,7 +16,7 @@ from matplotlib.tri import Triangulation
 
 from ..analytic.compare import PartialSlip
 from ..arrays import Array, Dataset, Mask
-from ..core import measures
+from ..core import flat
 from ..core.edges import ZoneMesh
 from ..core.measures import ROUND
 from ..errors import NotInResult
@@ -160,7 +160,7 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     canvas, axes = style.drawing(ax, max(width, 4.6), height + 0.6, equal=True)
     x_min, x_max, y_min, y_max = part.limits
     around = np.pad(view.contact, 1, mode="wrap" if view.lattice.periodic else "constant")
-    x, y, rim = view.x * part.factor, view.y * part.factor, measures.boundary(around)[1:-1, 1:-1]
+    x, y, rim = view.x * part.factor, view.y * part.factor, flat.boundary(around)[1:-1, 1:-1]
     wide = np.array([1.0, part.stretch] if part.is_wide else [part.stretch, 1.0])  # as in the picture
     across = part.width * wide[0] / np.linalg.norm(view.basis * wide, axis=1).min()
     pitch = 70.0 * (6.4 if part.is_wide else min(3.4, 6.0 / part.aspect)) / across  # points between nodes
@@ -189,7 +189,7 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
     axes.plot(x[rim], y[rim], ms=max(0.45 * pitch, 1.0), color="black", label="boundary node", **dot)
     one = _is_spot(view, view.contact)
     if view.has("gap"):
-        edge = view.edges().contact()
+        edge = view.edges().edge()
         pieces = LineCollection(cast(Any, edge.segments * part.factor), colors="black", linewidths=0.9)
         axes_of = edge.semi_major, edge.semi_minor
         size = rf"$\sqrt{{A/\pi}}$ = {worded(edge.radius, 'm')}"
@@ -220,18 +220,18 @@ def contact_boundary(result: Result | Dataset, step: int = -1, ax: Axes | None =
 
 def _is_spot(view: StepView, zone: Mask) -> bool:
     """Test whether a zone fills most of the ellipse with its moments; none is fitted to several spots."""
-    moments = measures.moment_ellipse(view.x, view.y, zone)
+    moments = flat.moment_ellipse(view.x, view.y, zone)
     ellipse = np.pi * moments.semi_major * moments.semi_minor
     return not view.lattice.periodic and view.lattice.cell_area * np.count_nonzero(zone) > _FULL * ellipse
 
 
 def _fitted(
     view: StepView, zone: Mask, letter: str, center: tuple[float, float] | None = None
-) -> tuple[measures.Ellipse, str]:
+) -> tuple[flat.Ellipse, str]:
     """Return the circle of the boundary nodes of a zone, or the ellipse of its moments, and its label."""
-    moments = measures.moment_ellipse(view.x, view.y, zone)
+    moments = flat.moment_ellipse(view.x, view.y, zone)
     if moments.semi_minor > ROUND * moments.semi_major:
         center = center or (moments.x, moments.y)
-        radius = measures.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
-        return measures.Ellipse(radius, radius, 0.0, *center), f"circle, {letter} = {worded(radius, 'm')}"
+        radius = flat.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
+        return flat.Ellipse(radius, radius, 0.0, *center), f"circle, {letter} = {worded(radius, 'm')}"
     return moments, f"ellipse, {worded(moments.semi_major, 'm')} by {worded(moments.semi_minor, 'm')}"

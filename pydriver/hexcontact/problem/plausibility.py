@@ -12,14 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.measures import (
-    NO_VALUE,
-    LatticeErrors,
-    expected_entry_error,
-    expected_lattice_errors,
-    slip_ring,
-    turning_errors,
-)
+from ..core.flat import LatticeErrors, expected_lattice_errors, slip_ring, turning_errors
+from ..core.measures import NO_VALUE, expected_entry_error
 from ..deck.interface import TwoCoefficients
 from ..deck.rough import Rough
 from ..deck.surfaces import Cone

@@ -5,20 +5,18 @@ from __future__ import annotations
 import copy
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array, Mask
-from ..core import contact, friction, memory
+from ..core import contact, flat, friction, memory
 from ..core.contact import ElasticPair, Method, pair_of
 from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice, Pattern
-from ..core.measures import bulk_strain
 from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.interface import FROM_PYTHON, coulomb
@@ -204,7 +202,7 @@ class Problem:
         assert body.young_modulus is not None
         assert body.poisson_ratio is not None  # checked: the body is elastic
         state = BULK_STATES.index(bulk.state)
-        whole, strain = bulk_strain(body.young_modulus, body.poisson_ratio, stress, state)
+        whole, strain = flat.bulk_strain(body.young_modulus, body.poisson_ratio, stress, state)
         return whole, strain if bulk.body == 1 else -strain
 
     @property
@@ -265,14 +263,14 @@ class Problem:
         """
         return self.plane_friction.over(lattice)
 
-    def check_contact(self, number: int, zones: Callable[[], Iterable[tuple[Lattice, NDArray[Any]]]]) -> None:
+    def check_contact(self, step: Any) -> None:
         """Refuse a load step whose contact reaches the end of a height map, or a hole in it."""
-        gap = self.gap_in(self.load_steps[number - 1] if self.moves else None)
-        for rows, zone in zones() if gap.maps and self.period is None else ():
+        gap = self.gap_in(self.load_steps[step.index] if self.moves else None)
+        for rows, zone in step.bands("zone") if gap.maps and self.period is None else ():
             x, y = rows.x[zone > 0], rows.y[zone > 0]
             for one in gap.maps:
                 if fault := one.fault_near(rows.spacing, x, y):
-                    raise DeckError(f"{one.name}: the contact of load step {number} {fault}")
+                    raise DeckError(f"{one.name}: the contact of load step {step.number} {fault}")
 
     def check_beyond(self, step: Any) -> None:
         """Refuse a load step whose bodies also touch outside of a window that follows from the contact."""

@@ -17,9 +17,8 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..core import flat
 from ..core.contact import UNILATERAL, ElasticPair, Interface, rough_pressure
+from ..core.friction import ACCEPTED, PENDING
 from ..core.lattice import Lattice, Pattern
-from ..core.measures import is_unbounded
-from ..core.steps import ACCEPTED, PENDING
 from ..deck.faults import Mistake
 from ..deck.height_map import BEYOND_MAP, Placed, along_axes, place
 from ..deck.keys import Grid
@@ -156,7 +155,7 @@ def estimate_contact(
     slope, *body_slopes = (_steepest(each, lattice, pressure > 0) for each in surfaces)
     inside = np.isfinite(height)
     ends = share(inside, lattice) if share else inside.astype(float)
-    unbounded = interface == UNILATERAL and is_unbounded(ends, pressure)
+    unbounded = interface == UNILATERAL and flat.is_unbounded(ends, pressure)
     xx, yy, xy = search.moment_xx, search.moment_yy, search.moment_xy
     # the principal second moments, with the inertia of a cell itself
     mean, apart, cell = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy), lattice.cell_area / 12

@@ -152,7 +152,7 @@ class StepView:
 
     def stick_mesh(self) -> ZoneMesh:
         """Return the mesh of the stick area up to its edge."""
-        return self.edges().stick_mesh(*self._sticking)
+        return self.edges().mesh(self._sticking[1], False, *self._sticking)
 
     @property
     def _sticking(self) -> tuple[Mask, Array]:
@@ -186,11 +186,11 @@ class StepView:
 
     def touches(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) are in contact, to the edge between the nodes."""
-        return self._inside(x, y, self.edges().contact_distances())
+        return self._inside(x, y, self.edges().distances())
 
     def sticks(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) stick, to the edge between the nodes."""
-        return self._inside(x, y, self.edges().stick_distances(*self._sticking))
+        return self._inside(x, y, self.edges().distances(*self._sticking))
 
     def _inside(self, x: Array, y: Array, distances: Array) -> Mask:
         """Test which points of the plane have a distance from an edge above zero, given at the nodes."""

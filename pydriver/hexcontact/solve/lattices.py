@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.measures import limits_of_error, unresolved_slip_zones
+from ..core.flat import unresolved_slip_zones
+from ..core.measures import limits_of_error
 from ..errors import DeckError, ResourceError
 from ..problem.loads import LoadStep
 from ..problem.preview import SHIFTS, Trial

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from ..core import contact, kernel_cache, memory, ranks
@@ -79,17 +79,14 @@ def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[s
         below = stress.memory_needed(lattice, region(lattice, **table.where), steps, coated, kept)
         needs[f"stress.{number}"] = max(below, _tractions_memory(case, lattice, steps, table.source))
     for number, cycle in enumerate(case.deck.fatigue, 1):
-        steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
+        steps = len(cycle.steps or ())
+        if not steps:  # adaptive segments as one step each
+            first, last = cycle_of([stage_of(step) for step in case.load_steps], cycle.segment or ())
+            steps = last - first + 1
         points = region(lattice, **cycle.where)
         below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
         needs[f"fatigue.{number}"] = max(below, _tractions_memory(case, lattice, steps, None))
     return {key: needed + _LOADED_AFTER for key, needed in needs.items()}
-
-
-def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
-    """Return the places of the load steps of a closed cycle, adaptive segments as one step each."""
-    first, last = cycle_of([stage_of(step) for step in case.load_steps], labels)
-    return range(first, last + 1)
 
 
 def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
@@ -114,15 +111,17 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     """
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
     spectra = 5 + (case.pair.spectra % 2 == 0)  # a body is unlike a rigid one
-    given: dict[str, Any] = {"spectra": spectra, "threads": memory.threads(), "periodic": lattice.periodic}
-    operator = contact.memory_needed("fft", *lattice.shape, part="operator", **given)
-    set_up = contact.memory_needed("fft", *lattice.shape, part="set-up of the operator", **given)
+    core = partial(contact.memory_needed, "fft", *lattice.shape, threads=memory.threads())
+    given: dict[str, Any] = {"spectra": spectra, "periodic": lattice.periodic}
+    operator = core(part="operator", **given)
+    set_up = core(part="set-up of the operator", **given)
+    ahead = core() if case.deck.wear else 0
     fields, method = fields_held(case) * _ITEM * lattice.size, case.method_for(lattice)
-    needed, ahead = case.memory_needed(lattice), 0
-    if case.deck.wear:
-        ahead = contact.memory_needed("fft", *lattice.shape, threads=given["threads"])
+    needed = case.memory_needed(lattice)
     if ranks.count > 1:
-        copies, parts = _copies(case, lattice)
+        shared = is_shared(case, lattice)  # else each rank has all fields of a contact with friction
+        copies = ranks.on_node if shared or (case.frictional and method == "fft") else 1
+        parts = ranks.count if shared else 1
         needed, fields, operator, set_up, ahead = (
             part * copies // parts for part in (needed, fields, operator, set_up, ahead)
         )
@@ -135,13 +134,6 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
     return _LOADED + needed
-
-
-def _copies(case: Problem, lattice: Lattice) -> tuple[int, int]:
-    """Return how many ranks of this machine hold fields, and among how many these are shared out."""
-    if is_shared(case, lattice):
-        return ranks.on_node, ranks.count
-    return (ranks.on_node if case.frictional and case.method_for(lattice) == "fft" else 1), 1
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:

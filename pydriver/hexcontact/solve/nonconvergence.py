@@ -10,10 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.friction import FrictionLaw
+from ..core import flat
+from ..core.friction import LEAST, FrictionLaw
 from ..core.lattice import Lattice
-from ..core.measures import nodal_residuals
-from ..core.steps import LEAST
 from ..errors import ConvergenceError
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
@@ -119,7 +118,7 @@ def _sliding(
     moment, largest = _moments(case, lattice, solution, target, values)
     seen = bool(getattr(solution, "sliding", False)) or (twist and abs(moment) > _TWISTED * largest > 0.0)
     doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
-    if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
+    if not (seen or (shear and shear >= _SLIDING * bound)):
         return doubtful and not math.isinf(case.friction_coefficient), "", ""
     of_load = values[3] - moment
     if twist and abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest and not shear >= bound:
@@ -205,9 +204,11 @@ def _worst(
     if sign not in ("R_n", "R_t"):
         return Worst(sign, value, what=_missed(sign, solution, values))
     law = case.friction_law(lattice)
-    field = nodal_residuals(
-        lattice, case.solved_pair, law, case.interface, solution, tangential=sign == "R_t"
-    )
+    given = lattice, case.solved_pair, case.interface
+    if sign == "R_n":
+        field = flat.normal_residual(*given, solution.pressure, solution.gap)
+    else:  # a copy: the slip may be that of several parts of the step
+        field = flat.tangential_residual(*given, law, solution.copied())
     row, col = (int(k) for k in np.unravel_index(int(np.argmax(field)), field.shape))
     if not math.isclose(field[row, col], value, rel_tol=_SAME):  # of another state
         return Worst(sign, value)

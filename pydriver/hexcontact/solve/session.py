@@ -28,9 +28,9 @@ from ..result.layout import assemble
 from ..result.step import Step
 from ..result.store import Store, open_result
 from . import steps as solving
-from .log import Log
+from .events import Log
 from .run import metadata_of
-from .wear import without_ends
+from .steps import without_ends
 
 if TYPE_CHECKING:
     from ..result.result import Result

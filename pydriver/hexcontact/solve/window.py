@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import math
 import time
-import weakref
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
 from ..core import ranks
-from ..core.contact import ElasticPair, FlexibilityOperator, NormalContact, NormalSolution, pair_of
-from ..core.friction import ContactState, FrictionalContact, Rolling
+from ..core.contact import NormalSolution, pair_of
+from ..core.friction import ContactState, Rolling
 from ..core.lattice import Lattice
-from ..core.measures import measures, unbounded
 from ..core.shared import (
     FrictionPart,
     Layout,
     NormalPart,
-    SharedCycles,
     SharedFields,
-    SharedObject,
     gap_in_rows,
+    gathered,
+    on_ranks,
     operator_part,
     rigid,
+    rows_of,
 )
-from ..core.steps import CyclesOfWear, WearSettings
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
@@ -57,14 +54,13 @@ _ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contac
 class Window:
     """A case without friction on one window; results hold the fields of `steps_held` load steps in memory.
 
-    The steps have no history: each is solved from its load alone.
+    The steps have no history: each is solved from its load alone. All ranks share a window that is not too
+    small. Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those
+    of all rows, which each rank has then.
     """
 
     state = STATE[False]  # fields of every step
     contact: Any
-    worn: Array | None = None  # depth by which the surfaces are worn, m
-    _own_gap: Array | None = None
-    _lent: weakref.ref[Array] | None = None
 
     def __init__(
         self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
@@ -72,40 +68,26 @@ class Window:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
+        several = ranks.count > 1 and case.method_for(lattice) == "fft"
+        by_rows = several and is_shared(case, lattice)
+        self.layout = Layout(lattice, by_rows, by_rows or (several and case.frictional))
+        self.friction = case.friction_law(self.layout.nodes())
         self._bodies: dict[int, Any] = {}
-        self._place(None)
+        self.contact = self._solver(None, case.frictional)
+        if case.moves:  # gap before they move
+            shared = self.layout.shared
+            self._at_first = gap_in_rows(case.plane_gap, self.layout) if shared else self.contact.gap_rows()
 
-    def _place(self, target: LoadStep | None) -> None:
-        """Set the surfaces up at their place in a load step, None: before the first."""
-        gap, self.candidate = self.case.initial_gap(self.lattice, target)
-        if target is None:
-            self.friction = self.case.friction_law(self.lattice)
-        self.gap: Any = gap if self.case.moves else None
-        self.contact = self._solver(gap, self.case.frictional)
-        # of surfaces that move, and of nodes that cannot touch, the core has another one
-        if target is None and (self.case.moves or not self.candidate.all()):
-            self._own_gap = self._where_touching(gap)
-
-    @property
-    def initial_gap(self) -> Array:
-        """Gap of the surfaces that have not moved, NaN where nothing can touch: a copy while it is in use."""
-        gap = self._own_gap
-        if gap is None and self._lent is not None:
-            gap = self._lent()
-        if gap is None:
-            gap = self.contact.initial_gap
-            self._lent = weakref.ref(gap)
-        return gap
-
-    def _solver(self, gap: Any, frictional: bool) -> Any:
-        """Return a solver for an initial gap (inf where nothing can touch)."""
-        case, solver = self.case, self.case.solver
-        given = self.lattice, case.solved_pair, gap, self.candidate
-        how: dict[str, Any] = {"method": case.method_for(self.lattice), "interface": case.interface}
+    def _solver(self, target: LoadStep | None, frictional: bool) -> Any:
+        """Return a solver for the surfaces at their place in a load step, None: before the first."""
+        case, layout, gap = self.case, self.layout, self.case.gap_in(target)
+        how = {"pair": case.solved_pair, "interface": case.interface, "method": case.method_for(self.lattice)}
         if not frictional:
-            return NormalContact(*given, rim_warning=False, **how)
-        how |= {"coupling": solver.coupling, "iteration": solver.iteration}
-        return FrictionalContact(*given, friction_coefficient=self.friction, rim_warning=False, **how)
+            layout = layout._replace(by_rows=layout.shared and ranks.share(self.lattice))
+            return on_ranks(layout, NormalPart, gap, **how)
+        how |= {"coupling": case.solver.coupling, "iteration": case.solver.iteration}
+        law = case.plane_friction if layout.shared else self.friction
+        return on_ranks(layout, FrictionPart, gap, friction_coefficient=law, **how)
 
     def advance(self, state: Any, target: LoadStep, values: tuple[float, ...]) -> Any:
         """Solve a load step from the state at its beginning, None before the first load.
@@ -131,15 +113,11 @@ class Window:
                 f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
                 'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
             )
-        larger = self._larger(solution)
+        larger: Lattice = self.contact.grown(solution)
         del self.contact  # its memory goes before that of the next comes
         self._bodies.clear()
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return window_over(self.case, larger, self.steps_held, self.listener)
-
-    def _larger(self, solution: Any) -> Lattice:
-        """Return the lattice of a larger window for a contact that reached the rim."""
-        return self.lattice.grown(solution.zone > 0)
 
     def failure(
         self, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
@@ -147,7 +125,7 @@ class Window:
         """Return the error of a step that did not converge."""
         from . import nonconvergence
 
-        return nonconvergence.error(self.case, self.lattice, solution, target, values)
+        return nonconvergence.error(self.case, self.lattice, gathered(solution), target, values)
 
     def step(self, target: LoadStep, solution: NormalSolution, spent: float, started: float) -> Step:
         """Return a finished step from its end and the energy spent before; its time counts from `started`."""
@@ -180,50 +158,34 @@ class Window:
 
     def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
         """Return the fields of a finished step."""
-        fields = {"initial_gap": self.initial_gap}
-        fields |= {name: getattr(solution, name) for name in self.state}
-        fields["gap"] = self._where_touching(solution.gap)
-        if self.case.moves:
-            fields[MOVED_GAP] = self._where_touching(self.gap)
-        if self.worn is not None:
-            fields["worn_depth"] = self.worn
-        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
-            fields[NODAL_FRICTION] = np.broadcast_to(self.friction.limits[0], self.lattice.shape)
-        if not _DISPLACED.isdisjoint(fields_of(self.case)):
+        case, fields = self.case, {"initial_gap": rows_of(self.contact, "gap_rows")}
+        if case.moves:
+            fields = {MOVED_GAP: fields["initial_gap"], "initial_gap": self._at_first}
+        fields |= {name: rows_of(solution, name) for name in self.state}
+        if case.frictional and math.isnan(case.friction_coefficient) and self.friction.limits:
+            fields[NODAL_FRICTION] = rows_of(self.contact, "friction_rows")
+        if not _DISPLACED.isdisjoint(fields_of(case)):
             fields |= self._displaced(solution)
-        return fields
+        if not self.layout.shared:
+            return fields
+        shared = SharedFields(self.layout, fields)
+        return dict(shared) if self.steps_held else shared
 
     def _displaced(self, solution: Any) -> dict[str, Any]:
         """Return the displacements of the surfaces that the deck names."""
         found: dict[str, Any] = {}
-        for body in (1, 2):
-            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
-            if names and (pair := _pair_of_body(self.case, body)):
-                if body not in self._bodies:
-                    self._bodies[body] = self._operator(pair)
-                goodman = self.case.solver.coupling == "goodman"
-                moved = self._bodies[body].displacement(solution, body, goodman)
-                found |= {name: self._field(moved, name[-1]) for name in names}
+        for number, body in enumerate((self.case.body_1, self.case.body_2), start=1):
+            names = [name for name in fields_of(self.case) if name.startswith(f"displacement_{number}")]
+            if body.rigid and not body.coating:
+                found |= dict.fromkeys(names, rigid if self.layout.shared else np.zeros(self.lattice.shape))
             elif names:
-                found |= dict.fromkeys(names, self._rigid)
+                if number not in self._bodies:
+                    pair = pair_of(*((body, None) if number == 1 else (None, body)))  # against a rigid one
+                    self._bodies[number] = on_ranks(self.layout, operator_part, pair)
+                goodman = self.case.solver.coupling == "goodman"
+                moved = self._bodies[number].displacement(solution, number, goodman)
+                found |= {name: rows_of(moved, name[-1]) for name in names}
         return found
-
-    @property
-    def _rigid(self) -> Any:
-        """Displacement of a rigid body."""
-        return np.zeros(self.lattice.shape)
-
-    def _operator(self, pair: ElasticPair) -> Any:
-        """Return the operator of a body."""
-        return FlexibilityOperator(self.lattice, pair)
-
-    def _field(self, solution: Any, name: str) -> Any:
-        """Return a field of a solution."""
-        return getattr(solution, name)
-
-    def _where_touching(self, values: Array) -> Array:
-        """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
-        return values if self.candidate.all() else np.where(self.candidate, values, np.nan)
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
         """Return the prescribed loads and motions of a load step, by the keys of the deck."""
@@ -241,7 +203,7 @@ class Window:
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
-        measured, ends = self._measures(solution)
+        measured, ends = self.contact.measured(solution)
         found = given | measured
         if not self.case.deck.interface:
             found |= dict.fromkeys(ends, math.inf)
@@ -251,92 +213,12 @@ class Window:
             del found["contact_area_error"], found["mean_gap"]  # refinement has its own error
         return found
 
-    def _measures(self, solution: Any) -> tuple[dict[str, float], list[str]]:
-        """Return the measures of a state, and the names of those that rise to an end of the surface."""
-        found = measures(self.contact, solution)
-        if self.candidate.all() and not self.case.rollers:
-            return found, []
-        share = self.case.plane_gap.share(self.candidate, self.lattice)
-        return found, unbounded(share, solution)
-
-
-class SharedWindow(Window):
-    """A window whose rows all ranks share; each evaluates the gap at its nodes.
-
-    Nodes that enter where their gap closed, or roll across rows into a steady state, depend on those of all
-    rows, which each rank has then, as those of a small window.
-    """
-
-    _rigid = staticmethod(rigid)
-
-    @property
-    def initial_gap(self) -> Any:
-        """Gap of the surfaces that have not moved, at any point."""
-        return self.case.plane_gap
-
-    def _place(self, target: LoadStep | None) -> None:
-        if target is None:
-            self.layout = Layout(self.lattice, is_shared(self.case, self.lattice))
-            self.friction = self.case.friction_law(self.layout.nodes())
-        self.contact = self._solver(self.case.gap_in(target), self.case.frictional)
-
-    def _solver(self, gap: Any, frictional: bool) -> SharedObject:
-        how = {"pair": self.case.solved_pair, "interface": self.case.interface}
-        if not frictional:
-            layout = Layout(self.lattice, ranks.share(self.lattice))
-            return SharedObject(layout, NormalPart, layout, gap, **how)
-        how |= {"friction_coefficient": self.case.plane_friction, "coupling": self.case.solver.coupling}
-        return SharedObject(self.layout, FrictionPart, self.layout, gap, **how)
-
-    def _larger(self, solution: Any) -> Lattice:
-        larger: Lattice = self.contact.grown(solution)
-        return larger
-
-    def _measures(self, solution: Any) -> tuple[dict[str, float], list[str]]:
-        found: tuple[dict[str, float], list[str]] = self.contact.measured(solution)
-        return found
-
-    def failure(self, solution: Any, target: LoadStep, values: tuple[float, ...]) -> ConvergenceError:
-        """Return the error of a step that did not converge, from its fields, which are gathered here."""
-        return super().failure(solution.gathered(), target, values)
-
-    def _operator(self, pair: ElasticPair) -> SharedObject:
-        return SharedObject(self.layout, operator_part, self.layout, pair)
-
-    def _field(self, solution: Any, name: str) -> Any:
-        return solution.rows(name)
-
-    def _fields(self, solution: Any) -> Mapping[str, NDArray[Any]]:
-        rows = {"initial_gap": self.contact.rows("gap_rows")}
-        rows |= {name: solution.rows(name) for name in self.state}
-        if self.case.moves:
-            rows[MOVED_GAP] = rows["initial_gap"]
-            rows["initial_gap"] = gap_in_rows(self.initial_gap, self.layout)
-        if self.case.frictional and math.isnan(self.case.friction_coefficient) and self.friction.limits:
-            rows[NODAL_FRICTION] = self.contact.rows("friction_rows")
-        fields = SharedFields(self.layout, rows | self._displaced(solution))
-        return dict(fields) if self.steps_held else fields
-
 
 def window_over(
     case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
 ) -> Window:
     """Return a case on a window, for the algorithm that it needs; arguments as of `Window`."""
-    kind: type[Window] = FrictionWindow if case.frictional else Window
-    if ranks.count > 1 and case.method_for(lattice) == "fft":
-        if case.frictional:
-            kind = SharedFrictionWindow
-        elif is_shared(case, lattice):
-            kind = SharedWindow
-    return kind(case, lattice, steps_held, listener)
-
-
-def _pair_of_body(case: Problem, number: int) -> ElasticPair | None:
-    """Return the compliances of one body against a rigid one; None if it is rigid, too."""
-    body = case.body_1 if number == 1 else case.body_2
-    if body.rigid and not body.coating:
-        return None
-    return pair_of(*((body, None) if number == 1 else (None, body)))
+    return (FrictionWindow if case.frictional else Window)(case, lattice, steps_held, listener)
 
 
 class FrictionWindow(Window):
@@ -352,7 +234,7 @@ class FrictionWindow(Window):
     ) -> ContactState:
         """Advance a state to new loads and motions, with surfaces that move at their new place."""
         if self.case.moves:
-            self._place(target)
+            self.contact = self._solver(target, frictional=True)
         found: ContactState = self.contact.advance(
             self.contact.virgin().as_start() if state is None else state,
             [motion.control for motion in target.targets],
@@ -370,26 +252,6 @@ class FrictionWindow(Window):
         solver = self.case.solver
         return {"entry": solver.entry, "tolerance": solver.tolerance}
 
-    def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
-        """Return cycles that wear the surfaces."""
-        return CyclesOfWear(settings, self.case.pair, steps, state)
-
-    def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
-        """Remember the worn depth of a cycle, which the core has set."""
-        self.worn = fields["worn_depth"]
-
-    def wear(self, depth: Array) -> None:
-        """Set the worn depth (m), which adds to the gap before loading."""
-        self.worn = depth
-        self.contact.wear(depth)
-
-    def grown(self, solution: NormalSolution, target: LoadStep) -> FrictionWindow:
-        """Return the problem on a larger window, with its worn depth."""
-        larger: FrictionWindow = super().grown(solution, target)
-        if self.worn is not None:
-            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0)))
-        return larger
-
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; the history of the new nodes follows from it."""
         return None if state is None else self.contact.extended(state, lattice)
@@ -397,7 +259,7 @@ class FrictionWindow(Window):
     def restored(self, step: Step) -> ContactState | None:
         """Return the whole state, and set the worn depth of the step."""
         if (worn := step.fields.get("worn_depth")) is not None:
-            self.wear(np.array(worn))
+            self.contact.wear(np.array(worn))
         state: ContactState = self.contact.assembled(*state_of(step).parts())
         return state
 
@@ -415,7 +277,7 @@ class FrictionWindow(Window):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        solver, cell = self._solver(self.initial_gap, frictional=False), self.lattice.cell_area
+        solver, cell = self._solver(None, frictional=False), self.lattice.cell_area
         solved = (solver.solve(**drive, tolerance=_ROUGHLY) for drive in self.case.largest_drives)
         return max([cell, *(cell * int((each.parts()[0]["zone"] > 0).sum()) for each in solved)])
 
@@ -432,18 +294,3 @@ def state_of(step: Step) -> ContactState:
     state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
     state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
     return ContactState(**state)  # a finished step has converged, and away from the rim
-
-
-class SharedFrictionWindow(SharedWindow, FrictionWindow):
-    """Contact with friction whose rows all ranks share."""
-
-    def wear(self, depth: Array) -> None:
-        """Set the worn depth (m), which adds to the gap before loading."""
-        self.contact.wear(depth)
-
-    def cycles(self, settings: WearSettings, steps: Any, state: Any) -> Any:
-        """Return cycles that wear the surfaces."""
-        return SharedCycles(state.layout, CyclesOfWear, settings, self.case.pair, steps, state)
-
-    def remember_wear(self, fields: Mapping[str, NDArray[Any]]) -> None:
-        """Remember nothing: the core has the worn depth."""

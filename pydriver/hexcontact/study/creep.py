@@ -25,8 +25,7 @@ from ..errors import ConvergenceError, DeckError
 from ..files import text_of
 from ..problem.problem import Problem
 from ..solve import steps as solving
-from ..solve.events import Listener, Listeners
-from ..solve.log import Log
+from ..solve.events import Listener, Listeners, Log
 from ..solve.window import FrictionWindow
 from ..text import quantity
 from ..variables import CREEPAGES, VARIABLES

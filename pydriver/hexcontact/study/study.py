@@ -21,8 +21,7 @@ from ..arrays import Dataset
 from ..deck.faults import Source
 from ..deck.toml import plain, read_toml
 from ..errors import DeckError
-from ..solve.events import Bar, Lines, Listener, Listeners
-from ..solve.log import Log
+from ..solve.events import Bar, Lines, Listener, Listeners, Log
 from ..text import counted, quantity
 from .backend import BACKENDS, Backend, Job, Outcome, outcomes, solve_case
 from .backends.dask import Dask, DaskPool

@@ -80,8 +80,7 @@ contains
       allocate (constraints%multiplier(size(determined)), source=0.0_wp)
       allocate (ax(n))
       call new_active_set(nodes, spread(.true._lk, 1, n), system%space)
-      call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb, error)
-      if (allocated(error)) return
+      call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb)
       call constraints%satisfy(system%space, area%load(determined) - matmul(x, constraints%rows), x, solved)
       if (.not. solved) return
       call system%product(x, ax, error)
@@ -131,13 +130,12 @@ contains
   end subroutine product
 
   !> Apply the factors.
-  subroutine precondition_packed(self, nodes, n, r, z, error)
+  subroutine precondition_packed(self, nodes, n, r, z)
     class(area_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
 
     call self%it%factors%apply(r, z)
   end subroutine precondition_packed

@@ -3,9 +3,8 @@ module hc_coupled_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_operator_set, only: operators_t
+  use hc_operator_set, only: traction_system_t
   use hc_shear_system, only: shear_system_t
-  use hc_linear_system, only: linear_system_t
   use hc_active_set, only: active_set_t
   implicit none
   private
@@ -16,8 +15,7 @@ module hc_coupled_system
   !> it moves the traction across at which the spring of the node rests, too.
   !>
   !> Its matrix is not symmetric. A vector is the pressure, then the shear in the frames.
-  type, extends(linear_system_t) :: coupled_system_t
-    type(operators_t), pointer :: operators => null()
+  type, extends(traction_system_t) :: coupled_system_t
     !> Frames and compliances of the nodes
     type(shear_system_t), pointer :: shear => null()
     !> Nodes in contact, and unknowns of the shear traction (of 2 n)
@@ -30,7 +28,6 @@ module hc_coupled_system
     procedure :: product => coupled_product
     procedure :: product_packed => coupled_product_packed
     procedure :: precondition_packed => coupled_precondition_packed
-    procedure :: take_image => coupled_image
     !> Add the share of the pressure to the traction along e, and the stretch by its rest to the displacement along t
     procedure :: add_slope, add_tilt
   end type coupled_system_t
@@ -128,7 +125,7 @@ contains
       !$omp end parallel do
       call self%operators%replace([normal, along_x, along_y], y, error)
       if (allocated(error)) return
-      call self%shear%add_springs_packed(runs, x(n_p + 1:n_p + n_t), y(n + 1:))
+      call self%shear%add_springs(x(n_p + 1:n_p + n_t), y(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at)
       do k = 1, size(contact%first)
         do i = contact%first(k), contact%last(k)
@@ -143,20 +140,19 @@ contains
 
   !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
   !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.
-  subroutine coupled_precondition_packed(self, nodes, n, r, z, error)
+  subroutine coupled_precondition_packed(self, nodes, n, r, z)
     class(coupled_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: shear(:)
     integer :: k, i, at
 
     associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators)
       call operators%normal%apply_packed(contact, n/3, r(:n_p), z(:n_p), operators%preconditioning)
       if (.not. allocated(self%tilt)) then
-        call self%shear%precondition_packed(self%sheared, 2*n/3, r(n_p + 1:), z(n_p + 1:), error)
+        call self%shear%precondition_packed(self%sheared, 2*n/3, r(n_p + 1:), z(n_p + 1:))
         return
       end if
       shear = r(n_p + 1:)
@@ -166,19 +162,8 @@ contains
           shear(at) = shear(at) + self%shear%compliance(at)*self%tilt(at)*z(at)
         end do
       end do
-      call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:), error)
+      call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:))
     end associate
   end subroutine coupled_precondition_packed
-
-  !> Point to memory for a product: that of the operator, if it has some.
-  subroutine coupled_image(self, n, own, image, stat)
-    class(coupled_system_t), intent(in) :: self
-    integer, intent(in) :: n
-    real(wp), allocatable, target, intent(inout) :: own(:)
-    real(wp), pointer, contiguous, intent(out) :: image(:)
-    integer, intent(out) :: stat
-
-    call self%operators%take_image(3, own, image, stat)
-  end subroutine coupled_image
 
 end module hc_coupled_system

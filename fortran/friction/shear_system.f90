@@ -15,9 +15,8 @@ module hc_shear_system
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
-  use hc_operator_set, only: operators_t
+  use hc_operator_set, only: operators_t, traction_system_t
   use hc_frame_rows, only: turn_row, plane_row, add_springs_row, take_off_row, slip_compliance_row
-  use hc_linear_system, only: linear_system_t
   use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
   implicit none
   private
@@ -30,8 +29,7 @@ module hc_shear_system
   integer, parameter :: most = 256
 
   !> Shear traction in the frames of the nodes.
-  type, extends(linear_system_t) :: shear_system_t
-    type(operators_t), pointer :: operators => null()
+  type, extends(traction_system_t) :: shear_system_t
     !> Nodes in contact, in runs along the rows
     type(active_set_t) :: nodes
     !> Direction e of each of them; t is a quarter turn ahead
@@ -46,7 +44,6 @@ module hc_shear_system
     procedure :: product => shear_product
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
-    procedure :: take_image => shear_image
     !> Turn components along x and y into the frames, or back
     procedure :: turn
     !> Set the nodes in contact, all of which stick; prepare for their frames and compliances
@@ -56,7 +53,7 @@ module hc_shear_system
     !> Reduce the traction of slipping nodes by their compliance
     procedure :: apply_slip_compliance
     !> Turn displacements into the frames and add the stretch of the springs
-    procedure :: add_springs, add_springs_packed
+    procedure :: add_springs
     !> Take it off, and turn tractions and displacements out of the frames
     procedure :: leave_frames
     !> Components along x and y from packed ones in the frames
@@ -151,20 +148,23 @@ contains
   !> Turn displacements along x and y into the frames of the nodes in contact, and add the stretch of the springs.
   subroutine add_springs(self, traction, displacement)
     class(shear_system_t), intent(in) :: self
-    !> Traction in the frames (2 n)
+    !> Traction in the frames (2 n), or that along t of these nodes alone
     real(wp), intent(in), contiguous :: traction(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to, at
+    integer :: n, k, from, to, at, first
+    logical :: packed
 
     n = size(displacement)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
+    packed = size(traction) < size(displacement)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at, first)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
       at = self%nodes%place(k)
+      first = merge(at, from, packed)
       call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
-                           traction(from:to), displacement(from:to), displacement(n + from:n + to))
+                           traction(first:first + to - from), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine add_springs
@@ -258,7 +258,7 @@ contains
       call self%put_in_plane(nodes%pairs, x(:n_t), x(n_t + 1:), y)
       call self%operators%replace(shear, y, error)
       if (allocated(error)) return
-      call self%add_springs_packed(nodes%pairs, x(:n_t), y)
+      call self%add_springs(x(:n_t), y)
     end associate
   end subroutine shear_product_packed
 
@@ -292,37 +292,13 @@ contains
     !$omp end parallel do
   end subroutine put_in_plane
 
-  !> Turn displacements into the frames and add the stretch of the springs, under packed tractions.
-  subroutine add_springs_packed(self, runs, along_t, displacement)
-    class(shear_system_t), intent(in) :: self
-    !> Nodes in contact
-    type(paired_runs_t), intent(in) :: runs
-    !> Traction along t at these nodes
-    real(wp), intent(in), contiguous :: along_t(:)
-    !> Components along x and y; then in the frames (2 n)
-    real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to, at
-
-    n = size(displacement)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
-    do k = 1, size(runs%first)
-      from = runs%first(k)
-      to = runs%last(k)
-      at = runs%place(k)
-      call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
-                           along_t(at:at + to - from), displacement(from:to), displacement(n + from:n + to))
-    end do
-    !$omp end parallel do
-  end subroutine add_springs_packed
-
   !> Apply the preconditioner of the shear traction.
-  subroutine shear_precondition_packed(self, nodes, n, r, z, error)
+  subroutine shear_precondition_packed(self, nodes, n, r, z)
     class(shear_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
 
     associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
@@ -366,16 +342,5 @@ contains
       end do
     end associate
   end subroutine sum_behind
-
-  !> Point to memory for a product: that of the operator, if it has some.
-  subroutine shear_image(self, n, own, image, stat)
-    class(shear_system_t), intent(in) :: self
-    integer, intent(in) :: n
-    real(wp), allocatable, target, intent(inout) :: own(:)
-    real(wp), pointer, contiguous, intent(out) :: image(:)
-    integer, intent(out) :: stat
-
-    call self%operators%take_image(2, own, image, stat)
-  end subroutine shear_image
 
 end module hc_shear_system

@@ -208,8 +208,7 @@ contains
       if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
     end do
     !$omp end parallel do
-    call find_punch_pressure(now, nodes, constraints%columns, constraints%mb, error)
-    if (allocated(error)) return
+    call find_punch_pressure(now, nodes, constraints%columns, constraints%mb)
     if (changed) then
       call fit_load(now, nodes, constraints)
       if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
@@ -411,11 +410,10 @@ contains
     end if
     ! the pressure moves what u does not contain yet
     if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
-      call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
+      call now%shear%add_springs(found%unknown(:nodes%pairs%n_first), found%ax)
       call find_rhs(now, nodes, n, rhs, error)
       if (allocated(error)) return
-      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%unknown, error)
-      if (allocated(error)) return
+      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%unknown)
     end if
     call displace(now, nodes, found, error)
     if (allocated(error)) return
@@ -529,11 +527,11 @@ contains
     call now%shear%turn(traction(n + 1:))
     call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], found%ax, error)
     if (allocated(error)) return
-    call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
+    call now%shear%add_springs(found%unknown(:nodes%pairs%n_first), found%ax)
   end subroutine displace
 
   !> Estimate the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
-  subroutine find_punch_pressure(now, nodes, constraint, mb, error)
+  subroutine find_punch_pressure(now, nodes, constraint, mb)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
     !> Nodes in contact
@@ -542,31 +540,26 @@ contains
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> The pressure there (n_active, 1 or 0)
     real(sp), allocatable, intent(out) :: mb(:, :)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: pressure(:), column(:)
-    integer :: k
 
-    allocate (pressure(merge(size(now%p), 0, size(constraint, 2) > 0)), column(size(constraint, 1)))
-    if (.not. allocated(now%punch_pressure)) then
-      call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb, error)
-      if (allocated(error)) return
-      allocate (now%punch_pressure)
-      call new_packed_fields(now%punch_pressure, nodes, size(mb, 2), now%pressure%space)
-      do k = 1, size(mb, 2)
-        call now%pressure%space%fill(pressure, 0.0_wp)
-        column(:) = mb(:, k)
-        call nodes%unpack(column, pressure)
-        call now%punch_pressure%keep(k, pressure)
-      end do
+    if (size(constraint, 2) == 0) then
+      allocate (mb(size(constraint, 1), 0))
       return
     end if
-    allocate (mb(size(constraint, 1), size(constraint, 2)))
-    do k = 1, size(mb, 2)
-      call now%punch_pressure%restore(k, pressure)
+    allocate (pressure(size(now%p)))
+    if (allocated(now%punch_pressure)) then
+      call now%punch_pressure%restore(1, pressure)
+      allocate (column(size(constraint, 1)))
       call nodes%pack(pressure, column)
-      mb(:, k) = real(column, sp)
-    end do
+      mb = reshape(real(column, sp), [size(column), 1])
+      return
+    end if
+    call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb)
+    allocate (now%punch_pressure)
+    call new_packed_fields(now%punch_pressure, nodes, 1, now%pressure%space)
+    call now%pressure%space%fill(pressure, 0.0_wp)
+    call nodes%unpack(real(mb(:, 1), wp), pressure)
+    call now%punch_pressure%keep(1, pressure)
   end subroutine find_punch_pressure
 
   !> Estimate the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
@@ -595,8 +588,7 @@ contains
     known = allocated(now%rigid_traction) .and. .not. afresh
     if (known) known = now%rigid_traction%n_field == size(constraint, 2)
     if (.not. known) then
-      call precondition_constraints(now%shear, nodes, 2*n, constraint, mb, error)
-      if (allocated(error)) return
+      call precondition_constraints(now%shear, nodes, 2*n, constraint, mb)
       if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
       allocate (now%rigid_traction)
       call new_active_set(touching, [now%contact, now%contact], now%shear%space)

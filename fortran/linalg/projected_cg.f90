@@ -98,8 +98,7 @@ contains
         call add_constraints(change, b, r, iteration%residual, space)
         largest = max(largest, iteration%residual)
         if (iteration%residual <= iteration%tolerance .or. iteration%made >= iteration%most) exit
-        call system%precondition_packed(nodes, size(ax), r, z, error)
-        if (allocated(error)) return
+        call system%precondition_packed(nodes, size(ax), r, z)
         call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
         call recurrence%last_share(rz, share, anew)
         call combine(1.0_wp, z, merge(0.0_wp, share, anew), d, space)

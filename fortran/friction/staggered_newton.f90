@@ -186,8 +186,8 @@ contains
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
     real(wp), allocatable :: rhs(:), given(:), unknown(:)
-    real(wp) :: scale, level
-    logical :: by_load, compliant, unknown_gap
+    real(wp) :: scale, level, missing(1)
+    logical :: by_load, compliant, unknown_gap, independent
     integer :: i
 
     options = now%problem%options%newton
@@ -210,7 +210,11 @@ contains
     !$omp end parallel do
     call find_punch_pressure(now, nodes, constraints%columns, constraints%mb)
     if (changed) then
-      call fit_load(now, nodes, constraints)
+      ! the pressure on another contact carries the load
+      if (by_load) then
+        missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()
+        call constraints%satisfy(nodes%space, missing, now%p, independent, nodes)
+      end if
       if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
       call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
@@ -240,22 +244,6 @@ contains
     now%outcome = max(now%outcome, iteration%outcome)
     if (by_load) now%motion(normal) = constraints%multiplier(1)
   end subroutine solve_on_contact
-
-  !> Correct the pressure on another contact so that it carries the prescribed load.
-  subroutine fit_load(now, nodes, constraints)
-    !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
-    !> Nodes in contact
-    type(active_set_t), intent(in) :: nodes
-    !> The load, if it is prescribed
-    type(constraints_t), intent(in) :: constraints
-    real(wp) :: missing(1)
-    logical :: independent
-
-    if (size(constraints%columns, 2) == 0) return
-    missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()
-    call constraints%satisfy(nodes%space, missing, now%p, independent, nodes)
-  end subroutine fit_load
 
   !> Solve for the shear traction under the present pressure, (F10).
   subroutine solve_shear(now, judged, error)
@@ -477,7 +465,8 @@ contains
     now%n_shear = now%n_shear + 1
     if (mod(now%n_shear, now%problem%options%newton%sweeps_per_cut) == 0) call now%cut_parameter(0.5_wp)
     call found%driven%set_motions(found%constraints%multiplier, now%motion)
-    call leave_frames(now, found, rounding)
+    call now%shear%leave_frames(now%q, found%ax, rounding)
+    call move_alloc(found%ax, now%u)
     call now%find_tangential_residual()
     judged = .true.
     if (rounding > now%problem%options%newton%displacement_rounding*found%scale) then
@@ -485,19 +474,6 @@ contains
       call now%refresh(error)
     end if
   end subroutine take_solution
-
-  !> Turn traction and displacement out of the frames.
-  subroutine leave_frames(now, found, rounding)
-    !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
-    !> The solution, whose fields move to the iterate
-    type(shear_solution_t), intent(inout) :: found
-    !> Rounding error of the displacements [m]
-    real(wp), intent(out) :: rounding
-
-    call now%shear%leave_frames(now%q, found%ax, rounding)
-    call move_alloc(found%ax, now%u)
-  end subroutine leave_frames
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.
   subroutine displace(now, nodes, found, error)
@@ -577,7 +553,6 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: touching
-    real(wp), allocatable :: column(:)
     real(wp), allocatable, target :: own(:)
     real(wp), pointer, contiguous :: plane(:)
     integer :: n, k, n_t, stat
@@ -598,7 +573,6 @@ contains
     end if
     if (size(mb, 2) == 0) return
     call now%shear%take_image(2*n, own, plane, stat)
-    if (stat == 0 .and. .not. known) allocate (column(size(mb, 1)), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
     call now%shear%space%agree(error)
     if (allocated(error)) return
@@ -609,8 +583,7 @@ contains
                                              mb(n_t + 1:, k))
       else
         call now%shear%space%fill(plane, 0.0_wp)
-        column(:) = mb(:, k)
-        call now%shear%put_in_plane(nodes%pairs, column(:n_t), column(n_t + 1:), plane)
+        call now%shear%put_in_plane(nodes%pairs, real(mb(:n_t, k), wp), real(mb(n_t + 1:, k), wp), plane)
         call now%rigid_traction%keep(k, plane)
       end if
     end do

@@ -143,6 +143,7 @@ contains
     normal_contact_memory = normal_contact_memory + n*(2*field + 3*half + 2*mark)
   end function normal_contact_memory
 
+  !> Point to the problem on the finest lattice.
   function normal_part(self) result(problem)
     class(normal_contact_t), intent(in), target :: self
     class(normal_problem_t), pointer :: problem

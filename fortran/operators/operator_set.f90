@@ -137,7 +137,7 @@ contains
     if (.not. allocated(error)) call take_off_ahead(self, onto, displacement)
   end subroutine apply_operators
 
-  !> In steady rolling, take tangential displacements at the node ahead off those of each node.
+  !> Take tangential displacements at the node ahead off those of each node, in steady rolling.
   subroutine take_off_ahead(self, components, displacement)
     class(operators_t), intent(in) :: self
     integer, intent(in) :: components(:)

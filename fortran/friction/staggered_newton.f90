@@ -579,11 +579,12 @@ contains
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)
-        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane, mb(:n_t, k), &
-                                             mb(n_t + 1:, k))
+        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane)
+        call nodes%pack(plane, mb(:, k))
       else
         call now%shear%space%fill(plane, 0.0_wp)
-        call now%shear%put_in_plane(nodes%pairs, real(mb(:n_t, k), wp), real(mb(n_t + 1:, k), wp), plane)
+        call nodes%unpack(real(mb(:, k), wp), plane)
+        call now%shear%turn(plane)
         call now%rigid_traction%keep(k, plane)
       end if
     end do

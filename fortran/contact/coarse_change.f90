@@ -158,14 +158,14 @@ contains
     real(wp), intent(in), contiguous :: moved(:, :, :)
     !> Fine ones
     real(wp), intent(inout) :: displacement(:, :, :)
-    real(wp), allocatable :: change(:, :, :)
+    real(wp), allocatable :: change(:, :)
     integer :: m
 
     ! one by one: a window is too large for copies
-    allocate (change(size(displacement, 1), size(displacement, 2), 1))
+    allocate (change(size(displacement, 1), size(displacement, 2)))
     do m = 1, size(displacement, 3)
-      call prolong_displacement(coarse_problem, moved(:, :, m:m), problem, change)
-      displacement(:, :, m) = displacement(:, :, m) + change(:, :, 1)
+      call prolong_field(coarse_problem, moved(:, :, m), problem, change, beyond=.true.)
+      displacement(:, :, m) = displacement(:, :, m) + change
     end do
   end subroutine add_displacement
 

@@ -403,20 +403,24 @@ contains
 
     n = self%n_before
     resultants = 0.0_wp
-    if (allocated(self%rows)) n = size(self%rows, 1)
-    if (allocated(self%source) .and. .not. present(work)) allocate (own(size(x)))
-    vector => null()
-    if (present(work)) vector => work
-    if (allocated(own)) vector => own
-    do m = 1, size(self%mb, 2)
-      if (allocated(self%source)) then
+    if (allocated(self%source)) then
+      if (present(work)) then
+        vector => work
+      else
+        allocate (own(size(x)))
+        vector => own
+      end if
+      do m = 1, size(self%mb, 2)
         call self%source%find(m, vector(n + 1:), vector(:n))
         resultants(m) = space%dot(vector(:n), x(:n)) + space%dot(vector(n + 1:), x(n + 1:), n)
-        cycle
-      end if
-      resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
-      if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
-    end do
+      end do
+    else
+      if (allocated(self%rows)) n = size(self%rows, 1)
+      do m = 1, size(self%mb, 2)
+        resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
+        if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
+      end do
+    end if
     if (allocated(self%of_sum)) resultants(size(resultants)) = space%sum(x(:self%n_before))
   end function resultants
 

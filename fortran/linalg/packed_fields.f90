@@ -58,12 +58,9 @@ contains
     integer, intent(in) :: k
     !> The field
     real(wp), intent(out), contiguous :: field(:)
-    real(wp), allocatable :: packed(:)
 
     call self%space%fill(field, 0.0_wp)
-    allocate (packed(self%nodes%n_active))
-    packed = self%values(:, k)
-    call self%nodes%unpack(packed, field)
+    call self%nodes%unpack(real(self%values(:, k), wp), field)
   end subroutine restore
 
 end module hc_packed_fields

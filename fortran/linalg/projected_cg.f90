@@ -13,7 +13,7 @@ module hc_projected_cg
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
-  use hc_field_space, only: field_space_t
+  use hc_field_space, only: field_space_t, ddot
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, iterations_used_up, &
     solution_broke_off
   implicit none
@@ -23,16 +23,6 @@ module hc_projected_cg
 
   !> Values that one thread treats at a time: few enough to stay in its cache while several passes go over them
   integer, parameter :: block = 1024
-
-  interface
-    !> Compute a scalar product (BLAS)
-    pure real(wp) function ddot(n, dx, incx, dy, incy)
-      import :: wp
-      implicit none
-      integer, intent(in) :: n, incx, incy
-      real(wp), intent(in) :: dx(1 + (n - 1)*abs(incx)), dy(1 + (n - 1)*abs(incy))
-    end function ddot
-  end interface
 
 contains
 

@@ -17,8 +17,7 @@ module hc_friction_iterate
   use hc_pressure_system, only: pressure_system_t
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_linear_system, only: solution_accurate
-  use hc_active_set, only: find_span
-  use hc_packed_fields, only: packed_fields_t
+  use hc_active_set, only: find_span, packed_fields_t
   use hc_field_space, only: field_space_t
   implicit none
   private

@@ -30,8 +30,7 @@ module hc_staggered_newton
   use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
-  use hc_active_set, only: active_set_t, new_active_set
-  use hc_packed_fields, only: new_packed_fields
+  use hc_active_set, only: active_set_t, new_active_set, new_packed_fields
   use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
   use hc_step_equation, only: solve_step_equation
   implicit none
@@ -532,7 +531,7 @@ contains
     end if
     call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb)
     allocate (now%punch_pressure)
-    call new_packed_fields(now%punch_pressure, nodes, 1, now%pressure%space)
+    call new_packed_fields(now%punch_pressure, nodes, 1)
     call now%pressure%space%fill(pressure, 0.0_wp)
     call nodes%unpack(real(mb(:, 1), wp), pressure)
     call now%punch_pressure%keep(1, pressure)
@@ -567,7 +566,7 @@ contains
       if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
       allocate (now%rigid_traction)
       call new_active_set(touching, [now%contact, now%contact], now%shear%space)
-      call new_packed_fields(now%rigid_traction, touching, size(mb, 2), now%shear%space)
+      call new_packed_fields(now%rigid_traction, touching, size(mb, 2))
     else
       allocate (mb(size(constraint, 1), size(constraint, 2)))
     end if

@@ -3,7 +3,7 @@
 !> Equations: docs/theory/normal_contact.md, (N3) to (N5), (N7), (N8).
 module hc_normal_directions
   use hc_precision, only: wp, sp
-  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_projected_cg, only: conjugate_gradient_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_rows, only: residual_row, sum_row, projected_row, direction_row, dot_single
   implicit none
@@ -216,11 +216,10 @@ contains
     type(conjugate_gradient_t), intent(inout) :: recurrence
     real(wp) :: rz, share, sum_z
     real(sp) :: back, mean
-    logical :: anew
     integer :: row, k
 
     call sum_active(now, now%z, sum_z, now%r, rz)
-    call recurrence%last_share(rz, share, anew)
+    call recurrence%last_share(rz, share)
     back = real(share, sp)
     mean = 0.0_sp
     if (now%by_load) mean = real(sum_z/now%punch_sum, sp)

@@ -24,7 +24,7 @@ module hc_normal_lattice_solver
   use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
-  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_projected_cg, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, force_control, normal, sweeps_used_up, &
     no_progress
   use hc_normal_lattice, only: normal_lattice_t

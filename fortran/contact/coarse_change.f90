@@ -13,7 +13,7 @@
 !> Equations: docs/theory/multilevel.md, (M1).
 module hc_coarse_change
   use hc_precision, only: wp, zk
-  use hc_lattice, only: lattice_t, floor_half
+  use hc_hierarchy, only: coarse_rows_t
   use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_transfer, only: prolong, prolong_edge, prolong_shear
@@ -22,16 +22,6 @@ module hc_coarse_change
 
   public :: restrict_state, restricted, balance, add_change, add_displacement, find_displacements, &
             prolong_state, prolong_displacement
-
-  !> Rows of a coarse lattice that the nodes of finer ones between them take their values from.
-  type :: coarse_rows_t
-    !> Lattices of these rows, and of own rows of the finer lattice
-    type(lattice_t) :: rows, fine
-    !> First and last of them
-    integer :: needed(2) = 0
-    !> The coarse lattice is all there, since one rank has both
-    logical :: whole = .true.
-  end type coarse_rows_t
 
 contains
 
@@ -72,59 +62,21 @@ contains
     end do
   end function restricted
 
-  !> Find the rows of a coarse lattice that those of this rank of the finer one take their values from, with the neighbors of
-  !> neighbors.
-  type(coarse_rows_t) function rows_below(coarse_problem, problem) result(below)
-    type(friction_problem_t), intent(in) :: coarse_problem, problem
-    integer, parameter :: neighbors_of_neighbors = 2
-    integer :: own(2)
-
-    below%rows = coarse_problem%lattice
-    below%fine = problem%lattice
-    below%whole = problem%space%ranks%size == 1
-    if (below%whole) return
-    own = problem%space%own_rows(problem%lattice%extent(2))
-    below%fine = problem%rows_of(own(1), own(2))
-    own = problem%lattice%first(2) + own - 1
-    associate (needed => below%needed)
-      needed = [floor_half(own(1)), floor_half(own(2) + 1)] - coarse_problem%lattice%first(2) + 1
-      needed = needed + [-neighbors_of_neighbors, neighbors_of_neighbors]
-      if (.not. coarse_problem%lattice%periodic(2)) needed = min(max(needed, 1), coarse_problem%lattice%extent(2))
-      below%rows = coarse_problem%rows_of(needed(1), needed(2))
-    end associate
-  end function rows_below
-
-  !> Take the rows of a coarse field that those of this rank of the finer lattice take their values from.
-  subroutine take_below(coarse_problem, below, field, rows)
-    type(friction_problem_t), intent(in) :: coarse_problem
-    type(coarse_rows_t), intent(in) :: below
-    !> Field (n_col, own rows of the coarse lattice)
-    real(wp), intent(in), contiguous :: field(:, :)
-    !> Those rows
-    real(wp), allocatable, intent(out) :: rows(:, :)
-
-    allocate (rows(size(field, 1), below%needed(2) - below%needed(1) + 1))
-    call coarse_problem%take_rows(field, below%needed(1), rows)
-  end subroutine take_below
-
   !> Interpolate a field to the nodes of the finer lattice on this rank.
   subroutine prolong_field(coarse_problem, coarse, problem, fine, beyond)
     type(friction_problem_t), intent(in) :: coarse_problem, problem
     !> Field (n_col, own rows of the coarse lattice), and that of the finer one
-    real(wp), intent(in), contiguous :: coarse(:, :)
+    real(wp), intent(in), contiguous, target :: coarse(:, :)
     real(wp), intent(out), contiguous :: fine(:, :)
     !> Beyond the coarse window there are the values at its rim; default: zero
     logical, intent(in), optional :: beyond
     type(coarse_rows_t) :: below
-    real(wp), allocatable :: rows(:, :)
+    real(wp), allocatable, target :: own(:, :)
+    real(wp), pointer, contiguous :: rows(:, :)
 
-    below = rows_below(coarse_problem, problem)
-    if (below%whole) then
-      call prolong(coarse_problem%lattice, coarse, problem%lattice, fine, problem%space, beyond)
-    else
-      call take_below(coarse_problem, below, coarse, rows)
-      call prolong(below%rows, rows, below%fine, fine, problem%space, beyond)
-    end if
+    below = coarse_problem%rows_below(problem)
+    call coarse_problem%take_below(below, coarse, own, rows)
+    call prolong(below%rows, rows, below%fine, fine, problem%space, beyond)
   end subroutine prolong_field
 
   !> Set the coarse problem up so that the present state solves it under the present loads.
@@ -206,14 +158,14 @@ contains
     real(wp), intent(in), contiguous :: moved(:, :, :)
     !> Fine ones
     real(wp), intent(inout) :: displacement(:, :, :)
-    real(wp), allocatable :: change(:, :, :)
+    real(wp), allocatable :: change(:, :)
     integer :: m
 
     ! one by one: a window is too large for copies
-    allocate (change(size(displacement, 1), size(displacement, 2), 1))
+    allocate (change(size(displacement, 1), size(displacement, 2)))
     do m = 1, size(displacement, 3)
-      call prolong_displacement(coarse_problem, moved(:, :, m:m), problem, change)
-      displacement(:, :, m) = displacement(:, :, m) + change(:, :, 1)
+      call prolong_field(coarse_problem, moved(:, :, m), problem, change, beyond=.true.)
+      displacement(:, :, m) = displacement(:, :, m) + change
     end do
   end subroutine add_displacement
 
@@ -254,30 +206,26 @@ contains
   !> Prolong tractions and motions of a coarse state, to start on the finer lattice.
   subroutine prolong_state(coarse_problem, coarse, problem, state)
     type(friction_problem_t), intent(in) :: coarse_problem
-    type(contact_state_t), intent(in) :: coarse
+    type(contact_state_t), intent(in), target :: coarse
     type(friction_problem_t), intent(in) :: problem
     type(contact_state_t), intent(inout) :: state
     type(coarse_rows_t) :: below
-    real(wp), allocatable :: pressure(:, :), traction(:, :, :), rows(:, :)
+    real(wp), allocatable, target :: own(:, :), own_component(:, :)
+    real(wp), allocatable :: traction(:, :, :)
+    real(wp), pointer, contiguous :: pressure(:, :), component(:, :)
     integer :: m
 
     if (any(shape(coarse%pressure) /= coarse_problem%own_extent())) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    below = rows_below(coarse_problem, problem)
-    if (below%whole) then
-      call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
-      call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
-                         state%traction, problem%space)
-    else
-      call take_below(coarse_problem, below, coarse%pressure, pressure)
-      allocate (traction(size(pressure, 1), size(pressure, 2), 2))
-      do m = 1, 2
-        call take_below(coarse_problem, below, coarse%traction(:, :, m), rows)
-        traction(:, :, m) = rows
-      end do
-      call prolong_edge(below%rows, pressure, below%fine, state%pressure, problem%space)
-      call prolong_shear(below%rows, pressure, traction, below%fine, state%pressure, state%traction, problem%space)
-    end if
+    below = coarse_problem%rows_below(problem)
+    call coarse_problem%take_below(below, coarse%pressure, own, pressure)
+    allocate (traction(size(pressure, 1), size(pressure, 2), 2))
+    do m = 1, 2
+      call coarse_problem%take_below(below, coarse%traction(:, :, m), own_component, component)
+      traction(:, :, m) = component
+    end do
+    call prolong_edge(below%rows, pressure, below%fine, state%pressure, problem%space)
+    call prolong_shear(below%rows, pressure, traction, below%fine, state%pressure, state%traction, problem%space)
     state%motion = coarse%motion
   end subroutine prolong_state
 

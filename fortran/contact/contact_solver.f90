@@ -86,6 +86,7 @@ module hc_contact_solver
 
 contains
 
+  !> Point to the normal part of the problem.
   function normal_part(self) result(problem)
     class(friction_solver_t), intent(in), target :: self
     class(normal_problem_t), pointer :: problem

@@ -143,18 +143,8 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    integer :: row
 
-    associate (n => space%own_extent(lattice%extent))
-      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)))
-    end associate
-    !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, size(state%pressure, 2)
-      state%pressure(:, row) = 0.0_wp
-      state%gap(:, row) = 0.0_wp
-      state%zone(:, row) = separated
-    end do
-    !$omp end parallel do
+    call add_fields(state, lattice, space, frictionless=.true.)
   end subroutine new_contact_state
 
   !> Set up a state with friction before the first load: no contact, nothing displaced.
@@ -173,24 +163,29 @@ contains
   end subroutine new_friction_state
 
   !> Give a state the fields that a load step finds: no contact, nothing displaced. Numbers that are known stay.
-  subroutine add_fields(state, lattice, space)
+  subroutine add_fields(state, lattice, space, frictionless)
     !> State without fields
     type(contact_state_t), intent(inout) :: state
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Only those of a frictionless contact; absent: all
+    logical, intent(in), optional :: frictionless
     integer :: row
 
     associate (n => space%own_extent(lattice%extent))
-      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)), state%traction(n(1), n(2), 2), &
-                state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2))
+      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)))
+      if (.not. present(frictionless)) then
+        allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2))
+      end if
     end associate
     !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, size(state%pressure, 2)
       state%pressure(:, row) = 0.0_wp
       state%gap(:, row) = 0.0_wp
       state%zone(:, row) = separated
+      if (.not. allocated(state%traction)) cycle
       state%traction(:, row, :) = 0.0_wp
       state%relative_displacement(:, row, :) = 0.0_wp
       state%slip_increment(:, row, :) = 0.0_wp

@@ -46,6 +46,8 @@ module hc_normal_problem
     procedure :: find_contact, linearize
     !> Nodes that the undeformed bodies overlap on
     procedure :: first_guess
+    !> Gap from its closing by the pressure
+    procedure :: open_gap
     !> Zones, load and residuals of a state whose pressure and gap are known
     procedure :: complete_pressed
     !> Return whether there is contact at the rim of the window
@@ -271,6 +273,22 @@ contains
     low = minval(h, mask=candidate)
     active = candidate .and. h <= low + edge_share*(overlap - low)
   end function first_guess
+
+  !> Compute the gap h + w - approach in the place of the closing w.
+  subroutine open_gap(self, approach, gap)
+    class(normal_problem_t), intent(in) :: self
+    !> Approach [m]
+    real(wp), intent(in) :: approach
+    !> Closing of the gap; then the gap (n_col, own rows) [m]
+    real(wp), intent(inout), contiguous :: gap(:, :)
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do row = 1, size(gap, 2)
+      gap(:, row) = self%initial_gap(:, row) + gap(:, row) - approach
+    end do
+    !$omp end parallel do
+  end subroutine open_gap
 
   !> Compute zones, load and residuals of a state whose pressure and gap are known.
   subroutine complete_pressed(self, target, tolerance, state, error)

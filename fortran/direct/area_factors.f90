@@ -107,11 +107,14 @@ contains
       new = pack(area%contact, self%row(area%contact) == 0)
       if (size(new) > 0) call add_rows(self, flexibility, unit, new, info, error)
     else
+      call self%clear()
       self%n_core = count(area%is_core)
       is_here(pack(area%stuck, area%is_core)) = .false.
       new = [pack(area%stuck, area%is_core), pack(area%contact, is_here(area%contact))]
       is_here(area%contact) = .true.
-      call clear_rows(self, size(is_here))
+      self%order = [integer ::]
+      if (allocated(self%row)) deallocate (self%row)
+      allocate (self%row(size(is_here)), source=0)
       call add_rows(self, flexibility, unit, new, info, error)
     end if
     if (allocated(error)) return
@@ -146,18 +149,6 @@ contains
     is_kept = count(self%row(stuck) > 0 .and. self%row(stuck) <= self%n_core) == self%n_core .and. &
               count(self%row(contact) == 0) + count(.not. is_here(self%order)) <= most_exchanged*n
   end function is_kept
-
-  !> Delete all rows.
-  subroutine clear_rows(self, n_window)
-    type(area_factors_t), intent(inout) :: self
-    !> Nodes of the window
-    integer, intent(in) :: n_window
-
-    self%order = [integer ::]
-    if (allocated(self%behind)) deallocate (self%behind)
-    if (allocated(self%row)) deallocate (self%row)
-    allocate (self%row(n_window), source=0)
-  end subroutine clear_rows
 
   !> Add the rows of some nodes to L, and to S.
   subroutine add_rows(self, flexibility, unit, new, info, error)

@@ -9,13 +9,12 @@
 module hc_area_system
   use hc_precision, only: wp, lk
   use hc_error, only: error_t
-  use hc_flexibility, only: flexibility_t, normal, along_x
-  use hc_contact_problem, only: friction_problem_t
+  use hc_flexibility, only: normal, along_x
   use hc_load_constraints, only: driven_motions_t
   use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, precondition_constraints, solution_accurate
   use hc_projected_gmres, only: projected_gmres
-  use hc_area_factors, only: area_factors_t
+  use hc_direct_iterate, only: direct_iterate_t
   implicit none
   private
 
@@ -41,11 +40,7 @@ module hc_area_system
 
   !> The matrix of an area and its factors.
   type, extends(linear_system_t) :: area_system_t
-    !> The contact problem
-    type(friction_problem_t), pointer :: problem => null()
-    !> Products over the window
-    class(flexibility_t), pointer :: operator => null()
-    type(area_factors_t), pointer :: factors => null()
+    type(direct_iterate_t), pointer :: it => null()
     type(area_t), pointer :: area => null()
   contains
     procedure :: product
@@ -55,15 +50,9 @@ module hc_area_system
 contains
 
   !> Solve for the unknowns of an area and the changes of the driven motions, from a start.
-  subroutine solve_with_factors(problem, operator, factors, accuracy, area, solved, error)
-    !> The contact problem
-    type(friction_problem_t), intent(in), target :: problem
-    !> Products over the window
-    class(flexibility_t), intent(inout), target :: operator
-    !> Factors of the area
-    type(area_factors_t), intent(in), target :: factors
-    !> Residual that may be left, relative to the largest pressure or traction
-    real(wp), intent(in) :: accuracy
+  subroutine solve_with_factors(it, area, solved, error)
+    !> Iterate, with the factors of the area
+    type(direct_iterate_t), intent(in), target :: it
     !> The area; its unknowns at the present motions are on entry a start
     type(area_t), intent(inout), target :: area
     !> False: the loads do not determine the motions, or too many directions would be needed; the unknowns mean nothing then
@@ -80,9 +69,7 @@ contains
     integer :: k, n
 
     n = size(area%node)
-    system%problem => problem
-    system%operator => operator
-    system%factors => factors
+    system%it => it
     system%area => area
     allocate (area%change(size(area%load)), source=0.0_wp)
     associate (x => area%unknown(:, 0))
@@ -93,8 +80,7 @@ contains
       allocate (constraints%multiplier(size(determined)), source=0.0_wp)
       allocate (ax(n))
       call new_active_set(nodes, spread(.true._lk, 1, n), system%space)
-      call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb, error)
-      if (allocated(error)) return
+      call precondition_constraints(system, nodes, n, constraints%columns, constraints%mb)
       call constraints%satisfy(system%space, area%load(determined) - matmul(x, constraints%rows), x, solved)
       if (.not. solved) return
       call system%product(x, ax, error)
@@ -104,11 +90,10 @@ contains
       largest = maxval(abs(x), mask=abs(area%weight(normal, :)) > 0.0_wp)
       if (.not. largest > 0.0_wp) largest = maxval(abs(right))
       scale = largest
-      if (problem%friction%is_bounded()) then
-        if (problem%friction%resists()) scale = min(scale, problem%friction%largest_bound(largest))
-      end if
-      iteration = iteration_t(tolerance=accuracy*scale*real(n, wp)**0.25_wp, most=problem%options%direct%max_directions, &
-                              most_directions=problem%options%direct%max_directions)
+      associate (friction => it%problem%friction, most => it%problem%options%direct%max_directions)
+        if (friction%is_bounded() .and. friction%resists()) scale = min(scale, friction%largest_bound(largest))
+        iteration = iteration_t(tolerance=it%accuracy*scale*real(n, wp)**0.25_wp, most=most, most_directions=most)
+      end associate
       iteration%weight = [1.0_wp]
       call projected_gmres(system, nodes, constraints, right, x, ax, iteration, error)
       if (allocated(error)) return
@@ -117,6 +102,7 @@ contains
     area%change(determined) = constraints%multiplier
   end subroutine solve_with_factors
 
+  !> Multiply by the matrix of (F7).
   subroutine product(self, x, y, error)
     class(area_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
@@ -126,7 +112,7 @@ contains
     real(wp), pointer, contiguous :: f(:, :), u(:, :)
     integer :: k
 
-    associate (n => self%problem%lattice%extent)
+    associate (n => self%it%problem%lattice%extent)
       allocate (field(n(1), n(2), 3), moved(n(1), n(2), 3))
     end associate
     f(1:size(field)/3, 1:3) => field
@@ -135,22 +121,23 @@ contains
     do k = 1, size(x)
       f(self%area%node(k), :) = f(self%area%node(k), :) + x(k)*self%area%traction(:, k)
     end do
-    call self%problem%displacements(self%operator, field(:, :, normal), field(:, :, along_x:), moved, error)
+    call self%it%problem%displacements(self%it%operator, field(:, :, normal), field(:, :, along_x:), moved, error)
     if (allocated(error)) return
     do k = 1, size(x)
-      y(k) = dot_product(self%area%weight(:, k), u(self%area%node(k), :))/self%problem%normal_compliance + self%area%spring(k)*x(k)
+      y(k) = dot_product(self%area%weight(:, k), u(self%area%node(k), :))/self%it%problem%normal_compliance &
+             + self%area%spring(k)*x(k)
     end do
   end subroutine product
 
-  subroutine precondition_packed(self, nodes, n, r, z, error)
+  !> Apply the factors.
+  subroutine precondition_packed(self, nodes, n, r, z)
     class(area_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
 
-    call self%factors%apply(r, z)
+    call self%it%factors%apply(r, z)
   end subroutine precondition_packed
 
 end module hc_area_system

@@ -56,7 +56,7 @@ module hc_direct_contact
 
 contains
 
-  !> Flexibility of a problem.
+  !> Set up a problem with its flexibility.
   subroutine new_direct_contact(self, lattice, medium, initial_gap, candidate, error, options, law)
     !> Problem to be set up
     type(direct_contact_t), intent(out) :: self
@@ -81,6 +81,7 @@ contains
     call new_dense_flexibility(self%flexibility, lattice, medium, error)
   end subroutine new_direct_contact
 
+  !> Solve a load step, of which the normal load or the approach matters, from the contact area of the start.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
@@ -90,18 +91,17 @@ contains
     integer, intent(in) :: max_sweeps
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
-    logical :: again
+    logical, allocatable :: nodes(:, :)
 
-    again = allocated(start%pressure)
-    if (again) again = any(start%pressure > 0.0_wp)
-    if (again) then
-      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
-                      start%pressure > 0.0_wp)
-    else
-      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+    if (allocated(start%pressure)) nodes = start%pressure > 0.0_wp
+    if (allocated(nodes)) then
+      if (.not. any(nodes)) deallocate (nodes)
     end if
+    ! not allocated: absent
+    call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, nodes)
   end subroutine solve_step
 
+  !> Point to the problem.
   function normal_part(self) result(problem)
     class(direct_contact_t), intent(in), target :: self
     class(normal_problem_t), pointer :: problem

@@ -27,8 +27,7 @@ module hc_direct_friction
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: exchange
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, classify, enter, is_unsupported, &
-    linearize_law, evaluate, record
+  use hc_direct_iterate, only: direct_iterate_t, infinite
   use hc_dissertation_iteration, only: iterate_as_written
   use hc_direct_system, only: solve_area
   implicit none
@@ -55,7 +54,7 @@ module hc_direct_friction
 
 contains
 
-  !> Flexibility of a problem.
+  !> Set up the flexibility of a problem.
   subroutine new_direct_friction(self, problem, error)
     !> Solver to be set up
     type(direct_friction_t), intent(out) :: self
@@ -70,6 +69,7 @@ contains
     call new_fft_flexibility(self%operator, problem%lattice, problem%medium, error, space=problem%space)
   end subroutine new_direct_friction
 
+  !> Compute the displacements of given tractions.
   subroutine displacements(self, pressure, traction, displacement, error)
     class(direct_friction_t), intent(inout) :: self
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
@@ -90,6 +90,7 @@ contains
     end if
   end subroutine set_gap
 
+  !> Solve a load step: from the change that a coarser lattice finds, then from the old state.
   recursive subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
@@ -101,6 +102,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t) :: guess
     type(load_step_t) :: step
+    type(direct_iterate_t) :: it
     real(wp) :: work
     integer :: sweeps
     logical :: guessed
@@ -112,7 +114,8 @@ contains
     end if
     step = load_step_t(target, reference, tolerance, max_sweeps)
     if (self%problem%options%direct%as_written) then
-      call iterate_as_written(self%problem, self%flexibility, self%operator, self%factors, start, step, state, error)
+      call take_problem(self, it)
+      call iterate_as_written(it, start, step, state, error)
       return
     end if
     call find_start(self, start, step, guess, guessed, work, error)
@@ -234,6 +237,18 @@ contains
     if (.not. allocated(error)) call move_alloc(coarser, self%coarser)
   end subroutine set_up_coarser
 
+  !> Give an iterate the problem with its flexibility.
+  subroutine take_problem(self, it)
+    class(direct_friction_t), intent(inout), target :: self
+    !> Iterate
+    type(direct_iterate_t), intent(inout) :: it
+
+    it%problem => self%problem
+    it%flexibility => self%flexibility
+    it%operator => self%operator
+    it%factors => self%factors
+  end subroutine take_problem
+
   !> Iterate from a state until the residuals are within the tolerance.
   subroutine iterate(self, start, is_near, step, state, error)
     class(direct_friction_t), intent(inout), target :: self
@@ -251,17 +266,15 @@ contains
     integer :: sweep, unsupported
 
     options = self%problem%options%direct
-    ! with rows of the step before, the last bits would depend on whether the run was interrupted
-    call self%factors%clear()
     call new_friction_state(state, self%problem%lattice)
-    self%operator%applications = 0.0_wp
-    call new_direct_iterate(it, self%problem, start, step)
+    call take_problem(self, it)
+    call it%begin(start, step)
     it%accuracy = options%first_accuracy
 
     if (any(start%pressure > 0.0_wp)) then
-      call continue_from(self, start, is_near, it, error)
+      call continue_from(start, is_near, it, error)
     else
-      call set_start(self, step%target, it, error)
+      call set_start(it, error)
     end if
     unsupported = 0
     share = 1.0_wp
@@ -269,20 +282,20 @@ contains
       if (allocated(error)) return
       before = it
       ! with wrong zones of stick and slip, full convergence of the contact area costs more than it saves
-      call find_area(self, step%target, merge(1, sweep, is_near), it, error)
+      call find_area(merge(1, sweep, is_near), it, error)
       if (allocated(error)) return
-      if (is_unsupported(self%problem, it)) then
+      if (it%is_unsupported()) then
         unsupported = unsupported + 1
         if (unsupported < options%max_unsupported .and. any(it%zone == slip)) then
           before%solves = it%solves
           it = before
           share = options%cautious_share*share
           call fix_in_stick(self%problem%space, self%problem%options%contact%fixed_share, it%compliance, it%zone)
-          call find_area(self, step%target, sweep, it, error)
+          call find_area(sweep, it, error)
           if (allocated(error)) return
         end if
       end if
-      call record(self%problem, self%operator, step, it, state, error)
+      call it%record(step, state, error)
       if (allocated(error) .or. state%converged) exit
       it%accuracy = min(it%accuracy, max(options%last_accuracy*step%tolerance, options%inner_accuracy* &
                                          max(state%residual_normal, state%residual_tangential)))
@@ -291,16 +304,13 @@ contains
         if (state%sliding .or. unsupported == options%max_unsupported) exit
       end if
       if (mod(sweep, options%sweeps_per_cut) == 0) share = 0.5_wp*share
-      call classify(self%problem, share, it)
+      call it%classify(share)
     end do
     if (state%sliding) state%stopped = loads_not_carried
   end subroutine iterate
 
-  !> First contact: without shear traction, and then against the slip that its pressure causes.
-  subroutine set_start(self, target, it, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
+  !> Find a first contact: without shear traction, and then against the slip that its pressure causes.
+  subroutine set_start(it, error)
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
@@ -308,27 +318,26 @@ contains
     real(wp) :: weight(size(it%p)), mean
     integer :: i
 
-    it%contact = self%problem%first_guess(target)
+    it%contact = it%problem%first_guess(it%target)
     where (it%contact)
       it%zone = slip
       it%compliance = infinite
     end where
-    call find_area(self, target, self%problem%options%direct%first_areas, it, error)
+    call find_area(it%problem%options%direct%first_areas, it, error)
     if (allocated(error)) return
     ! shifts that are free follow the bodies
     weight = max(it%p, 0.0_wp)/max(sum(max(it%p, 0.0_wp)), tiny(1.0_wp))
     do i = 1, 2
-      if (target%control(1 + i) /= force_control) cycle
+      if (it%target%control(1 + i) /= force_control) cycle
       mean = sum(weight*it%ds(:, i))
       it%motion(1 + i) = it%motion(1 + i) + mean
       it%ds(:, i) = it%ds(:, i) - mean
     end do
-    call classify(self%problem, self%problem%options%direct%cautious_share, it)
+    call it%classify(it%problem%options%direct%cautious_share)
   end subroutine set_start
 
-  !> Tractions, and contact with a ring around it, of the state to start from.
-  subroutine continue_from(self, start, is_near, it, error)
-    class(direct_friction_t), intent(inout) :: self
+  !> Take tractions, and contact with a ring around it, of the state to start from.
+  subroutine continue_from(start, is_near, it, error)
     !> State to start from
     type(contact_state_t), intent(in) :: start
     !> Its contact area needs no ring around it
@@ -341,20 +350,17 @@ contains
 
     n = size(it%p)
     it%contact = reshape(start%pressure > 0.0_wp, [n])
-    if (.not. is_near) it%contact = reshape(self%problem%lattice%dilated(start%pressure > 0.0_wp), [n])
+    if (.not. is_near) it%contact = reshape(it%problem%lattice%dilated(start%pressure > 0.0_wp), [n])
     it%contact = it%candidate .and. it%contact
     if (.not. any(it%contact)) it%contact = it%candidate
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
     it%q = reshape(start%traction, [n, 2])
-    call evaluate(self%problem, self%operator, it, error)
-    if (.not. allocated(error)) call classify(self%problem, self%problem%options%direct%cautious_share, it)
+    call it%evaluate(error)
+    if (.not. allocated(error)) call it%classify(it%problem%options%direct%cautious_share)
   end subroutine continue_from
 
-  !> Contact area under a frozen state of stick and slip, and its tractions.
-  subroutine find_area(self, target, max_tries, it, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
+  !> Find the contact area under a frozen state of stick and slip, and its tractions.
+  subroutine find_area(max_tries, it, error)
     !> Areas that may be tried
     integer, intent(in) :: max_tries
     !> Iterate
@@ -366,28 +372,29 @@ contains
     integer :: i, fewest, left, try
 
     fewest = huge(1)
-    left = self%problem%options%direct%stalled_exchanges
-    do try = 1, max_tries
-      if (self%problem%normal_law%is_compliant() .and. any(abs(it%p) > 0.0_wp)) call linearize_law(self%problem, it)
-      call solve_area(self%problem, self%flexibility, self%operator, self%factors, target, it, error)
-      if (allocated(error)) return
-      if (self%problem%normal_law%is_compliant()) then
-        violation = 0.0_wp
-        call self%problem%normal_law%violation(1, self%problem%normal_compliance, it%p, it%gap, logical(it%candidate), violation)
-        if (violation <= self%problem%options%direct%settled_spring*maxval(it%p)) return
-        cycle
-      end if
-      negligible = max(self%problem%options%direct%pressure_rounding, it%accuracy)*maxval(it%p)
-      wrong = merge(it%p < -negligible, &
-                    it%candidate .and. it%gap < -negligible*self%problem%normal_compliance, it%contact)
-      if (.not. any(wrong)) return
-      before = it%contact
-      call exchange(wrong, self%problem%options%direct%stalled_exchanges, fewest, left, it%contact)
-      if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
-      do i = 1, size(it%p)
-        if (it%contact(i) .and. .not. before(i)) call enter(self%problem, it, i)
+    associate (problem => it%problem, options => it%problem%options%direct)
+      left = options%stalled_exchanges
+      do try = 1, max_tries
+        if (problem%normal_law%is_compliant() .and. any(abs(it%p) > 0.0_wp)) call it%linearize_law()
+        call solve_area(it, error)
+        if (allocated(error)) return
+        if (problem%normal_law%is_compliant()) then
+          violation = 0.0_wp
+          call problem%normal_law%violation(1, problem%normal_compliance, it%p, it%gap, logical(it%candidate), violation)
+          if (violation <= options%settled_spring*maxval(it%p)) return
+          cycle
+        end if
+        negligible = it%negligible_pressure()
+        wrong = merge(it%p < -negligible, it%candidate .and. it%gap < -negligible*problem%normal_compliance, it%contact)
+        if (.not. any(wrong)) return
+        before = it%contact
+        call exchange(wrong, options%stalled_exchanges, fewest, left, it%contact)
+        if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
+        do i = 1, size(it%p)
+          if (it%contact(i) .and. .not. before(i)) call it%enter(i)
+        end do
       end do
-    end do
+    end associate
   end subroutine find_area
 
 end module hc_direct_friction

@@ -20,15 +20,11 @@
 module hc_dissertation_iteration
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_flexibility, only: flexibility_t
-  use hc_flexibility_dense, only: dense_flexibility_t
-  use hc_contact_state, only: contact_state_t, load_target_t, load_step_t, new_friction_state, stick, slip, normal, no_progress, &
+  use hc_contact_state, only: contact_state_t, load_step_t, new_friction_state, stick, slip, normal, no_progress, &
     sweeps_used_up, loads_not_carried
   use hc_normal_problem, only: nearest_nodes
-  use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
-  use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, record
+  use hc_direct_iterate, only: direct_iterate_t, infinite
   use hc_direct_system, only: solve_area
   implicit none
   private
@@ -45,14 +41,9 @@ module hc_dissertation_iteration
 contains
 
   !> Iterate from a state until the residuals are within the tolerance or nothing new comes.
-  subroutine iterate_as_written(problem, flexibility, operator, factors, start, step, state, error)
-    !> The contact problem
-    type(friction_problem_t), intent(in) :: problem
-    !> Its flexibility: coefficients, and products
-    type(dense_flexibility_t), intent(in) :: flexibility
-    class(flexibility_t), intent(inout) :: operator
-    !> Factors of the last area
-    type(area_factors_t), intent(inout) :: factors
+  subroutine iterate_as_written(it, start, step, state, error)
+    !> Iterate, with its problem and flexibility
+    type(direct_iterate_t), intent(inout) :: it
     !> State to start from
     type(contact_state_t), intent(in) :: start
     !> The load step
@@ -61,58 +52,46 @@ contains
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    type(direct_iterate_t) :: it
     type(arrangements_t) :: before
     logical :: changed, repeated, first
     integer :: sweep
 
-    call factors%clear()
-    call new_friction_state(state, problem%lattice)
-    operator%applications = 0.0_wp
-    call new_direct_iterate(it, problem, start, step)
-    it%accuracy = problem%options%direct%last_accuracy*step%tolerance
+    call new_friction_state(state, it%problem%lattice)
+    call it%begin(start, step)
+    it%accuracy = it%problem%options%direct%last_accuracy*step%tolerance
     first = .not. any(start%pressure > 0.0_wp)
     if (.not. first) then
       it%contact = it%candidate .and. reshape(start%pressure > 0.0_wp, [size(it%p)])
       it%p = reshape(start%pressure, [size(it%p)])
       it%q = reshape(start%traction, [size(it%p), 2])
     else
-      it%contact = problem%first_guess(step%target)
+      it%contact = it%problem%first_guess(step%target)
     end if
     if (.not. any(it%contact)) it%contact = it%candidate
     where (it%contact) it%zone = stick
-    if (.not. first) call partition(problem, it, changed)
+    if (.not. first) call partition(it, changed)
     allocate (before%sums(2, 0))
     do sweep = 1, step%max_sweeps
       call before%add(it, repeated)
-      call find_area(problem, flexibility, operator, factors, step%target, first, it, error)
+      call find_area(first, it, error)
       if (allocated(error)) return
-      call record(problem, operator, step, it, state, error)
+      call it%record(step, state, error)
       if (allocated(error) .or. state%converged) return
       state%stopped = no_progress
       if (repeated) return
       if (.not. it%carried) then
-        state%sliding = overloads(problem, step%target, state%pressure, state%residual_normal)
+        state%sliding = overloads(it%problem, step%target, state%pressure, state%residual_normal)
         if (state%sliding) state%stopped = loads_not_carried
         return
       end if
-      call partition(problem, it, changed)
+      call partition(it, changed)
       if (.not. changed) return
     end do
     state%stopped = sweeps_used_up
   end subroutine iterate_as_written
 
-  !> Inner loop: the contact area under frozen zones.
-  subroutine find_area(problem, flexibility, operator, factors, target, shrinks, it, error)
-    !> The contact problem
-    type(friction_problem_t), intent(in) :: problem
-    !> Its flexibility: coefficients, and products
-    type(dense_flexibility_t), intent(in) :: flexibility
-    class(flexibility_t), intent(inout) :: operator
-    !> Factors of the last area
-    type(area_factors_t), intent(inout) :: factors
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
+  !> Find the contact area under frozen zones: the inner loop.
+  subroutine find_area(shrinks, it, error)
     !> Nodes leave the area only
     logical, intent(in) :: shrinks
     !> Iterate
@@ -128,18 +107,18 @@ contains
     do
       call before%add(it, repeated)
       if (repeated) return
-      call solve_area(problem, flexibility, operator, factors, target, it, error)
+      call solve_area(it, error)
       if (allocated(error)) return
-      negligible = max(problem%options%direct%pressure_rounding, it%accuracy)*maxval(it%p)
+      negligible = it%negligible_pressure()
       tension = it%contact .and. it%p < -negligible
       if (any(tension)) then
         it%contact = it%contact .and. .not. tension
         if (.not. any(it%contact)) it%contact = nearest_nodes(it%gap, it%candidate)
       else if (shrinks) then
         return
-      else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then
+      else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*it%problem%normal_compliance)) then
         wider = it%candidate &
-                .and. reshape(problem%lattice%dilated(logical(reshape(it%contact, problem%lattice%extent))), [size(it%p)])
+                .and. reshape(it%problem%lattice%dilated(logical(reshape(it%contact, it%problem%lattice%extent))), [size(it%p)])
         where (wider .and. .not. it%contact) it%zone = stick
         it%contact = wider
       else
@@ -148,10 +127,8 @@ contains
     end do
   end subroutine find_area
 
-  !> Stick or slip at every node in contact, from the last tractions and the last slip.
-  subroutine partition(problem, it, changed)
-    !> The contact problem
-    type(friction_problem_t), intent(in) :: problem
+  !> Find stick or slip at every node in contact, from the last tractions and the last slip.
+  subroutine partition(it, changed)
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Some zone or direction is another one
@@ -161,10 +138,10 @@ contains
     integer :: i, k
 
     changed = .false.
-    if (.not. problem%friction%is_bounded()) return
-    call problem%friction%find_bounds(1, it%p, bound)
-    call problem%friction%find_lengths(it%q(:, 1), it%q(:, 2), length)
-    negligible = problem%options%direct%negligible_slip*problem%tangential_compliance*maxval(it%p)
+    if (.not. it%problem%friction%is_bounded()) return
+    call it%problem%friction%find_bounds(1, it%p, bound)
+    call it%problem%friction%find_lengths(it%q(:, 1), it%q(:, 2), length)
+    negligible = it%problem%options%direct%negligible_slip*it%problem%tangential_compliance*maxval(it%p)
     do i = 1, size(it%p)
       if (.not. it%contact(i)) cycle
       if (it%zone(i) == stick) then

@@ -260,28 +260,24 @@ contains
     type(friction_iterate_t), intent(in) :: now
     !> In the frames; on the nodes in contact (2 n)
     real(wp), intent(inout), contiguous :: frame(:)
-    real(wp), dimension(now%problem%lattice%extent(1)) :: along, across
     real(wp) :: motion(n_motion)
-    integer :: n, k, from, to, i, m, at
+    integer :: n, k, from, to
 
     n = size(now%contact)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    associate (nodes => now%shear%nodes, n_col => size(along))
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, i, m, at)
+    associate (nodes => now%shear%nodes, n_col => now%problem%lattice%extent(1))
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
       do k = 1, size(nodes%first)
         from = nodes%first(k)
         to = nodes%last(k)
-        at = nodes%place(k)
-        m = to - from + 1
-        call now%problem%rigid_displacement_row(motion, (from - 1)/n_col + 1, along(:m), across(:m), modulo(from - 1, n_col) + 1)
-        do i = 1, m
-          along(i) = along(i) + now%origin(from + i - 1)
-          across(i) = across(i) + now%origin(n + from + i - 1)
-        end do
-        call plane_row(m, now%shear%direction(:, at:at + m - 1), along, across, frame(from:to), frame(n + from:n + to))
+        call now%problem%rigid_displacement_row(motion, (from - 1)/n_col + 1, frame(from:to), frame(n + from:n + to), &
+                                                modulo(from - 1, n_col) + 1)
+        frame(from:to) = frame(from:to) + now%origin(from:to)
+        frame(n + from:n + to) = frame(n + from:n + to) + now%origin(n + from:n + to)
       end do
       !$omp end parallel do
     end associate
+    call now%shear%turn(frame)
   end subroutine find_prescribed_displacement
 
 end module hc_active_zones

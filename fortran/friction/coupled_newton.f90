@@ -227,8 +227,7 @@ contains
       missing = [missing, now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()]
       c%multiplier = [c%multiplier, now%motion(normal)]
       allocate (ones(pressed%n_active, 1), source=1.0_wp)
-      call find_punch_pressure(now, pressed, ones, punch, error)
-      if (allocated(error)) return
+      call find_punch_pressure(now, pressed, ones, punch)
       c%of_sum = punch(:, 1)
     end associate
   end subroutine constrain
@@ -301,8 +300,7 @@ contains
         call step%nodes%pack(step%x, unknown)
         call find_rhs(now, step, rhs, error)
         if (allocated(error)) return
-        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, unknown, error)
-        if (allocated(error)) return
+        call step_ahead(system, step%nodes, step%constraints, rhs, step%ax, options%length_ahead, unknown)
         call step%nodes%unpack(unknown, step%x)
         deallocate (unknown)
       end if

@@ -17,8 +17,7 @@ module hc_friction_iterate
   use hc_pressure_system, only: pressure_system_t
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_linear_system, only: solution_accurate
-  use hc_active_set, only: find_span
-  use hc_packed_fields, only: packed_fields_t
+  use hc_active_set, only: find_span, packed_fields_t
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -112,21 +111,13 @@ contains
 
   !> Sum the pressure over the window, row by row.
   real(wp) function pressure_sum(self)
-    class(friction_iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in), target :: self
+    real(wp), pointer, contiguous :: p(:, :)
 
-    pressure_sum = over_window(self%problem%own_extent(), self%p)
-
-  contains
-
-    !> Sum a vector over all nodes.
-    real(wp) function over_window(n, p)
-      !> Columns and own rows of the window
-      integer, intent(in) :: n(2)
-      real(wp), intent(in) :: p(n(1), n(2))
-
-      over_window = self%operators%space%sum(p)
-    end function over_window
-
+    associate (n => self%problem%own_extent())
+      p(1:n(1), 1:n(2)) => self%p
+    end associate
+    pressure_sum = self%operators%space%sum(p)
   end function pressure_sum
 
   !> Set tractions and motions from those of a state, and compute the displacements.
@@ -137,7 +128,7 @@ contains
     !> Operator and preconditioners over its window
     type(operators_t), intent(inout), target :: operators
     !> State to start from, whose tractions are freed
-    type(contact_state_t), intent(inout) :: start
+    type(contact_state_t), intent(inout), target :: start
     !> The load step, whose reference is not copied
     type(load_step_t), intent(in) :: step
     !> Allocated on failure
@@ -145,20 +136,14 @@ contains
     !> w, u_x, u_y of the start but for an error of interpolation (n_col, n_row, 3), if known; freed [m]
     real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
     type(driven_motions_t) :: driven
-    integer :: n, row, from, to
+    real(wp), pointer, contiguous :: pressure(:), traction(:)
 
     call set_problem(self, problem, operators, step)
-    n = size(self%p)
-    !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
-    do row = 1, size(start%pressure, 2)
-      to = row*problem%lattice%extent(1)
-      from = to - problem%lattice%extent(1) + 1
-      self%p(from:to) = start%pressure(:, row)
-      self%q(from:to) = start%traction(:, row, 1)
-      self%q(n + from:n + to) = start%traction(:, row, 2)
-      self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
-    end do
-    !$omp end parallel do
+    pressure(1:size(start%pressure)) => start%pressure
+    traction(1:size(start%traction)) => start%traction
+    call operators%space%copy(pressure, self%p)
+    call operators%space%copy(traction, self%q)
+    self%contact = self%p > 0.0_wp .and. self%candidate
     deallocate (start%pressure, start%traction)
     self%motion = merge(start%motion, step%target%value, step%target%control == force_control)
     if (operators%space%count(self%contact) > 0) then
@@ -229,10 +214,11 @@ contains
   subroutine take_estimate(self, estimate, error)
     class(friction_iterate_t), intent(inout) :: self
     !> w, u_x, u_y (n_col, n_row, 3) [m]
-    real(wp), intent(in), contiguous :: estimate(:, :, :)
+    real(wp), intent(in), contiguous, target :: estimate(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: n, row, from, to
+    real(wp), pointer, contiguous :: moved(:)
+    integer :: n
 
     n = size(self%p)
     call allocate_displacements(self)
@@ -240,16 +226,10 @@ contains
       call self%operators%apply([along_x, along_y], self%q, [normal], self%closing, error)
       if (allocated(error)) return
     end if
-    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
-    do row = 1, size(estimate, 2)
-      to = row*size(estimate, 1)
-      from = to - size(estimate, 1) + 1
-      self%w(from:to) = estimate(:, row, 1)
-      if (self%pressure_feels_shear) self%w(from:to) = self%w(from:to) - self%closing(from:to)
-      self%u(from:to) = estimate(:, row, 2)
-      self%u(n + from:n + to) = estimate(:, row, 3)
-    end do
-    !$omp end parallel do
+    moved(1:3*n) => estimate
+    call self%operators%space%copy(moved(:n), self%w)
+    if (self%pressure_feels_shear) self%w = self%w - self%closing
+    call self%operators%space%copy(moved(n + 1:), self%u)
   end subroutine take_estimate
 
   !> Compute the displacements of the present tractions anew.

@@ -14,13 +14,12 @@ module hc_frictional_contact
   use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count
   use hc_flexibility, only: check_operator
-  use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, load_step_t
+  use hc_contact_state, only: contact_state_t, copy_tractions, load_target_t, load_step_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_operator_set, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: prolong_state, prolong_displacement, restricted
-  use hc_fas_predictor, only: predict
+  use hc_fas_predictor, only: predict, find_first
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
@@ -230,7 +229,7 @@ contains
         call predict(self%problem, self%coarse, self%operators(2:), start, step, guess, error, estimate)
         guessed = guess%converged
       else
-        call coarse_guess(self, step, guess, estimate, error)
+        call find_first(self%problem, self%coarse, self%operators(2:), step, guess, error, estimate)
         guessed = .not. allocated(error)
         if (guessed) guessed = self%problem%space%max(guess%pressure) > 0.0_wp
       end if
@@ -267,78 +266,5 @@ contains
     end subroutine attempt
 
   end subroutine solve_step
-
-  !> Find a first guess on the coarser lattices.
-  subroutine coarse_guess(self, step, guess, estimate, error)
-    class(frictional_contact_t), intent(inout), target :: self
-    !> The load step
-    type(load_step_t), intent(in) :: step
-    !> On entry a state without contact, on return one to start from, with the work in applications of the full operator on the
-    !> finest lattice
-    type(contact_state_t), intent(inout) :: guess
-    !> w, u_x, u_y of that state, but for an error of interpolation, if it has any tractions (n_col, n_row, 3) [m]
-    real(wp), allocatable, intent(out) :: estimate(:, :, :)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-
-    type :: field_t
-      real(wp), allocatable :: value(:, :, :)
-    end type field_t
-    type(contact_state_t) :: state, coarser
-    type(field_t), target :: origin(size(self%operators))
-    type(load_target_t) :: target
-    real(wp), allocatable :: known(:, :, :)
-    real(wp) :: work
-    integer :: l
-
-    work = 0.0_wp
-    target = step%target
-    origin(2)%value = restricted(self%problem, step%reference, self%coarse(2))
-    do l = 3, size(self%operators)
-      origin(l)%value = restricted(self%coarse(l - 1), origin(l - 1)%value, self%coarse(l))
-    end do
-    do l = size(self%operators), 2, -1
-      associate (problem => self%coarse(l))
-        if (problem%space%count(problem%candidate) == 0) cycle
-        if (.not. problem%is_pressed(step%target)) cycle
-        call new_friction_state(state, problem%lattice, problem%space)
-        state%motion = guess%motion
-        if (allocated(coarser%pressure)) call continue_from(self%coarse(l + 1), coarser, problem, state)
-        target%rolling%share = 0.5_wp**(l - 1)
-        call solve_on_lattice(problem, self%operators(l), state, &
-                              load_step_t(target, origin(l)%value, problem%options%multilevel%nested_tolerance, &
-                                          step%max_sweeps), coarser, error, known, as_start=.true.)
-        ! each rank may have solved all of the coarser lattice
-        call self%problem%space%agree(error)
-        if (allocated(error)) return
-        work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
-        ! a start from an unconverged solution saves nothing
-        if (coarser%converged) cycle
-        deallocate (coarser%pressure)
-        if (allocated(known)) deallocate (known)
-      end associate
-    end do
-    if (allocated(coarser%pressure)) call continue_from(self%coarse(2), coarser, self%problem, guess)
-    guess%operator_applications = work
-    call move_alloc(known, estimate)
-
-  contains
-
-    !> Prolong a state, and the displacements that are known of it.
-    subroutine continue_from(coarse_problem, coarse, problem, state)
-      type(friction_problem_t), intent(in) :: coarse_problem, problem
-      type(contact_state_t), intent(in) :: coarse
-      type(contact_state_t), intent(inout) :: state
-      real(wp), allocatable :: moved(:, :, :)
-
-      call prolong_state(coarse_problem, coarse, problem, state)
-      call move_alloc(known, moved)
-      if (.not. allocated(moved)) return
-      if (any(shape(moved(:, :, 1)) /= coarse_problem%own_extent())) return
-      allocate (known(problem%lattice%extent(1), problem%own_rows(), 3))
-      call prolong_displacement(coarse_problem, moved, problem, known)
-    end subroutine continue_from
-
-  end subroutine coarse_guess
 
 end module hc_frictional_contact

@@ -205,20 +205,16 @@ contains
   subroutine collect(now, state)
     type(friction_iterate_t), intent(in) :: now
     !> State whose gap and relative displacement they become, for `complete_state`
-    type(contact_state_t), intent(inout) :: state
-    integer :: n, row, from, to
+    type(contact_state_t), intent(inout), target :: state
+    real(wp), pointer, contiguous :: gap(:), displacement(:)
 
-    n = size(now%p)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
-    do row = 1, size(state%gap, 2)
-      to = row*size(state%gap, 1)
-      from = to - size(state%gap, 1) + 1
-      state%gap(:, row) = now%w(from:to)
-      if (now%pressure_feels_shear) state%gap(:, row) = state%gap(:, row) + now%closing(from:to)
-      state%relative_displacement(:, row, 1) = now%u(from:to)
-      state%relative_displacement(:, row, 2) = now%u(n + from:n + to)
-    end do
-    !$omp end parallel do
+    gap(1:size(now%w)) => state%gap
+    displacement(1:size(now%u)) => state%relative_displacement
+    associate (space => now%operators%space)
+      call space%copy(now%w, gap)
+      if (now%pressure_feels_shear) call space%add(now%closing, gap)
+      call space%copy(now%u, displacement)
+    end associate
   end subroutine collect
 
   !> Bound the displacement by the difference of the recorded tractions from those of the iterate, and by rounded directions, as a

@@ -4,8 +4,7 @@ module hc_pressure_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal
-  use hc_operator_set, only: operators_t
-  use hc_linear_system, only: linear_system_t
+  use hc_operator_set, only: traction_system_t
   use hc_active_set, only: active_set_t
   implicit none
   private
@@ -13,8 +12,7 @@ module hc_pressure_system
   public :: pressure_system_t
 
   !> Pressure on the nodes in contact.
-  type, extends(linear_system_t) :: pressure_system_t
-    type(operators_t), pointer :: operators => null()
+  type, extends(traction_system_t) :: pressure_system_t
     !> Compliance C [m/Pa] and offset [m] of the spring of each node, 0 off the contact; not there without a compliant law
     real(wp), allocatable :: compliance(:), offset(:)
   contains
@@ -23,7 +21,6 @@ module hc_pressure_system
     procedure :: product => pressure_product
     procedure :: product_packed => pressure_product_packed
     procedure :: precondition_packed => pressure_precondition_packed
-    procedure :: take_image => pressure_image
   end type pressure_system_t
 
 contains
@@ -80,28 +77,16 @@ contains
   end subroutine stretch
 
   !> Apply the preconditioner of the pressure.
-  subroutine pressure_precondition_packed(self, nodes, n, r, z, error)
+  subroutine pressure_precondition_packed(self, nodes, n, r, z)
     class(pressure_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
 
     associate (operators => self%operators)
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed
-
-  !> Point to memory for a product: that of the operator, if it has some.
-  subroutine pressure_image(self, n, own, image, stat)
-    class(pressure_system_t), intent(in) :: self
-    integer, intent(in) :: n
-    real(wp), allocatable, target, intent(inout) :: own(:)
-    real(wp), pointer, contiguous, intent(out) :: image(:)
-    integer, intent(out) :: stat
-
-    call self%operators%take_image(1, own, image, stat)
-  end subroutine pressure_image
 
 end module hc_pressure_system

@@ -11,13 +11,12 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
-  use hc_precision, only: wp, sp, lk
+  use hc_precision, only: wp, lk
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
-  use hc_operator_set, only: operators_t
-  use hc_frame_rows, only: turn_row, plane_row, add_springs_row, take_off_row, slip_compliance_row
-  use hc_linear_system, only: linear_system_t
+  use hc_operator_set, only: operators_t, traction_system_t
+  use hc_frame_rows, only: turn_row, add_springs_row, take_off_row, slip_compliance_row
   use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
   implicit none
   private
@@ -30,8 +29,7 @@ module hc_shear_system
   integer, parameter :: most = 256
 
   !> Shear traction in the frames of the nodes.
-  type, extends(linear_system_t) :: shear_system_t
-    type(operators_t), pointer :: operators => null()
+  type, extends(traction_system_t) :: shear_system_t
     !> Nodes in contact, in runs along the rows
     type(active_set_t) :: nodes
     !> Direction e of each of them; t is a quarter turn ahead
@@ -46,7 +44,6 @@ module hc_shear_system
     procedure :: product => shear_product
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
-    procedure :: take_image => shear_image
     !> Turn components along x and y into the frames, or back
     procedure :: turn
     !> Set the nodes in contact, all of which stick; prepare for their frames and compliances
@@ -56,11 +53,11 @@ module hc_shear_system
     !> Reduce the traction of slipping nodes by their compliance
     procedure :: apply_slip_compliance
     !> Turn displacements into the frames and add the stretch of the springs
-    procedure :: add_springs, add_springs_packed
+    procedure :: add_springs
     !> Take it off, and turn tractions and displacements out of the frames
     procedure :: leave_frames
-    !> Components along x and y from packed ones in the frames
-    procedure :: put_in_plane
+    !> Displacements by tractions in the frames
+    procedure :: displace
   end type shear_system_t
 
 contains
@@ -109,40 +106,31 @@ contains
     call self%operators%tangential%set_active(contact, self%compliance, self%direction)
   end subroutine use_frames
 
-  !> Reduce tractions by springs in series with the stiffness that a node was found to have in stick.
-  subroutine apply_slip_compliance(self, runs, along_t, along_e, plane, traction_t, traction_e)
+  !> Turn tractions into the frames, and reduce them by springs in series with the stiffness that a node was found to have in stick.
+  subroutine apply_slip_compliance(self, runs, along_t, along_e, traction)
     class(shear_system_t), intent(in) :: self
     !> Nodes in contact, and which of them have a component along e
     type(paired_runs_t), intent(in) :: runs
     !> Displacement along t and e at these nodes
     real(wp), intent(in), contiguous :: along_t(:), along_e(:)
-    !> Its traction if all nodes stuck, along x and y (2 n)
-    real(wp), intent(in), contiguous :: plane(:)
-    !> The traction along t and e at these nodes
-    real(sp), intent(inout), contiguous :: traction_t(:), traction_e(:)
-    real(wp), dimension(most) :: q_t, q_e, u_e
-    integer :: i, k, n, from, to, m, at
+    !> Its traction if all nodes stuck, along x and y; then that along t and e (2 n)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp) :: u_e(most)
+    integer :: k, n, from, to, m, at
 
-    n = size(plane)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, from, to, m, at, q_t, q_e, u_e)
+    n = size(traction)/2
+    call self%turn(traction)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, m, at, u_e)
     do k = 1, size(runs%first)
       do from = runs%first(k), runs%last(k), most
         to = min(from + most - 1, runs%last(k))
         m = to - from + 1
         at = runs%place(k) + from - runs%first(k)
-        do i = 1, m
-          associate (e => self%direction(:, at + i - 1), q_x => plane(from + i - 1), q_y => plane(n + from + i - 1))
-            q_t(i) = -e(2)*q_x + e(1)*q_y
-            q_e(i) = e(1)*q_x + e(2)*q_y
-          end associate
-        end do
         ! a slipping node does not move along e
         u_e(:m) = 0.0_wp
         if (runs%second(k) > 0) u_e(:m) = along_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k))
-        call slip_compliance_row(m, self%compliance(at:at + m - 1), along_t(at:at + m - 1), u_e, q_t, q_e)
-        traction_t(at:at + m - 1) = real(q_t(:m), sp)
-        if (runs%second(k) == 0) cycle
-        traction_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k)) = real(q_e(:m), sp)
+        call slip_compliance_row(m, self%compliance(at:at + m - 1), along_t(at:at + m - 1), u_e, traction(from:to), &
+                                 traction(n + from:n + to))
       end do
     end do
     !$omp end parallel do
@@ -151,20 +139,23 @@ contains
   !> Turn displacements along x and y into the frames of the nodes in contact, and add the stretch of the springs.
   subroutine add_springs(self, traction, displacement)
     class(shear_system_t), intent(in) :: self
-    !> Traction in the frames (2 n)
+    !> Traction in the frames (2 n), or that along t of these nodes alone
     real(wp), intent(in), contiguous :: traction(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to, at
+    integer :: n, k, from, to, at, first
+    logical :: packed
 
     n = size(displacement)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
+    packed = size(traction) < size(displacement)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at, first)
     do k = 1, size(self%nodes%first)
       from = self%nodes%first(k)
       to = self%nodes%last(k)
       at = self%nodes%place(k)
+      first = merge(at, from, packed)
       call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
-                           traction(from:to), displacement(from:to), displacement(n + from:n + to))
+                           traction(first:first + to - from), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine add_springs
@@ -239,10 +230,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call self%space%copy(x, y)
-    call self%turn(y)
-    call self%operators%replace(shear, y, error)
-    if (allocated(error)) return
-    call self%add_springs(x, y)
+    call self%displace(x, y, error)
   end subroutine shear_product
 
   !> Multiply values at the active nodes: the component along t of all nodes in contact, that along e of some.
@@ -253,80 +241,38 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    associate (n_t => nodes%pairs%n_first)
-      call self%space%fill(y, 0.0_wp)
-      call self%put_in_plane(nodes%pairs, x(:n_t), x(n_t + 1:), y)
-      call self%operators%replace(shear, y, error)
-      if (allocated(error)) return
-      call self%add_springs_packed(nodes%pairs, x(:n_t), y)
-    end associate
+    call self%space%fill(y, 0.0_wp)
+    call nodes%unpack(x, y)
+    call self%displace(x(:nodes%pairs%n_first), y, error)
   end subroutine shear_product_packed
 
-  !> Compute the components along x and y at the nodes in contact from those along t and e; values elsewhere stay.
-  subroutine put_in_plane(self, runs, along_t, along_e, plane)
-    class(shear_system_t), intent(in) :: self
-    !> Nodes in contact, and which of them have a component along e
-    type(paired_runs_t), intent(in) :: runs
-    !> Components along t and e
-    real(wp), intent(in), contiguous :: along_t(:), along_e(:)
-    !> Components along x and y (2 n)
-    real(wp), intent(inout), contiguous :: plane(:)
-    integer :: n, k, from, to, at, i
+  !> Compute the displacements by tractions in the frames, in their place, with the stretch of the springs.
+  subroutine displace(self, traction, values, error)
+    class(shear_system_t), intent(inout) :: self
+    !> The tractions (2 n), or those along t of the nodes in contact alone
+    real(wp), intent(in), contiguous :: traction(:)
+    !> The tractions, then the displacements (2 n)
+    real(wp), intent(inout), contiguous, target :: values(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
 
-    n = size(plane)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at, i)
-    do k = 1, size(runs%first)
-      from = runs%first(k)
-      to = runs%last(k)
-      at = runs%place(k)
-      if (runs%second(k) == 0) then
-        do i = from, to
-          plane(i) = -self%direction(2, at + i - from)*along_t(at + i - from)
-          plane(n + i) = self%direction(1, at + i - from)*along_t(at + i - from)
-        end do
-      else
-        call plane_row(to - from + 1, self%direction(:, at:at + to - from), along_t(at:at + to - from), &
-                       along_e(runs%second(k):runs%second(k) + to - from), plane(from:to), plane(n + from:n + to))
-      end if
-    end do
-    !$omp end parallel do
-  end subroutine put_in_plane
-
-  !> Turn displacements into the frames and add the stretch of the springs, under packed tractions.
-  subroutine add_springs_packed(self, runs, along_t, displacement)
-    class(shear_system_t), intent(in) :: self
-    !> Nodes in contact
-    type(paired_runs_t), intent(in) :: runs
-    !> Traction along t at these nodes
-    real(wp), intent(in), contiguous :: along_t(:)
-    !> Components along x and y; then in the frames (2 n)
-    real(wp), intent(inout), contiguous :: displacement(:)
-    integer :: n, k, from, to, at
-
-    n = size(displacement)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at)
-    do k = 1, size(runs%first)
-      from = runs%first(k)
-      to = runs%last(k)
-      at = runs%place(k)
-      call add_springs_row(to - from + 1, self%direction(:, at:at + to - from), self%compliance(at:at + to - from), &
-                           along_t(at:at + to - from), displacement(from:to), displacement(n + from:n + to))
-    end do
-    !$omp end parallel do
-  end subroutine add_springs_packed
+    call self%turn(values)
+    call self%operators%replace(shear, values, error)
+    if (allocated(error)) return
+    call self%add_springs(traction, values)
+  end subroutine displace
 
   !> Apply the preconditioner of the shear traction.
-  subroutine shear_precondition_packed(self, nodes, n, r, z, error)
+  subroutine shear_precondition_packed(self, nodes, n, r, z)
     class(shear_system_t), intent(inout) :: self
     type(active_set_t), intent(in) :: nodes
     integer, intent(in) :: n
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    type(error_t), allocatable, intent(out) :: error
 
     associate (operators => self%operators)
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
-      if (operators%rolling%steady) call sum_behind(self, nodes%pairs, z)
+      if (operators%rolling%steady) call sum_behind(self, nodes, z)
     end associate
   end subroutine shear_precondition_packed
 
@@ -334,10 +280,10 @@ contains
   !>
   !> With the shift Z to the node ahead B = T (1 - Z) = (1 - Z) T but for the rear of the contact, and (1 - Z)^-1 sums from its
   !> front on. Slipping nodes, whose traction is known but for the component across, begin a new sum.
-  subroutine sum_behind(self, runs, z)
+  subroutine sum_behind(self, nodes, z)
     class(shear_system_t), intent(in) :: self
-    !> Nodes in contact, and which of them have a component along e
-    type(paired_runs_t), intent(in) :: runs
+    !> Unknowns of these nodes, in pairs
+    type(active_set_t), intent(in) :: nodes
     !> Traction along t and e at these nodes
     real(wp), intent(inout), contiguous :: z(:)
     real(wp), allocatable :: plane(:)
@@ -347,8 +293,9 @@ contains
 
     n = product(self%space%own_extent(self%operators%flexibility%lattice%extent))
     allocate (plane(2*n), source=0.0_wp)
-    associate (n_t => runs%n_first, rolling => self%operators%rolling)
-      call self%put_in_plane(runs, z(:n_t), z(n_t + 1:), plane)
+    call nodes%unpack(z, plane)
+    call self%turn(plane)
+    associate (runs => nodes%pairs, rolling => self%operators%rolling)
       to_ahead = rolling%stride(self%operators%flexibility%lattice%extent(1))
       forward = to_ahead > 0
       do k = merge(size(runs%first), 1, forward), merge(1, size(runs%first), forward), merge(-1, 1, forward)
@@ -359,23 +306,11 @@ contains
             plane(m + i) = plane(m + i)/rolling%share
             if (i + to_ahead >= 1 .and. i + to_ahead <= n) plane(m + i) = plane(m + i) + own*plane(m + i + to_ahead)
           end do
-          z(at) = -self%direction(2, at)*plane(i) + self%direction(1, at)*plane(n + i)
-          if (runs%second(k) == 0) cycle
-          z(n_t + runs%second(k) + i - runs%first(k)) = self%direction(1, at)*plane(i) + self%direction(2, at)*plane(n + i)
         end do
       end do
     end associate
+    call self%turn(plane)
+    call nodes%pack(plane, z)
   end subroutine sum_behind
-
-  !> Point to memory for a product: that of the operator, if it has some.
-  subroutine shear_image(self, n, own, image, stat)
-    class(shear_system_t), intent(in) :: self
-    integer, intent(in) :: n
-    real(wp), allocatable, target, intent(inout) :: own(:)
-    real(wp), pointer, contiguous, intent(out) :: image(:)
-    integer, intent(out) :: stat
-
-    call self%operators%take_image(2, own, image, stat)
-  end subroutine shear_image
 
 end module hc_shear_system

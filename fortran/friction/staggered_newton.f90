@@ -30,8 +30,7 @@ module hc_staggered_newton
   use hc_active_zones, only: linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
-  use hc_active_set, only: active_set_t, new_active_set
-  use hc_packed_fields, only: new_packed_fields
+  use hc_active_set, only: active_set_t, new_active_set, new_packed_fields
   use hc_linear_system, only: constraints_t, iteration_t, precondition_constraints, step_ahead, solution_accurate
   use hc_step_equation, only: solve_step_equation
   implicit none
@@ -186,8 +185,8 @@ contains
     type(iteration_t) :: iteration
     type(newton_options_t) :: options
     real(wp), allocatable :: rhs(:), given(:), unknown(:)
-    real(wp) :: scale, level
-    logical :: by_load, compliant, unknown_gap
+    real(wp) :: scale, level, missing(1)
+    logical :: by_load, compliant, unknown_gap, independent
     integer :: i
 
     options = now%problem%options%newton
@@ -208,10 +207,13 @@ contains
       if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
     end do
     !$omp end parallel do
-    call find_punch_pressure(now, nodes, constraints%columns, constraints%mb, error)
-    if (allocated(error)) return
+    call find_punch_pressure(now, nodes, constraints%columns, constraints%mb)
     if (changed) then
-      call fit_load(now, nodes, constraints)
+      ! the pressure on another contact carries the load
+      if (by_load) then
+        missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()
+        call constraints%satisfy(nodes%space, missing, now%p, independent, nodes)
+      end if
       if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
       call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
@@ -241,22 +243,6 @@ contains
     now%outcome = max(now%outcome, iteration%outcome)
     if (by_load) now%motion(normal) = constraints%multiplier(1)
   end subroutine solve_on_contact
-
-  !> Correct the pressure on another contact so that it carries the prescribed load.
-  subroutine fit_load(now, nodes, constraints)
-    !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
-    !> Nodes in contact
-    type(active_set_t), intent(in) :: nodes
-    !> The load, if it is prescribed
-    type(constraints_t), intent(in) :: constraints
-    real(wp) :: missing(1)
-    logical :: independent
-
-    if (size(constraints%columns, 2) == 0) return
-    missing = now%target%value(normal)/now%problem%lattice%cell_area() - now%pressure_sum()
-    call constraints%satisfy(nodes%space, missing, now%p, independent, nodes)
-  end subroutine fit_load
 
   !> Solve for the shear traction under the present pressure, (F10).
   subroutine solve_shear(now, judged, error)
@@ -411,11 +397,10 @@ contains
     end if
     ! the pressure moves what u does not contain yet
     if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
-      call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
+      call now%shear%add_springs(found%unknown(:nodes%pairs%n_first), found%ax)
       call find_rhs(now, nodes, n, rhs, error)
       if (allocated(error)) return
-      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%unknown, error)
-      if (allocated(error)) return
+      call step_ahead(now%shear, nodes, found%constraints, rhs, found%ax, options%length_ahead, found%unknown)
     end if
     call displace(now, nodes, found, error)
     if (allocated(error)) return
@@ -479,7 +464,8 @@ contains
     now%n_shear = now%n_shear + 1
     if (mod(now%n_shear, now%problem%options%newton%sweeps_per_cut) == 0) call now%cut_parameter(0.5_wp)
     call found%driven%set_motions(found%constraints%multiplier, now%motion)
-    call leave_frames(now, found, rounding)
+    call now%shear%leave_frames(now%q, found%ax, rounding)
+    call move_alloc(found%ax, now%u)
     call now%find_tangential_residual()
     judged = .true.
     if (rounding > now%problem%options%newton%displacement_rounding*found%scale) then
@@ -487,19 +473,6 @@ contains
       call now%refresh(error)
     end if
   end subroutine take_solution
-
-  !> Turn traction and displacement out of the frames.
-  subroutine leave_frames(now, found, rounding)
-    !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
-    !> The solution, whose fields move to the iterate
-    type(shear_solution_t), intent(inout) :: found
-    !> Rounding error of the displacements [m]
-    real(wp), intent(out) :: rounding
-
-    call now%shear%leave_frames(now%q, found%ax, rounding)
-    call move_alloc(found%ax, now%u)
-  end subroutine leave_frames
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.
   subroutine displace(now, nodes, found, error)
@@ -529,11 +502,11 @@ contains
     call now%shear%turn(traction(n + 1:))
     call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], found%ax, error)
     if (allocated(error)) return
-    call now%shear%add_springs_packed(nodes%pairs, found%unknown(:nodes%pairs%n_first), found%ax)
+    call now%shear%add_springs(found%unknown(:nodes%pairs%n_first), found%ax)
   end subroutine displace
 
   !> Estimate the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
-  subroutine find_punch_pressure(now, nodes, constraint, mb, error)
+  subroutine find_punch_pressure(now, nodes, constraint, mb)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
     !> Nodes in contact
@@ -542,31 +515,26 @@ contains
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> The pressure there (n_active, 1 or 0)
     real(sp), allocatable, intent(out) :: mb(:, :)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: pressure(:), column(:)
-    integer :: k
 
-    allocate (pressure(merge(size(now%p), 0, size(constraint, 2) > 0)), column(size(constraint, 1)))
-    if (.not. allocated(now%punch_pressure)) then
-      call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb, error)
-      if (allocated(error)) return
-      allocate (now%punch_pressure)
-      call new_packed_fields(now%punch_pressure, nodes, size(mb, 2), now%pressure%space)
-      do k = 1, size(mb, 2)
-        call now%pressure%space%fill(pressure, 0.0_wp)
-        column(:) = mb(:, k)
-        call nodes%unpack(column, pressure)
-        call now%punch_pressure%keep(k, pressure)
-      end do
+    if (size(constraint, 2) == 0) then
+      allocate (mb(size(constraint, 1), 0))
       return
     end if
-    allocate (mb(size(constraint, 1), size(constraint, 2)))
-    do k = 1, size(mb, 2)
-      call now%punch_pressure%restore(k, pressure)
+    allocate (pressure(size(now%p)))
+    if (allocated(now%punch_pressure)) then
+      call now%punch_pressure%restore(1, pressure)
+      allocate (column(size(constraint, 1)))
       call nodes%pack(pressure, column)
-      mb(:, k) = real(column, sp)
-    end do
+      mb = reshape(real(column, sp), [size(column), 1])
+      return
+    end if
+    call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb)
+    allocate (now%punch_pressure)
+    call new_packed_fields(now%punch_pressure, nodes, 1)
+    call now%pressure%space%fill(pressure, 0.0_wp)
+    call nodes%unpack(real(mb(:, 1), wp), pressure)
+    call now%punch_pressure%keep(1, pressure)
   end subroutine find_punch_pressure
 
   !> Estimate the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
@@ -584,7 +552,6 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(active_set_t) :: touching
-    real(wp), allocatable :: column(:)
     real(wp), allocatable, target :: own(:)
     real(wp), pointer, contiguous :: plane(:)
     integer :: n, k, n_t, stat
@@ -595,30 +562,28 @@ contains
     known = allocated(now%rigid_traction) .and. .not. afresh
     if (known) known = now%rigid_traction%n_field == size(constraint, 2)
     if (.not. known) then
-      call precondition_constraints(now%shear, nodes, 2*n, constraint, mb, error)
-      if (allocated(error)) return
+      call precondition_constraints(now%shear, nodes, 2*n, constraint, mb)
       if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
       allocate (now%rigid_traction)
       call new_active_set(touching, [now%contact, now%contact], now%shear%space)
-      call new_packed_fields(now%rigid_traction, touching, size(mb, 2), now%shear%space)
+      call new_packed_fields(now%rigid_traction, touching, size(mb, 2))
     else
       allocate (mb(size(constraint, 1), size(constraint, 2)))
     end if
     if (size(mb, 2) == 0) return
     call now%shear%take_image(2*n, own, plane, stat)
-    if (stat == 0 .and. .not. known) allocate (column(size(mb, 1)), stat=stat)
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the shear traction: choose a smaller window')
     call now%shear%space%agree(error)
     if (allocated(error)) return
     do k = 1, size(mb, 2)
       if (known) then
         call now%rigid_traction%restore(k, plane)
-        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane, mb(:n_t, k), &
-                                             mb(n_t + 1:, k))
+        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), plane)
+        call nodes%pack(plane, mb(:, k))
       else
         call now%shear%space%fill(plane, 0.0_wp)
-        column(:) = mb(:, k)
-        call now%shear%put_in_plane(nodes%pairs, column(:n_t), column(n_t + 1:), plane)
+        call nodes%unpack(real(mb(:, k), wp), plane)
+        call now%shear%turn(plane)
         call now%rigid_traction%keep(k, plane)
       end if
     end do

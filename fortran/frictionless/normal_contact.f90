@@ -9,11 +9,11 @@ module hc_normal_contact
   use hc_error, only: error_t, status, raise
   use hc_communicator, only: communicator_t
   use hc_options, only: options_t
-  use hc_lattice, only: lattice_t, floor_half
+  use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_memory, only: give_back
   use hc_scratch, only: scratch_t
-  use hc_hierarchy, only: level_count
+  use hc_hierarchy, only: level_count, coarse_rows_t
   use hc_elastic_medium, only: elastic_medium_t
   use hc_fft_layout_single, only: convolution_memory, transform_memory
   use hc_flexibility, only: check_operator, padded_length
@@ -143,6 +143,7 @@ contains
     normal_contact_memory = normal_contact_memory + n*(2*field + 3*half + 2*mark)
   end function normal_contact_memory
 
+  !> Point to the problem on the finest lattice.
   function normal_part(self) result(problem)
     class(normal_contact_t), intent(in), target :: self
     class(normal_problem_t), pointer :: problem
@@ -272,29 +273,29 @@ contains
   subroutine prolong_pressure(coarser, coarse, level, pressure)
     !> Coarser lattice, and pressure and gap there
     type(normal_lattice_t), intent(in) :: coarser
-    type(contact_state_t), intent(inout) :: coarse
+    type(contact_state_t), intent(in), target :: coarse
     !> Finer lattice
     type(normal_lattice_t), intent(in) :: level
     !> Pressure there
     real(wp), intent(inout), contiguous :: pressure(:, :)
     real(wp), dimension(size(pressure, 1)) :: compliance, offset
-    real(wp), allocatable :: contact(:, :)
-    type(lattice_t) :: coarse_rows, fine_rows
+    real(wp), allocatable, target :: own(:, :), own_gap(:, :)
+    real(wp), pointer, contiguous :: p(:, :), gap(:, :)
+    type(coarse_rows_t) :: below
     type(tangent_t) :: tangent
     real(wp) :: p_max
     integer :: row
 
     p_max = coarser%space%max(coarse%pressure)
-    coarse_rows = coarser%lattice
-    fine_rows = level%lattice
-    if (level%space%ranks%size > 1) call take_coarse_rows(coarser, coarse, level, coarse_rows, fine_rows)
+    below = coarser%rows_below(level)
+    call coarser%take_below(below, coarse%pressure, own, p)
     if (.not. is_smooth(level, p_max)) then
-      call prolong_edge(coarse_rows, coarse%pressure, fine_rows, pressure, level%space)
+      call prolong_edge(below%rows, p, below%fine, pressure, level%space)
       return
     end if
+    call coarser%take_below(below, coarse%gap, own_gap, gap)
     tangent = tangent_t(1.0_wp/coarser%normal_compliance, level%softest_spring(p_max))
-    allocate (contact, source=coarse%pressure - tangent%r*min(coarse%gap, coarser%normal_compliance*p_max))
-    call prolong(coarse_rows, contact, fine_rows, pressure, level%space)
+    call prolong(below%rows, p - tangent%r*min(gap, coarser%normal_compliance*p_max), below%fine, pressure, level%space)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
     do row = 1, size(pressure, 2)
       ! the tangent at the solution p is that of p + r sigma(p) = t, too
@@ -305,32 +306,6 @@ contains
     end do
     !$omp end parallel do
   end subroutine prolong_pressure
-
-  !> Take the rows of the coarse solution about those of the finer lattice on this rank, with the neighbors of neighbors.
-  subroutine take_coarse_rows(coarser, coarse, level, coarse_rows, fine_rows)
-    type(normal_lattice_t), intent(in) :: coarser
-    !> Pressure and gap on own rows; then on those rows
-    type(contact_state_t), intent(inout) :: coarse
-    type(normal_lattice_t), intent(in) :: level
-    !> Lattices of those rows, and of own rows
-    type(lattice_t), intent(out) :: coarse_rows, fine_rows
-    integer, parameter :: neighbors_of_neighbors = 2
-    real(wp), allocatable :: rows(:, :)
-    integer :: own(2), wanted(2)
-
-    own = level%space%own_rows(level%lattice%extent(2))
-    fine_rows = level%rows_of(own(1), own(2))
-    own = level%lattice%first(2) + own - 1
-    wanted = [floor_half(own(1)), floor_half(own(2) + 1)] - coarser%lattice%first(2) + 1
-    wanted = wanted + [-neighbors_of_neighbors, neighbors_of_neighbors]
-    if (.not. coarser%lattice%periodic(2)) wanted = min(max(wanted, 1), coarser%lattice%extent(2))
-    coarse_rows = coarser%rows_of(wanted(1), wanted(2))
-    allocate (rows(coarser%lattice%extent(1), wanted(2) - wanted(1) + 1))
-    call coarser%take_rows(coarse%pressure, wanted(1), rows)
-    coarse%pressure = rows
-    call coarser%take_rows(coarse%gap, wanted(1), rows)
-    coarse%gap = rows
-  end subroutine take_coarse_rows
 
   !> Return the space of a lattice: one thread where the start of the others takes longer than each of the short passes.
   type(field_space_t) function space_of(self, lattice)

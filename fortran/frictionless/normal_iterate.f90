@@ -5,7 +5,6 @@ module hc_normal_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
-  use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_rows, only: limits_t, classification_t, classify_row, add_row, dot_single, largest_of
@@ -27,6 +26,8 @@ module hc_normal_iterate
   !> Those in single precision are zero off the active nodes, r but for the rings of the
   !> continuation and z and kd everywhere; their units are p_unit and p_unit times that of the preconditioner.
   type :: normal_iterate_t
+    !> Problem on the lattice that is being solved, with its operators
+    type(normal_lattice_t), pointer :: level => null()
     !> Pressure [Pa] and the closing of the gap that it causes [m]; that of the springs below is part of it
     real(wp), allocatable :: p(:, :), w(:, :)
     !> Under a compliant law: compliance [m/Pa] and offset [m] of the spring of each node, 0 off the active nodes
@@ -64,22 +65,20 @@ module hc_normal_iterate
 contains
 
   !> Scale the pressure so that it has the least energy under a prescribed approach; springs as they are linearised.
-  subroutine rescale(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine rescale(now)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
     integer :: row, k
 
     if (allocated(now%offset)) now%w = now%w - now%offset
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       overlap(row) = 0.0_wp
       resistance(row) = 0.0_wp
       do k = 1, now%n_run(row)
         associate (from => now%run(1, k, row), to => now%run(2, k, row))
-          overlap(row) = overlap(row) + sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
+          overlap(row) = overlap(row) + sum(now%p(from:to, row)*(now%approach - now%level%initial_gap(from:to, row)), &
                                             mask=now%active(from:to, row))
           resistance(row) = resistance(row) + dot_product(now%p(from:to, row), now%w(from:to, row))
           if (allocated(now%offset)) overlap(row) = overlap(row) - dot_product(now%p(from:to, row), now%offset(from:to, row))
@@ -87,8 +86,8 @@ contains
       end do
     end do
     !$omp end parallel do
-    factor = level%space%total(overlap)/level%space%total(resistance)
-    if (.not. factor > 0.0_wp) factor = now%approach/level%space%max(now%w)
+    factor = now%level%space%total(overlap)/now%level%space%total(resistance)
+    if (.not. factor > 0.0_wp) factor = now%approach/now%level%space%max(now%w)
     now%p = factor*now%p
     now%w = factor*now%w
     if (allocated(now%offset)) now%w = now%w + now%offset
@@ -99,15 +98,13 @@ contains
   !>
   !> The residual then has no part along the motion of the punch; before there is one, the mean gap
   !> under the pressure vanishes.
-  subroutine find_approach(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine find_approach(now)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: weight(size(now%p, 2)), moment(size(now%p, 2)), w, l, u
     integer :: col, row, k
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(w, l, u)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads) private(w, l, u)
     do row = 1, size(now%p, 2)
       w = 0.0_wp
       l = 0.0_wp
@@ -118,14 +115,14 @@ contains
           do col = now%run(1, k, row), now%run(2, k, row)
             u = now%punch(col, row)
             w = w + u
-            l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
+            l = l + u*(merge(now%level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         else
           !$omp simd private(u) reduction(+: w, l)
           do col = now%run(1, k, row), now%run(2, k, row)
             u = now%p(col, row)
             w = w + u
-            l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
+            l = l + u*(merge(now%level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         end if
       end do
@@ -133,13 +130,11 @@ contains
       moment(row) = l
     end do
     !$omp end parallel do
-    now%approach = level%space%total(moment)/level%space%total(weight)
+    now%approach = now%level%space%total(moment)/now%level%space%total(weight)
   end subroutine find_approach
 
   !> Compute the residuals, and find the set that the present pressure and gap call for.
-  subroutine classify(level, now, candidate, next, changed, error)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine classify(now, candidate, next, changed, error)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
@@ -156,31 +151,31 @@ contains
     integer :: row, numbers(3)
 
     ! r' of (N2)
-    limits = limits_t(level%normal_classification_parameter(now%n_active), 1.0_wp/level%normal_compliance, now%approach)
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    limits = limits_t(now%level%normal_classification_parameter(now%n_active), 1.0_wp/now%level%normal_compliance, now%approach)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       if (allocated(now%offset)) then
-        call classify_compliant_row(level, now, row, limits%r, candidate(:, row), next(:, row), found(row))
+        call classify_compliant_row(now, row, limits%r, candidate(:, row), next(:, row), found(row))
       else
-        call classify_row(limits, level%initial_gap(:, row), now%p(:, row), now%w(:, row), candidate(:, row), &
+        call classify_row(limits, now%level%initial_gap(:, row), now%p(:, row), now%w(:, row), candidate(:, row), &
                           now%active(:, row), next(:, row), found(row))
       end if
     end do
     !$omp end parallel do
     numbers = [count(.not. found%finite), sum(found%n_next), sum(found%n_changed)]
-    call level%space%ranks%add_counts(numbers)
+    call now%level%space%ranks%add_counts(numbers)
     if (numbers(1) > 0 .or. .not. ieee_is_finite(now%approach)) then
       call raise(error, status%no_convergence, not_finite)
       return
     end if
     largest = [maxval(found%p_max), maxval(found%worst), maxval(found%worst_changed), maxval(found%worst_active)]
-    call level%space%most(largest)
+    call now%level%space%most(largest)
     now%p_max = largest(1)
     now%residual = largest(2)/now%p_max
     now%residual_changed = largest(3)/now%p_max
     now%residual_active = largest(4)
     if (.not. allocated(now%offset)) then
-      now%residual_active = now%residual_active/(level%normal_compliance*now%p_max)
+      now%residual_active = now%residual_active/(now%level%normal_compliance*now%p_max)
     else
       now%residual_active = now%residual_active/now%p_max
     end if
@@ -194,8 +189,7 @@ contains
 
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of its
   !> linearisation.
-  subroutine classify_compliant_row(level, now, row, r, candidate, next, found)
-    type(normal_lattice_t), intent(in) :: level
+  subroutine classify_compliant_row(now, row, r, candidate, next, found)
     type(normal_iterate_t), intent(in) :: now
     integer, intent(in) :: row
     !> Classification parameter [Pa/m]
@@ -209,51 +203,43 @@ contains
     integer :: first
 
     first = (row - 1)*size(next) + 1
-    left = level%initial_gap(:, row) + now%w(:, row) - now%approach
+    left = now%level%initial_gap(:, row) + now%w(:, row) - now%approach
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
     found%finite = all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
     if (.not. found%finite) return
     possible = candidate
-    call level%normal_law%find_contact(r, now%p(:, row), gap, possible, called_for)
+    call now%level%normal_law%find_contact(r, now%p(:, row), gap, possible, called_for)
     next = called_for
-    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, possible, found%worst)
-    call level%normal_law%violation(first, level%normal_compliance, now%p(:, row), gap, &
+    call now%level%normal_law%violation(first, now%level%normal_compliance, now%p(:, row), gap, possible, found%worst)
+    call now%level%normal_law%violation(first, now%level%normal_compliance, now%p(:, row), gap, &
                                     possible .and. (called_for .neqv. now%active(:, row)), found%worst_changed)
     found%p_max = max(0.0_wp, maxval(now%p(:, row)))
-    found%worst_active = max(0.0_wp, maxval(abs(left)/(level%normal_compliance + now%compliance(:, row)), mask=now%active(:, row)))
+    found%worst_active = max(0.0_wp, maxval(abs(left)/(now%level%normal_compliance + now%compliance(:, row)), &
+                                            mask=now%active(:, row)))
     found%n_next = count(next)
     found%n_changed = count(next .neqv. now%active(:, row))
   end subroutine classify_compliant_row
 
   !> Linearise a compliant law about the present pressure and gap, and give the springs to the preconditioner.
-  subroutine linearize_law(level, now, r)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine linearize_law(now, r)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
     real(wp), allocatable :: gap(:, :)
-    integer :: row
 
-    call add_springs(level, now, -1)
-    allocate (gap, mold=now%w)
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
-    do row = 1, size(gap, 2)
-      gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
-    end do
-    !$omp end parallel do
-    call level%linearize(r, now%p, gap, now%active, now%compliance, now%offset)
-    call add_springs(level, now, 1)
+    call add_springs(now, -1)
+    allocate (gap, source=now%w)
+    call now%level%open_gap(now%approach, gap)
+    call now%level%linearize(r, now%p, gap, now%active, now%compliance, now%offset)
+    call add_springs(now, 1)
     associate (n => size(now%p))
-      call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
+      call now%level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
     end associate
   end subroutine linearize_law
 
   !> Add the springs to the closing by the pressure, or subtract them again.
-  subroutine add_springs(level, now, sign)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine add_springs(now, sign)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> 1 to add them, -1 to take them off
@@ -261,7 +247,7 @@ contains
     integer :: row
 
     if (.not. allocated(now%offset)) return
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       now%w(:, row) = now%w(:, row) + sign*(now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
     end do
@@ -269,9 +255,7 @@ contains
   end subroutine add_springs
 
   !> Take a new set of active nodes; under a compliant law the preconditioner receives it with the springs.
-  subroutine set_active(level, now, next)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine set_active(now, next)
     !> Iterate
     type(normal_iterate_t), intent(inout), target :: now
     !> The new set; on return the old one
@@ -285,16 +269,16 @@ contains
     call move_alloc(next, now%active)
     call move_alloc(swap, next)
     now%n_active = now%n_next
-    call find_runs(now, level%space)
+    call find_runs(now)
     active(1:size(now%active)) => now%active
-    if (.not. allocated(now%compliance)) call level%preconditioner%set_active(active)
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    if (.not. allocated(now%compliance)) call now%level%preconditioner%set_active(active)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp
     end do
     !$omp end parallel do
     if (.not. allocated(now%punch)) return
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       part(row) = 0.0_wp
       known(row) = 0
@@ -307,22 +291,20 @@ contains
       end do
     end do
     !$omp end parallel do
-    now%punch_sum = level%space%total(part)
+    now%punch_sum = now%level%space%total(part)
     n = sum(known)
-    call level%space%ranks%add_counts(n)
+    call now%level%space%ranks%add_counts(n)
     if (2*n(1) < now%n_active) deallocate (now%punch)                          ! nodes that came back are not in it
   end subroutine set_active
 
   !> Find the runs of columns that the active nodes of each row lie in, those of earlier sets included.
-  subroutine find_runs(now, space)
+  subroutine find_runs(now)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
     logical(lk) :: known(size(now%active, 1))
     integer :: row, k
 
-    !$omp parallel do schedule(static) num_threads(space%threads) private(known)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads) private(known)
     do row = 1, size(now%active, 2)
       known = now%active(:, row)
       do k = 1, now%n_run(row)
@@ -368,35 +350,31 @@ contains
   end subroutine list_runs
 
   !> Estimate the pressure of a rigid punch over the active nodes, nowhere negative.
-  subroutine find_punch_pressure(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine find_punch_pressure(now)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
 
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = merge(1.0_sp, 0.0_sp, now%active(:, row))
     end do
     !$omp end parallel do
-    call level%precondition(now%r, now%z)
+    call now%level%precondition(now%r, now%z)
     allocate (now%punch(size(now%p, 1), size(now%p, 2)))
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       now%punch(:, row) = merge(max(now%z(:, row, 1), 0.0_sp), 0.0_sp, now%active(:, row))
     end do
     !$omp end parallel do
-    now%punch_sum = level%space%sum(now%punch)
+    now%punch_sum = now%level%space%sum(now%punch)
   end subroutine find_punch_pressure
 
   !> Update p <- p + share d, w <- w + share (K + C) d, C the springs of a compliant law.
   !>
   !> Without springs the approach moves along, so that under a prescribed load it is still that of `find_approach`.
-  subroutine advance(level, now, share, follows)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine advance(now, share, follows)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Share of the direction that is added
@@ -410,7 +388,7 @@ contains
     step = share*now%p_unit
     closing = share*now%w_unit
     largest = 0.0_sp
-    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       moment(row) = 0.0_wp
       do k = 1, now%n_run(row)
@@ -431,50 +409,44 @@ contains
     end do
     !$omp end parallel do
     change = largest
-    call level%space%most(change)
+    call now%level%space%most(change)
     now%closing_error = now%closing_error + single_error*abs(closing)*change(1)
-    if (follows) now%approach = now%approach + closing*level%space%total(moment)/now%punch_sum
+    if (follows) now%approach = now%approach + closing*now%level%space%total(moment)/now%punch_sum
   end subroutine advance
 
-  !> Is there tension?
-  logical function pulls(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  !> Return whether there is tension.
+  logical function pulls(now)
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
     integer :: row, k, n(1)
 
     n = 0
-    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(+: n)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads) reduction(+: n)
     do row = 1, size(now%p, 2)
       do k = 1, now%n_run(row)
         n = n + count(now%p(now%run(1, k, row):now%run(2, k, row), row) < 0.0_wp)
       end do
     end do
     !$omp end parallel do
-    call level%space%ranks%add_counts(n)
+    call now%level%space%ranks%add_counts(n)
     pulls = n(1) > 0
   end function pulls
 
   !> Compute the difference between the prescribed load and the sum of the pressures, which is rounding error.
-  real(wp) function missing_load(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  real(wp) function missing_load(now)
     !> Iterate
     type(normal_iterate_t), intent(in) :: now
 
-    missing_load = now%pressures - level%space%sum(now%p)
+    missing_load = now%pressures - now%level%space%sum(now%p)
   end function missing_load
 
   !> Scale the pressures to the prescribed load.
-  subroutine fit_load(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
+  subroutine fit_load(now)
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: lack
 
-    lack = missing_load(level, now)
+    lack = missing_load(now)
     if (allocated(now%punch)) then
       now%p = now%p + lack/now%punch_sum*now%punch
     else
@@ -483,9 +455,7 @@ contains
   end subroutine fit_load
 
   !> Set the pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
-  subroutine set_start(level, now, candidate, error)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine set_start(now, candidate, error)
     !> Iterate, whose pressure is the one to start from, up to a factor
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
@@ -496,7 +466,7 @@ contains
     integer :: n(2), row, stat, try
     logical :: known
 
-    n = level%own_extent()
+    n = now%level%own_extent()
     if (allocated(now%active)) then
       if (any(shape(now%active) /= n)) deallocate (now%d, now%active, now%run, now%n_run)
     end if
@@ -507,19 +477,19 @@ contains
     if (.not. allocated(now%active)) then
       allocate (now%d(n(1), n(2), 1), now%active(n(1), n(2)), now%run(2, n(1)/worth_a_run + 1, n(2)), now%n_run(n(2)), stat=stat)
     end if
-    call level%take_fields(now%r, now%z, now%kd)
+    call now%level%take_fields(now%r, now%z, now%kd)
     if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
-    if (stat == 0 .and. level%normal_law%is_compliant()) then
+    if (stat == 0 .and. now%level%normal_law%is_compliant()) then
       allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
     end if
     if (stat /= 0) call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
-    call level%space%ranks%agree(error)
+    call now%level%space%ranks%agree(error)
     if (allocated(error)) then
       now = normal_iterate_t()                                                 ! fields that did fit
       return
     end if
-    known = level%space%count(logical(now%p > 0.0_wp .and. candidate, lk)) > 0
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    known = now%level%space%count(logical(now%p > 0.0_wp .and. candidate, lk)) > 0
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, n(2)
       now%active(:, row) = candidate(:, row)
       if (known) now%active(:, row) = candidate(:, row) .and. now%p(:, row) > 0.0_wp
@@ -529,33 +499,33 @@ contains
       now%r(:, row, 1) = 0.0_sp
     end do
     !$omp end parallel do
-    now%n_active = level%space%count(now%active)
-    largest = level%space%max(now%p)
+    now%n_active = now%level%space%count(now%active)
+    largest = now%level%space%max(now%p)
     now%approach = now%target
     now%closing_error = 0.0_wp
     scale = 1.0_wp
-    if (now%by_load) scale = now%target/(level%lattice%cell_area()*level%space%sum(now%p))
+    if (now%by_load) scale = now%target/(now%level%lattice%cell_area()*now%level%space%sum(now%p))
     now%n_run = 0
-    call find_runs(now, level%space)
+    call find_runs(now)
     now%p_unit = scale*largest
-    now%w_unit = now%p_unit*level%preconditioner%unit
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    now%w_unit = now%p_unit*now%level%preconditioner%unit
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, n(2)
       now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
       now%p(:, row) = 0.0_wp
     end do
     !$omp end parallel do
-    call level%multiply(now%d, now%kd)
-    call advance(level, now, 1.0_wp, .false.)
+    call now%level%multiply(now%d, now%kd)
+    call advance(now, 1.0_wp, .false.)
     do try = 1, merge(start_steps, 0, allocated(now%offset))
-      call linearize_law(level, now, 0.0_wp)
+      call linearize_law(now, 0.0_wp)
       if (now%by_load) exit
-      call rescale(level, now)
+      call rescale(now)
     end do
     if (.not. now%by_load) then
-      call rescale(level, now)
-      now%p_unit = level%space%max(now%p)
-      now%w_unit = now%p_unit*level%preconditioner%unit
+      call rescale(now)
+      now%p_unit = now%level%space%max(now%p)
+      now%w_unit = now%p_unit*now%level%preconditioner%unit
     end if
   end subroutine set_start
 

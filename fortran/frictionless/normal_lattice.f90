@@ -149,17 +149,12 @@ contains
     type(contact_state_t), intent(inout) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: row
 
     self%flexibility%applications = 0.0_wp
     self%single_work = 0.0_wp
     call self%multiply_exactly(state%pressure, state%gap, error)
     if (allocated(error)) return
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do row = 1, size(state%gap, 2)
-      state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
-    end do
-    !$omp end parallel do
+    call self%open_gap(state%motion(normal), state%gap)
     call self%complete_pressed(target, tolerance, state, error)
   end subroutine complete_from_pressure
 

@@ -24,7 +24,7 @@ module hc_normal_lattice_solver
   use hc_precision, only: wp, sp, lk
   use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
-  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_projected_cg, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, force_control, normal, sweeps_used_up, &
     no_progress
   use hc_normal_lattice, only: normal_lattice_t
@@ -66,7 +66,7 @@ contains
   !> Solve for a normal load or an approach.
   subroutine solve_on_normal_lattice(level, now, target, tolerance, max_sweeps, state, error)
     !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+    type(normal_lattice_t), intent(inout), target :: level
     !> Iterate of an earlier solution, whose memory is used again
     type(normal_iterate_t), intent(inout) :: now
     !> Normal load or approach to be reached
@@ -85,6 +85,7 @@ contains
 
     level%flexibility%applications = 0.0_wp
     level%single_work = 0.0_wp
+    now%level => level
     call move_alloc(state%pressure, now%p)
     state = contact_state_t()
     if (.not. level%is_pressed(target)) then
@@ -97,33 +98,29 @@ contains
       now%target = target%value(normal)
       if (now%by_load) then
         now%pressures = now%target/level%lattice%cell_area()
-        call iterate(level, now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
+        call iterate(now, level%candidate, tolerance, max_sweeps, state%sweeps, error)
       else
         ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap; from mean planes it
         ! closes it, and layers bulge
         everywhere = level%lattice%is_periodic() .or. .not. level%medium%trace() > 0.0_wp
-        call iterate(level, now, logical(level%candidate .and. (level%initial_gap < now%target .or. everywhere), lk), tolerance, &
+        call iterate(now, logical(level%candidate .and. (level%initial_gap < now%target .or. everywhere), lk), tolerance, &
                      max_sweeps, state%sweeps, error)
       end if
       call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return
       state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
-      if (pulls(level, now)) then
+      if (pulls(now)) then
         ! it is within the tolerance
         !$omp parallel do schedule(static) num_threads(level%space%threads)
         do row = 1, size(now%p, 2)
           now%p(:, row) = max(now%p(:, row), 0.0_wp)
         end do
         !$omp end parallel do
-        if (level%exact) call find_closing(level, now, error)
+        if (level%exact) call find_closing(now, error)
       end if
       if (allocated(error)) return
-      call add_springs(level, now, -1)
-      !$omp parallel do schedule(static) num_threads(level%space%threads)
-      do row = 1, size(now%w, 2)
-        now%w(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
-      end do
-      !$omp end parallel do
+      call add_springs(now, -1)
+      call level%open_gap(now%approach, now%w)
       call move_alloc(now%p, state%pressure)
       call move_alloc(now%w, state%gap)
       if (allocated(now%punch)) deallocate (now%punch)
@@ -138,8 +135,7 @@ contains
   end subroutine solve_on_normal_lattice
 
   !> Iterate up to the tolerance.
-  subroutine iterate(level, now, candidate, tolerance, max_sweeps, sweeps, error)
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine iterate(now, candidate, tolerance, max_sweeps, sweeps, error)
     !> Its pressure is the start, up to a factor; on return the solution
     type(normal_iterate_t), intent(inout) :: now
     !> Nodes that may come into contact (n_col, n_row)
@@ -157,54 +153,53 @@ contains
     logical :: changed, compliant, anew, corrected, follows
 
     sweeps = 0
-    progress%length = level%options%normal%searched_length
-    call set_start(level, now, candidate, error)
+    progress%length = now%level%options%normal%searched_length
+    call set_start(now, candidate, error)
     if (allocated(error)) return
     allocate (next, mold=candidate)
-    compliant = level%normal_law%is_compliant()
+    compliant = now%level%normal_law%is_compliant()
     anew = .true.
     follows = .false.
     do
-      if (now%by_load .and. .not. follows) call find_approach(level, now)
+      if (now%by_load .and. .not. follows) call find_approach(now)
       follows = .false.
-      call classify(level, now, candidate, next, changed, error)
+      call classify(now, candidate, next, changed, error)
       if (allocated(error)) return
-      call remove_rounding(level, now, tolerance, progress%fits, corrected, error)
+      call remove_rounding(now, tolerance, progress%fits, corrected, error)
       if (allocated(error)) return
       if (corrected) cycle
       if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
       sweeps = sweeps + 1
-      call progress%judge(now, level%options%normal, sweeps, compliant, changed)
-      level%preconditioner%patches = now%searches
+      call progress%judge(now, now%level%options%normal, sweeps, compliant, changed)
+      now%level%preconditioner%patches = now%searches
       if (changed) then
-        call set_active(level, now, next)
+        call set_active(now, next)
         call recurrence%restart()
       end if
-      if (compliant) call follow_law(level, now, changed, sweeps, anew)
-      if (now%by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
-      if (now%by_load .and. changed) call find_approach(level, now)
-      call find_residual(level, now)
-      call level%precondition(now%r, now%z)
-      call find_step(level, now, progress, recurrence, changed, anew)
-      call level%multiply(now%d, now%kd)
-      share = share_of_step(level, now, progress, recurrence)
+      if (compliant) call follow_law(now, changed, sweeps, anew)
+      if (now%by_load .and. .not. allocated(now%punch)) call find_punch_pressure(now)
+      if (now%by_load .and. changed) call find_approach(now)
+      call find_residual(now)
+      call now%level%precondition(now%r, now%z)
+      call find_step(now, progress, recurrence, changed, anew)
+      call now%level%multiply(now%d, now%kd)
+      share = share_of_step(now, progress, recurrence)
       if (.not. share > 0.0_wp) then
         ! the residual has reached round-off of single precision: a product in double precision is next, or the end
-        if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return
+        if (.not. (now%level%exact .and. now%closing_error > 0.0_wp)) return
         now%closing_error = huge(1.0_wp)
         cycle
       end if
       ! close to the solution rounding errors would add up
       follows = now%by_load .and. now%residual > sqrt(epsilon(1.0_wp)) .and. .not. compliant
-      call advance(level, now, share, follows)
-      if (progress%step == projected .and. .not. now%by_load) call rescale(level, now)
+      call advance(now, share, follows)
+      if (progress%step == projected .and. .not. now%by_load) call rescale(now)
     end do
   end subroutine iterate
 
   !> Compute the closing of the gap in double precision where errors of single precision, or a load that was missed by rounding,
   !> would limit the accuracy.
-  subroutine remove_rounding(level, now, tolerance, fits, corrected, error)
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine remove_rounding(now, tolerance, fits, corrected, error)
     type(normal_iterate_t), intent(inout) :: now
     real(wp), intent(in) :: tolerance
     !> Times that the pressure of a solution was fitted to the load
@@ -214,19 +209,19 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     corrected = .false.
-    if (.not. level%exact) return
-    associate (options => level%options%normal)
+    if (.not. now%level%exact) return
+    associate (options => now%level%options%normal)
       ! the error of the pressure by an error of the gap falls with the stiffness of the layer
-      corrected = now%closing_error > max(level%normal_compliance, level%normal_law%compliance_under(now%p_max))*now%p_max &
+      corrected = now%closing_error > max(now%level%normal_compliance, now%level%normal_law%compliance_under(now%p_max))*now%p_max &
                   *max(options%residual_share*now%residual, options%tolerance_share*tolerance)
       if (.not. corrected .and. now%residual <= tolerance .and. now%by_load .and. fits < options%max_fits) then
-        corrected = abs(missing_load(level, now)) > options%tolerance_share*tolerance*now%pressures
+        corrected = abs(missing_load(now)) > options%tolerance_share*tolerance*now%pressures
         if (corrected) fits = fits + 1
       end if
     end associate
     if (.not. corrected) return
-    if (now%by_load) call fit_load(level, now)
-    call find_closing(level, now, error)
+    if (now%by_load) call fit_load(now)
+    call find_closing(now, error)
   end subroutine remove_rounding
 
   !> Judge the progress of the residual, and fix the set where it changes without end.
@@ -256,8 +251,7 @@ contains
 
   !> Find the next step: a conjugate one on a set that stands or is fixed, else a projected one, of a length that is searched for
   !> where sets change without end.
-  subroutine find_step(level, now, progress, recurrence, changed, anew)
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine find_step(now, progress, recurrence, changed, anew)
     type(normal_iterate_t), intent(inout) :: now
     type(progress_t), intent(inout) :: progress
     type(conjugate_gradient_t), intent(inout) :: recurrence
@@ -272,24 +266,24 @@ contains
     if (now%searches .and. .not. progress%fixed) then
       anew = .true.
       ! without tension, or after it was taken away
-      found = .not. pulls(level, now)
+      found = .not. pulls(now)
       if (found .or. progress%step == searched .or. progress%emptied) then
-        call search_step(level, now, progress, found)
+        call search_step(now, progress, found)
       end if
       progress%emptied = .not. found
       if (found) return
       ! tension, and the pressure of nodes that left the set, go first
-      call searched_step(level, now, 0.0_wp, 0.0_wp, progress%fall)
+      call searched_step(now, 0.0_wp, 0.0_wp, progress%fall)
       call recurrence%restart()
     else if (changed) then
-      call projected_step(level, now)
+      call projected_step(now)
     else
       progress%step = conjugate
-      if (level%normal_law%is_compliant()) then
-        call next_sprung_direction(level, now, anew)
+      if (now%level%normal_law%is_compliant()) then
+        call next_sprung_direction(now, anew)
         anew = .false.
       else
-        call next_direction(level, now, recurrence)
+        call next_direction(now, recurrence)
       end if
       return
     end if
@@ -297,38 +291,36 @@ contains
   end subroutine find_step
 
   !> Search a step, shorter and shorter until it goes down; if none does the set is fixed.
-  subroutine search_step(level, now, progress, found)
-    type(normal_lattice_t), intent(in) :: level
+  subroutine search_step(now, progress, found)
     type(normal_iterate_t), intent(inout) :: now
     type(progress_t), intent(inout) :: progress
     !> There is such a step
     logical, intent(out) :: found
     real(wp) :: shortest
 
-    shortest = level%options%normal%least_searched*progress%length
+    shortest = now%level%options%normal%least_searched*progress%length
     found = .false.
     do while (progress%length > shortest)
-      call searched_step(level, now, progress%length, merge(progress%curved, 0.0_wp, progress%step == searched), progress%fall)
+      call searched_step(now, progress%length, merge(progress%curved, 0.0_wp, progress%step == searched), progress%fall)
       found = progress%fall > 0.0_wp
       progress%step = merge(searched, projected, found)
       if (found) return
       progress%length = 0.5_wp*progress%length
     end do
-    progress%length = level%options%normal%searched_length
+    progress%length = now%level%options%normal%searched_length
     progress%fixed = .true.
     progress%fixed_start = min(now%residual, 1.0_wp)
   end subroutine search_step
 
   !> Compute the largest share of a step that leaves no tension: 1 where pressure was cut off, more elsewhere.
-  real(wp) function longest_share(level, now)
-    type(normal_lattice_t), intent(in) :: level
+  real(wp) function longest_share(now)
     type(normal_iterate_t), intent(in) :: now
     !> Rounding errors of single precision
     real(wp), parameter :: rounding = 1.0e-6_wp
     real(wp) :: fall(1), part(size(now%p, 2))
     integer :: row, k
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%p, 2)
       part(row) = 0.0_wp
       do k = 1, now%n_run(row)
@@ -340,14 +332,13 @@ contains
     end do
     !$omp end parallel do
     fall = max(maxval(part), epsilon(1.0_wp))
-    call level%space%most(fall)
+    call now%level%space%most(fall)
     longest_share = 1.0_wp
     if (fall(1) < 1.0_wp - rounding) longest_share = 1.0_wp/fall(1)
   end function longest_share
 
   !> Compute the share of a step that is taken, and of a searched one the length of the next.
-  real(wp) function share_of_step(level, now, progress, recurrence)
-    type(normal_lattice_t), intent(in) :: level
+  real(wp) function share_of_step(now, progress, recurrence)
     type(normal_iterate_t), intent(in) :: now
     type(progress_t), intent(inout) :: progress
     type(conjugate_gradient_t), intent(in) :: recurrence
@@ -355,25 +346,24 @@ contains
 
     share_of_step = 1.0_wp
     if (progress%step == searched) then
-      progress%curved = curvature(level, now)
+      progress%curved = curvature(now)
       best = progress%fall/progress%curved
       ! all of it ends where there is no tension
       share_of_step = min(best, 1.0_wp)
-      if (level%lattice%slenderness() > level%options%preconditioner%slender) share_of_step = min(best, longest_share(level, now))
+      if (now%level%lattice%slenderness() > now%level%options%preconditioner%slender) share_of_step = min(best, longest_share(now))
       ! twice the last one at most, from far below the first one more
       progress%length = min(progress%length*min(max(best, 0.5_wp), 8.0_wp), &
-                            max(2.0_wp*progress%length, 0.5_wp*level%options%normal%searched_length), 2.0_wp)
-    else if (progress%step == conjugate .and. level%normal_law%is_compliant()) then
-      share_of_step = find_sprung_step(level, now)
+                            max(2.0_wp*progress%length, 0.5_wp*now%level%options%normal%searched_length), 2.0_wp)
+    else if (progress%step == conjugate .and. now%level%normal_law%is_compliant()) then
+      share_of_step = find_sprung_step(now)
     else if (progress%step == conjugate) then
-      share_of_step = recurrence%step_length(curvature(level, now))
+      share_of_step = recurrence%step_length(curvature(now))
     end if
   end function share_of_step
 
   !> Linearise a compliant law again, which costs no product: in the first iterations, for a new set, and where the linear problem
   !> is solved.
-  subroutine follow_law(level, now, changed, sweeps, anew)
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine follow_law(now, changed, sweeps, anew)
     type(normal_iterate_t), intent(inout) :: now
     !> The set of active nodes is another one
     logical, intent(in) :: changed
@@ -383,30 +373,29 @@ contains
     logical, intent(inout) :: anew
     logical :: settled
 
-    associate (options => level%options%normal)
+    associate (options => now%level%options%normal)
       settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
       anew = anew .or. settled
       if (changed .or. settled .or. sweeps <= options%most_linearized) then
-        call linearize_law(level, now, level%normal_classification_parameter(now%n_active))
+        call linearize_law(now, now%level%normal_classification_parameter(now%n_active))
       end if
     end associate
-    if (now%by_load) call find_approach(level, now)
+    if (now%by_load) call find_approach(now)
   end subroutine follow_law
 
   !> Compute w = K p in double precision, without a rest of single precision.
-  subroutine find_closing(level, now, error)
-    type(normal_lattice_t), intent(inout) :: level
+  subroutine find_closing(now, error)
     type(normal_iterate_t), intent(inout) :: now
     type(error_t), allocatable, intent(out) :: error
     integer :: row
 
-    call level%multiply_exactly(now%p, now%w, error)
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    call now%level%multiply_exactly(now%p, now%w, error)
+    !$omp parallel do schedule(static) num_threads(now%level%space%threads)
     do row = 1, size(now%r, 2)
       now%r(:, row, 1) = 0.0_sp                                                ! which the transforms have overwritten
     end do
     !$omp end parallel do
-    call add_springs(level, now, 1)
+    call add_springs(now, 1)
     now%closing_error = 0.0_wp
   end subroutine find_closing
 

@@ -85,8 +85,6 @@ contains
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     real(wp), dimension(size(ahead, 1), size(ahead, 2)) :: before, after, spring
-    logical :: wears
-    integer :: col, row
 
     ahead = now%energy
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
@@ -94,12 +92,7 @@ contains
     spring = merge(wear*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
     call settle(now, problem, before, spring, tolerance, after, error, cache)
     if (allocated(error)) return
-    do row = 1, size(ahead, 2)
-      do col = 1, size(ahead, 1)
-        wears = now%energy(col, row) > 0.0_wp .and. before(col, row) > 0.0_wp
-        if (wears) ahead(col, row) = now%energy(col, row)*(after(col, row)/before(col, row))
-      end do
-    end do
+    where (now%energy > 0.0_wp .and. before > 0.0_wp) ahead = now%energy*(after/before)
   end subroutine energy_ahead
 
   !> Solve for the pressure on springs that are new, given one that is in balance without them.
@@ -147,15 +140,11 @@ contains
     ! the gap under `before` is that of the cycle, 0 where nodes carry
     lift = problem%space%max(closing, logical(now%candidate, lk))
     level%initial_gap = lift - closing
-    do row = 1, size(before, 2)
-      do col = 1, size(before, 1)
-        if (.not. now%candidate(col, row)) then
-          level%initial_gap(col, row) = 0.0_wp
-        else if (.not. before(col, row) > 0.0_wp) then
-          level%initial_gap(col, row) = level%initial_gap(col, row) + max(now%gap(col, row), 0.0_wp)
-        end if
-      end do
-    end do
+    where (.not. now%candidate)
+      level%initial_gap = 0.0_wp
+    else where (.not. before > 0.0_wp)
+      level%initial_gap = level%initial_gap + max(now%gap, 0.0_wp)
+    end where
     allocate (state%pressure, source=merge(before, 0.0_wp, now%candidate))
     target = load_target_t([merge(force_control, displacement_control, now%by_load)], &
                            [merge(problem%lattice%cell_area()*problem%space%sum(state%pressure), lift, now%by_load)])

@@ -13,7 +13,7 @@ module hc_field_space
   implicit none
   private
 
-  public :: field_space_t, space_over, sum_block, most_threads
+  public :: field_space_t, space_over, sum_block, most_threads, ddot
 
   !> Terms that one thread adds up.
   integer, parameter :: sum_block = 4096

@@ -6,13 +6,13 @@
 module hc_hierarchy
   use hc_precision, only: wp, lk
   use hc_communicator, only: rows_held
-  use hc_lattice, only: lattice_t
+  use hc_lattice, only: lattice_t, floor_half
   use hc_field_space, only: field_space_t
   use hc_transfer, only: restrict_field, restrict_mask
   implicit none
   private
 
-  public :: level_t, level_count
+  public :: level_t, level_count, coarse_rows_t
 
   !> Contact problem on one lattice.
   type, abstract :: level_t
@@ -37,11 +37,22 @@ module hc_hierarchy
     procedure :: coarsen
     !> Gap of the problem there, set again; values of a field there
     procedure :: coarsen_gap, restrict
+    !> Rows that the nodes of the next finer lattice take their values from, and a field there
+    procedure :: rows_below, take_below
     !> The same problem on a part of its window
     procedure :: extract_part
     !> Bodies, laws and tuning numbers, from the same problem on another lattice
     procedure(inherit), deferred :: inherit
   end type level_t
+
+  !> Rows of a coarse lattice that the nodes of the finer one between them take their values from, with the neighbors of neighbors.
+  type :: coarse_rows_t
+    !> Lattices of these rows, and of own rows of the finer lattice
+    type(lattice_t) :: rows, fine
+    !> First and last of them; the coarse lattice is all there, since one rank has both
+    integer, private :: needed(2) = 0
+    logical, private :: whole = .true.
+  end type coarse_rows_t
 
   abstract interface
     !> Take bodies, laws and tuning numbers from the same problem on another lattice; lattice, gap and candidates are set.
@@ -132,6 +143,48 @@ contains
       values = rows(first(1)::2, ::2)
     end if
   end subroutine restrict
+
+  !> Return the rows that those of this rank of the next finer lattice take their values from.
+  type(coarse_rows_t) function rows_below(self, fine) result(below)
+    class(level_t), intent(in) :: self
+    !> The problem on the finer lattice
+    class(level_t), intent(in) :: fine
+    integer, parameter :: neighbors_of_neighbors = 2
+    integer :: own(2)
+
+    below%rows = self%lattice
+    below%fine = fine%lattice
+    below%whole = fine%space%ranks%size == 1
+    if (below%whole) return
+    own = fine%space%own_rows(fine%lattice%extent(2))
+    below%fine = fine%rows_of(own(1), own(2))
+    own = fine%lattice%first(2) + own - 1
+    associate (needed => below%needed)
+      needed = [floor_half(own(1)), floor_half(own(2) + 1)] - self%lattice%first(2) + 1
+      needed = needed + [-neighbors_of_neighbors, neighbors_of_neighbors]
+      if (.not. self%lattice%periodic(2)) needed = min(max(needed, 1), self%lattice%extent(2))
+      below%rows = self%rows_of(needed(1), needed(2))
+    end associate
+  end function rows_below
+
+  !> Point to these rows of a field: to the field itself where one rank has both lattices.
+  subroutine take_below(self, below, field, own, rows)
+    class(level_t), intent(in) :: self
+    !> The rows
+    type(coarse_rows_t), intent(in) :: below
+    !> Field (n_col, own rows)
+    real(wp), intent(in), contiguous, target :: field(:, :)
+    !> Memory of the caller, allocated if it is needed
+    real(wp), allocatable, target, intent(inout) :: own(:, :)
+    !> Those rows
+    real(wp), pointer, contiguous, intent(out) :: rows(:, :)
+
+    rows => field
+    if (below%whole) return
+    if (.not. allocated(own)) allocate (own(size(field, 1), below%needed(2) - below%needed(1) + 1))
+    call self%take_rows(field, below%needed(1), own)
+    rows => own
+  end subroutine take_below
 
   !> Find the first column and row of the fine nodes that the own rows of the coarse lattice consist of, and their rows.
   subroutine find_fine_rows(fine, coarse, first, n)

@@ -10,6 +10,7 @@ module hc_active_set
   private
 
   public :: active_set_t, new_active_set, paired_runs_t, pair_runs, find_span
+  public :: packed_fields_t, new_packed_fields
 
   !> Nodes that one thread looks through at a time.
   integer, parameter :: block_size = 8192
@@ -53,6 +54,18 @@ module hc_active_set
     procedure :: is_set
     procedure, private :: pack_field, pack_single, add_to_field, add_single
   end type active_set_t
+
+  !> Fields that vanish off the nodes of a set, and serve as estimates: their values at these nodes, in single precision.
+  type :: packed_fields_t
+    !> Number of fields
+    integer :: n_field = 0
+    !> The nodes, and the values there (n_active, number of fields)
+    type(active_set_t), private :: nodes
+    real(sp), allocatable, private :: values(:, :)
+  contains
+    !> Keep a field, and return it over all nodes
+    procedure :: keep, restore
+  end type packed_fields_t
 
   !> Find the first and the last of some nodes, 1 and 0 if there are none: those that are active, or those with a value above zero
   interface find_span
@@ -488,5 +501,42 @@ contains
     is_set = within == self%n_active
     if (is_set) is_set = own%count(active) == within
   end function is_set
+
+  !> Set up a number of fields.
+  subroutine new_packed_fields(self, nodes, n_field)
+    !> Fields to be set up
+    type(packed_fields_t), intent(out) :: self
+    !> Nodes that they do not vanish at
+    type(active_set_t), intent(in) :: nodes
+    !> Number of fields
+    integer, intent(in) :: n_field
+
+    self%n_field = n_field
+    self%nodes = nodes
+    allocate (self%values(nodes%n_active, n_field))
+  end subroutine new_packed_fields
+
+  !> Keep a field.
+  subroutine keep(self, k, field)
+    class(packed_fields_t), intent(inout) :: self
+    !> Its number
+    integer, intent(in) :: k
+    !> The field
+    real(wp), intent(in), contiguous :: field(:)
+
+    call self%nodes%pack(field, self%values(:, k))
+  end subroutine keep
+
+  !> Return a field that was kept.
+  subroutine restore(self, k, field)
+    class(packed_fields_t), intent(in) :: self
+    !> Its number
+    integer, intent(in) :: k
+    !> The field
+    real(wp), intent(out), contiguous :: field(:)
+
+    call self%nodes%space%fill(field, 0.0_wp)
+    call self%nodes%unpack(real(self%values(:, k), wp), field)
+  end subroutine restore
 
 end module hc_active_set

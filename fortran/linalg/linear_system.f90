@@ -171,7 +171,7 @@ contains
   end subroutine take_image
 
   !> Compute z = M r at the active nodes: by default M is the identity.
-  subroutine precondition_packed(self, nodes, n, r, z, error)
+  subroutine precondition_packed(self, nodes, n, r, z)
     class(linear_system_t), intent(inout) :: self
     !> Active nodes, and number of all nodes
     type(active_set_t), intent(in) :: nodes
@@ -179,14 +179,12 @@ contains
     !> Values at the active nodes
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
 
     call self%space%copy(r, z)
   end subroutine precondition_packed
 
   !> Compute M B, the constraint vectors after the preconditioner.
-  subroutine precondition_constraints(system, nodes, n, constraint, mb, error)
+  subroutine precondition_constraints(system, nodes, n, constraint, mb)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns, and number of all nodes
@@ -196,15 +194,12 @@ contains
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> M B there
     real(sp), allocatable, intent(out) :: mb(:, :)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: column(:)
     integer :: m
 
     allocate (mb(size(constraint, 1), size(constraint, 2)), column(size(constraint, 1)))
     do m = 1, size(constraint, 2)
-      call system%precondition_packed(nodes, n, constraint(:, m), column, error)
-      if (allocated(error)) return
+      call system%precondition_packed(nodes, n, constraint(:, m), column)
       mb(:, m) = real(column, sp)
     end do
   end subroutine precondition_constraints
@@ -243,7 +238,7 @@ contains
 
   !> Take a step along the preconditioned residual, projected on the constraints, before the product A x is known: that of the
   !> unknowns before small changes serves for the residual, and one product serves for changes and step together.
-  subroutine step_ahead(system, nodes, constraints, rhs, ax, length, x, error)
+  subroutine step_ahead(system, nodes, constraints, rhs, ax, length, x)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns
@@ -257,8 +252,6 @@ contains
     real(wp), intent(in) :: length
     !> Unknowns (n_active), whose C^T x stays
     real(wp), intent(inout), contiguous :: x(:)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: z(:)
     real(wp), dimension(size(constraints%multiplier)) :: share
     real(wp) :: inverse(size(share), size(share))
@@ -270,8 +263,7 @@ contains
     call nodes%pack(ax, z)
     rhs = rhs - z
     call constraints%add_columns(system%space, constraints%multiplier, rhs)
-    call system%precondition_packed(nodes, size(ax), rhs, z, error)
-    if (allocated(error)) return
+    call system%precondition_packed(nodes, size(ax), rhs, z)
     share = -matmul(inverse, constraints%resultants(nodes%space, z))
     call constraints%add_mb(system%space, share, z)
     x = x + length*z
@@ -411,20 +403,24 @@ contains
 
     n = self%n_before
     resultants = 0.0_wp
-    if (allocated(self%rows)) n = size(self%rows, 1)
-    if (allocated(self%source) .and. .not. present(work)) allocate (own(size(x)))
-    vector => null()
-    if (present(work)) vector => work
-    if (allocated(own)) vector => own
-    do m = 1, size(self%mb, 2)
-      if (allocated(self%source)) then
+    if (allocated(self%source)) then
+      if (present(work)) then
+        vector => work
+      else
+        allocate (own(size(x)))
+        vector => own
+      end if
+      do m = 1, size(self%mb, 2)
         call self%source%find(m, vector(n + 1:), vector(:n))
         resultants(m) = space%dot(vector(:n), x(:n)) + space%dot(vector(n + 1:), x(n + 1:), n)
-        cycle
-      end if
-      resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
-      if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
-    end do
+      end do
+    else
+      if (allocated(self%rows)) n = size(self%rows, 1)
+      do m = 1, size(self%mb, 2)
+        resultants(m) = space%dot(self%columns(n - self%n_before + 1:, m), x(n + 1:), n)
+        if (allocated(self%rows)) resultants(m) = space%dot(self%rows(:, m), x(:n)) + resultants(m)
+      end do
+    end if
     if (allocated(self%of_sum)) resultants(size(resultants)) = space%sum(x(:self%n_before))
   end function resultants
 

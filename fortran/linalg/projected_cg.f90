@@ -1,38 +1,42 @@
 !> Conjugate gradients on a set of active nodes, with linear constraints (hc_linear_system).
 !>
+!>     d <- z + (r^T z)/(r^T z of the last direction) d,     x <- x + (r^T z)/(d^T A d) d,     z = M r
+!>
 !> The projection of the preconditioned residual satisfies the constraints on B^T x exactly,
 !>
 !>     z <- M r - M B (B^T M B)^-1 B^T M r.
 !>
 !> (M. R. Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand. 49, 1952, 409-436).
 !>
-!> Equations: docs/theory/friction.md, (F11).
+!> Equations: docs/theory/friction.md, (F11); with sets of nodes that change docs/theory/normal_contact.md, (N5).
 module hc_projected_cg
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t
-  use hc_conjugate_gradient, only: conjugate_gradient_t
-  use hc_field_space, only: field_space_t
+  use hc_field_space, only: field_space_t, ddot
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, iterations_used_up, &
     solution_broke_off
   implicit none
   private
 
-  public :: projected_cg
+  public :: projected_cg, conjugate_gradient_t
 
   !> Values that one thread treats at a time: few enough to stay in its cache while several passes go over them
   integer, parameter :: block = 1024
 
-  interface
-    !> Compute a scalar product (BLAS)
-    pure real(wp) function ddot(n, dx, incx, dy, incy)
-      import :: wp
-      implicit none
-      integer, intent(in) :: n, incx, incy
-      real(wp), intent(in) :: dx(1 + (n - 1)*abs(incx)), dy(1 + (n - 1)*abs(incy))
-    end function ddot
-  end interface
+  !> Where the recurrence of conjugate gradients stands, for vectors of any kind and storage.
+  type :: conjugate_gradient_t
+    !> r^T z of the last direction; not positive: there is none, the next direction is z
+    real(wp), private :: rz = 0.0_wp
+  contains
+    !> Discard the last direction
+    procedure :: restart
+    !> Share of the last direction in the next
+    procedure :: last_share
+    !> Length of the step along the direction
+    procedure :: step_length
+  end type conjugate_gradient_t
 
 contains
 
@@ -69,7 +73,7 @@ contains
     real(wp), dimension(size(constraints%columns, 2)) :: change, along
     real(wp) :: inverse(size(change), size(change))
     type(field_space_t) :: space
-    logical :: independent, anew
+    logical :: independent
     integer :: stat
 
     space = nodes%space
@@ -95,14 +99,14 @@ contains
         call advance_residual(-step, z, change, b, m_b, r, along, space)
         change = -matmul(along, inverse)
         constraints%multiplier = constraints%multiplier + change
-        call add_constraints(change, b, r, iteration%residual, space)
+        call space%add_columns(b, change, r)
+        iteration%residual = space%max_abs(r)
         largest = max(largest, iteration%residual)
         if (iteration%residual <= iteration%tolerance .or. iteration%made >= iteration%most) exit
-        call system%precondition_packed(nodes, size(ax), r, z, error)
-        if (allocated(error)) return
+        call system%precondition_packed(nodes, size(ax), r, z)
         call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
-        call recurrence%last_share(rz, share, anew)
-        call combine(1.0_wp, z, merge(0.0_wp, share, anew), d, space)
+        call recurrence%last_share(rz, share)
+        call combine(1.0_wp, z, share, d, space)
         call system%product_packed(nodes, d, onto, error)
         if (allocated(error)) return
         call nodes%pack(onto, z)
@@ -200,33 +204,6 @@ contains
     end do
   end subroutine advance_residual
 
-  !> Compute r <- r + B change, and its largest element.
-  subroutine add_constraints(change, b, r, largest, space)
-    !> Change of the multipliers, and B
-    real(wp), intent(in), contiguous :: change(:), b(:, :)
-    !> Residual, and its largest element
-    real(wp), intent(inout), contiguous :: r(:)
-    real(wp), intent(out) :: largest
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    integer :: i, m, from, to
-
-    largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to) reduction(max: largest)
-    do from = 1, size(r), block
-      to = min(from + block - 1, size(r))
-      do m = 1, size(change)
-        call add_multiple(to - from + 1, change(m), b(from:to, m), r(from:to))
-      end do
-      !$omp simd reduction(max: largest)
-      do i = from, to
-        largest = max(largest, abs(r(i)))
-      end do
-    end do
-    !$omp end parallel do
-    largest = space%largest(largest)
-  end subroutine add_constraints
-
   !> Project z <- z + M B share, and compute r^T z.
   subroutine project(share, m_b, r, z, rz, space)
     !> Shares of the constraints, and M B
@@ -298,5 +275,34 @@ contains
       y(i) = y(i) + factor*x(i)
     end do
   end subroutine add_multiple
+
+  !> Discard the last direction.
+  pure subroutine restart(self)
+    class(conjugate_gradient_t), intent(inout) :: self
+    self%rz = 0.0_wp
+  end subroutine restart
+
+  !> Compute the share of the last direction in the next, zero if there is none.
+  pure subroutine last_share(self, rz, share)
+    class(conjugate_gradient_t), intent(inout) :: self
+    !> r^T z
+    real(wp), intent(in) :: rz
+    real(wp), intent(out) :: share
+
+    share = 0.0_wp
+    if (self%rz > 0.0_wp) share = rz/self%rz
+    self%rz = rz
+  end subroutine last_share
+
+  !> Compute the length of the step along the direction; zero: nothing is left to gain in working precision, or a matrix is not
+  !> positive definite.
+  pure real(wp) function step_length(self, curvature)
+    class(conjugate_gradient_t), intent(in) :: self
+    !> d^T A d
+    real(wp), intent(in) :: curvature
+
+    step_length = 0.0_wp
+    if (curvature > 0.0_wp .and. self%rz > 0.0_wp) step_length = self%rz/curvature
+  end function step_length
 
 end module hc_projected_cg

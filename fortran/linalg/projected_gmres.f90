@@ -267,8 +267,7 @@ contains
         r = basis(k)%v
       end if
       call weigh(1.0_wp/iteration%weight, r)
-      call system%precondition_packed(nodes, size(ax), r, w, error)
-      if (allocated(error)) return
+      call system%precondition_packed(nodes, size(ax), r, w)
       deallocate (r)
       call take_memory(k)
       if (allocated(error)) return

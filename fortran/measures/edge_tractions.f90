@@ -252,8 +252,7 @@ contains
       do k = 1, size(change, 3)
         constraints%columns((k - 1)*count(nodes) + 1:k*count(nodes), k) = 1.0_wp
       end do
-      call precondition_constraints(system, set, size(x), constraints%columns, constraints%mb, error)
-      if (allocated(error)) return
+      call precondition_constraints(system, set, size(x), constraints%columns, constraints%mb)
       call constraints%satisfy(system%space, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, set)
       call system%product(x, ax, error)
       if (allocated(error)) return

@@ -18,10 +18,11 @@ module hc_operator_set
   use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
   use hc_shear_preconditioner, only: shear_preconditioner_t, new_shear_preconditioner
   use hc_spectrum_cache, only: kernel_cache_t
+  use hc_linear_system, only: linear_system_t
   implicit none
   private
 
-  public :: operators_t, new_operators, operators_memory
+  public :: operators_t, new_operators, operators_memory, traction_system_t
 
   !> Operator and preconditioners over one window, and the work they did: any that extend the abstract types.
   type :: operators_t
@@ -39,8 +40,6 @@ module hc_operator_set
     procedure :: apply => apply_operators
     !> The same along components that act, in the place of the tractions
     procedure :: replace => replace_by_displacement
-    !> Memory for them
-    procedure :: take_image
     !> Count the work from here on; no nodes are active
     procedure :: reset
     !> Free what the preconditioners store for the active nodes
@@ -48,6 +47,13 @@ module hc_operator_set
     !> All work so far, in applications of the full operator
     procedure :: work
   end type operators_t
+
+  !> A linear system of tractions, whose vectors are components over the window.
+  type, abstract, extends(linear_system_t) :: traction_system_t
+    type(operators_t), pointer :: operators => null()
+  contains
+    procedure :: take_image
+  end type traction_system_t
 
 contains
 
@@ -131,7 +137,7 @@ contains
     if (.not. allocated(error)) call take_off_ahead(self, onto, displacement)
   end subroutine apply_operators
 
-  !> In steady rolling, take tangential displacements at the node ahead off those of each node.
+  !> Take tangential displacements at the node ahead off those of each node, in steady rolling.
   subroutine take_off_ahead(self, components, displacement)
     class(operators_t), intent(in) :: self
     integer, intent(in) :: components(:)
@@ -167,22 +173,20 @@ contains
 
   !> Point to memory for components as vectors: that of the operator, until its next use or that of a preconditioner, or that of the
   !> caller.
-  subroutine take_image(self, n_component, own, image, stat)
-    class(operators_t), intent(in) :: self
-    !> Number of components
-    integer, intent(in) :: n_component
-    !> Memory of the caller, allocated if it is needed
+  subroutine take_image(self, n, own, image, stat)
+    class(traction_system_t), intent(in) :: self
+    integer, intent(in) :: n
     real(wp), allocatable, target, intent(inout) :: own(:)
     real(wp), pointer, contiguous, intent(out) :: image(:)
-    !> Not zero: there is not enough memory
     integer, intent(out) :: stat
 
     stat = 0
-    image => self%flexibility%in_place(n_component)
+    associate (flexibility => self%operators%flexibility)
+      image => flexibility%in_place(n/product(self%space%own_extent(flexibility%lattice%extent)))
+    end associate
     if (associated(image)) return
-    if (.not. allocated(own)) allocate (own(n_component*product(self%space%own_extent(self%flexibility%lattice%extent))), stat=stat)
-    if (stat /= 0) return
-    image => own
+    if (.not. allocated(own)) allocate (own(n), stat=stat)
+    if (stat == 0) image => own
   end subroutine take_image
 
   !> Return all work so far, in applications of the full operator.

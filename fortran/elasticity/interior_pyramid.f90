@@ -103,25 +103,29 @@ contains
     !> Derivatives
     real(wp), intent(out) :: derivative(n, n_derivative)
 
-    real(wp) :: radius(most_points), at(most_points, 3), least
-    integer :: i
+    real(wp) :: radius(most_points), far(most_points, n_derivative)
+    integer :: order(most_points), some(most_points), i, m, highest
 
-    least = huge(1.0_wp)
     do i = 1, n
       radius(i) = sqrt(x(i)**2 + y(i)**2 + z(i)**2)
-      at(i, :) = [x(i), y(i), z(i)]
-      if (radius(i) < far_radius) then
-        radius(i) = far_radius
-        at(i, :) = [0.0_wp, 0.0_wp, far_radius]
-      else
-        least = min(least, radius(i))
-      end if
+      order(i) = order_needed(radius(i))
+      if (order(i) == 0) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
     end do
-    if (least < huge(1.0_wp)) then
-      call far_potentials(self, n, order_needed(least), at(:n, 1), at(:n, 2), at(:n, 3), radius(:n), derivative)
-    end if
-    do i = 1, n
-      if (x(i)**2 + y(i)**2 + z(i)**2 < far_radius**2) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
+    ! together only points of one order, so that no value depends on the other points
+    do
+      highest = maxval(order(:n))
+      if (highest == 0) exit
+      m = 0
+      do i = 1, n
+        if (order(i) /= highest) cycle
+        m = m + 1
+        some(m) = i
+        order(i) = 0
+      end do
+      associate (at => some(:m))
+        call far_potentials(self, m, highest, x(at), y(at), z(at), radius(at), far(:m, :))
+        derivative(at, :) = far(:m, :)
+      end associate
     end do
   end subroutine potentials
 
@@ -195,12 +199,13 @@ contains
     !$omp end parallel do
   end subroutine fields
 
-  !> Compute the order of the moments that suffices from a distance on.
+  !> Return the order of the moments that suffices at a distance; 0: the point is too near for them.
   pure integer function order_needed(radius)
+    !> Distance, in longest edges
     real(wp), intent(in) :: radius
     integer :: band
 
-    order_needed = max_order
+    order_needed = merge(max_order, 0, radius >= far_radius)
     do band = 1, size(band_radius)
       if (radius >= band_radius(band)) order_needed = band_order(band)
     end do

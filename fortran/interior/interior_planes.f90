@@ -13,7 +13,7 @@ module hc_interior_planes
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
-  use hc_interior_fields, only: n_derivative, check_interior, xx, yy, zz, xy, yz, xz
+  use hc_interior_fields, only: check_interior, xx, yy, zz, xy, yz, xz
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_points, only: check_body
@@ -302,9 +302,9 @@ contains
     integer, intent(in) :: j
     real(wp), intent(out) :: k(:, :)
 
-    real(wp) :: x(most_points), y(most_points), z(most_points), d(most_points, n_derivative)
-    real(wp) :: u(most_points, 3, 3), s(most_points, 6, 3)
-    integer :: i, depth, n, m, middle, first, t
+    real(wp), allocatable :: u(:, :, :), s(:, :, :)
+    real(wp) :: x(most_points), y(most_points)
+    integer :: i, n, m, middle, first, t
 
     n = size(k, 2)/2
     middle = n + 1
@@ -317,17 +317,13 @@ contains
         x(i) = (first + i - 1)*self%basis(1, 1) + j*self%basis(1, 2)
         y(i) = (first + i - 1)*self%basis(2, 1) + j*self%basis(2, 2)
       end do
-      u = 0.0_wp
-      s = 0.0_wp
-      do depth = 1, size(self%fields%depth)
-        z = self%fields%depth(depth)/self%spacing
-        call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-        call self%fields%add(depth, d(:m, :), d(:m, :), d(:m, :), self%spacing, u(:m, :, :), s(:m, :, :))
-      end do
+      allocate (u(m, 3, 3), s(m, 6, 3))
+      call self%fields%of_pyramid(self%pyramid, self%spacing, x(:m), y(:m), u, s)
       if (self%tables%kind == of_displacement) s(:, :3, :) = u
       do t = 1, size(k, 1)
-        k(t, middle + first:middle + first + m - 1) = s(:m, self%tables%component(t), self%tables%load(t))
+        k(t, middle + first:middle + first + m - 1) = s(:, self%tables%component(t), self%tables%load(t))
       end do
+      deallocate (u, s)
       first = first + m
     end do
     if (self%mirrored) then

@@ -12,7 +12,7 @@ module hc_transfer
   implicit none
   private
 
-  public :: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
+  public :: prolong, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
 
 contains
 
@@ -150,25 +150,6 @@ contains
     !$omp end parallel do
   end subroutine prolong_edge
 
-  !> Interpolate all components of a field.
-  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine, space)
-    !> Coarse lattice and window
-    type(lattice_t), intent(in) :: coarse_lattice
-    !> Coarse field (n_col, n_row, number of components)
-    real(wp), intent(in) :: coarse(:, :, :)
-    !> Fine lattice and window
-    type(lattice_t), intent(in) :: fine_lattice
-    !> Fine field (n_col, n_row, number of components)
-    real(wp), intent(out) :: fine(:, :, :)
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    integer :: m
-
-    do m = 1, size(fine, 3)
-      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m), space)
-    end do
-  end subroutine prolong_vector
-
   !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
   subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine, space)
     !> Coarse lattice and window
@@ -208,7 +189,9 @@ contains
       end do
     end do
     !$omp end parallel do
-    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine, space)
+    do k = 1, size(fine, 3)
+      call prolong(coarse_lattice, ratio(:, :, k), fine_lattice, fine(:, :, k), space)
+    end do
     !$omp parallel do schedule(static) private(k) num_threads(space%threads_for(size(fine_pressure)))
     do row = 1, size(fine, 2)
       do k = 1, size(fine, 3)

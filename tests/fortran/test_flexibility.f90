@@ -512,11 +512,11 @@ contains
     real(wp), intent(in) :: displacement(:, :, :)
     type(edge_extension_t), intent(in), optional :: edge
     real(wp) :: traction(size(displacement, 1), size(displacement, 2), size(displacement, 3))
-    real(sp), dimension(size(displacement, 1), size(displacement, 2), size(displacement, 3)) :: given, wanted
+    real(sp) :: values(size(displacement, 1), size(displacement, 2), size(displacement, 3))
 
-    given = real(displacement/preconditioner%unit, sp)
-    call preconditioner%apply_single(given, wanted, edge)
-    traction = wanted
+    values = real(displacement/preconditioner%unit, sp)
+    call preconditioner%apply_in_place(values, edge)
+    traction = values
   end function undone
 
   !> In the middle of the window the preconditioner undoes the operator within 0.2 per cent.

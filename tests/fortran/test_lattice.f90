@@ -102,7 +102,8 @@ contains
     if (allocated(error)) return
     zone = .false.
     zone(1, 3) = .true.
-    call check_true(error, count(lattice%dilated(zone)) == 4 .and. count(lattice%dilated(zone, 2)) == 9, 'nodes near a corner')
+    call check_true(error, count(lattice%dilated(zone)) == 4 .and. count(lattice%dilated(lattice%dilated(zone))) == 9, &
+                    'nodes near a corner')
     if (allocated(error)) return
     call check_true(error, all(lattice%ring_max(merge(2.0_wp, 1.0_wp, zone)) > 1.5_wp .eqv. lattice%dilated(zone)), 'largest')
     if (allocated(error)) return

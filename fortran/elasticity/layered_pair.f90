@@ -19,7 +19,7 @@ module hc_layered_pair
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_word, n_block
-  use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
+  use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair, shear_modulus
   use hc_layer_response, only: layer_t, layered_body_t, n_response, of_normal, of_along, of_across, of_coupling
   use hc_image_fit, only: images_t, wave_numbers
   use hc_periodic_symbol, only: sinc
@@ -148,13 +148,6 @@ contains
     end do
     body%base = layer_t(0.0_wp, shear_modulus(material), material%poisson_ratio)
   end subroutine make_body
-
-  !> Return the shear modulus; 0: rigid [Pa].
-  pure real(wp) function shear_modulus(of)
-    type(material_t), intent(in) :: of
-    shear_modulus = 0.0_wp
-    if (.not. of%rigid) shear_modulus = of%young_modulus/(2.0_wp*(1.0_wp + of%poisson_ratio))
-  end function shear_modulus
 
   !> Find the images: with the largest depth from which on the error is small.
   pure subroutine find_images(self, error)

@@ -6,13 +6,13 @@
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_transfer
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp
   use hc_lattice, only: lattice_t, neighbors, floor_half
   use hc_field_space, only: field_space_t
   implicit none
   private
 
-  public :: prolong, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
+  public :: prolong, prolong_edge, prolong_shear, restrict_field, restrict_vector
 
 contains
 
@@ -233,21 +233,5 @@ contains
       coarse(:, :, m) = restrict_field(fine_lattice, fine(:, :, m), coarse_lattice)
     end do
   end function restrict_vector
-
-  !> Return the values of a mask at the coarse nodes.
-  pure function restrict_mask(fine_lattice, fine, coarse_lattice) result(coarse)
-    !> Fine lattice and window
-    type(lattice_t), intent(in) :: fine_lattice
-    !> Fine mask (n_col, n_row)
-    logical(lk), intent(in) :: fine(:, :)
-    !> Coarse lattice and window, inside the fine one
-    type(lattice_t), intent(in) :: coarse_lattice
-    !> Coarse mask (n_col, n_row)
-    logical(lk) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
-    integer :: start(2)
-
-    start = 2*coarse_lattice%first - fine_lattice%first + 1
-    coarse = fine(start(1)::2, start(2)::2)
-  end function restrict_mask
 
 end module hc_transfer

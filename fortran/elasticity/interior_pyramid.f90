@@ -25,8 +25,10 @@ module hc_interior_pyramid
 
   !> Distance from which the moment expansion is used, in longest edges.
   real(wp), parameter :: far_radius = 3.0_wp
-  !> Beyond band_radius(k) the moments up to the order band_order(k) suffice (truncation < 1e-14 of the envelopes).
-  real(wp), parameter :: band_radius(7) = [6.0_wp, 7.0_wp, 9.0_wp, 14.0_wp, 25.0_wp, 57.0_wp, 200.0_wp]
+  !> Beyond band_radius(k, :) the moments up to the order band_order(k) suffice: truncation < 1e-14 of the envelopes, or < 3e-17 where
+  !> fields are summed with large coefficients of either sign.
+  real(wp), parameter :: band_radius(7, 2) = reshape([6.0_wp, 7.0_wp, 9.0_wp, 14.0_wp, 25.0_wp, 57.0_wp, 200.0_wp, &
+                                                      9.0_wp, 11.0_wp, 15.0_wp, 25.0_wp, 52.0_wp, 140.0_wp, 630.0_wp], [7, 2])
   integer, parameter :: band_order(7) = [16, 14, 12, 10, 8, 6, 4]
   !> Points that are worked on at a time.
   integer, parameter, public :: most_points = 64
@@ -43,6 +45,8 @@ module hc_interior_pyramid
     real(wp) :: volume = 0.0_wp
     !> Harmonics are multiples of it (6 if the lattice is equilateral, else 2)
     integer :: fold = 2
+    !> Column of `band_radius`
+    integer :: bands = 1
     !> Signed coefficients of the moments: order of the moment, harmonic, order of the derivative (0...3)
     complex(wp) :: moment(0:max_order, -max_order:max_order, 0:3) = 0.0_wp
   contains
@@ -65,16 +69,19 @@ module hc_interior_pyramid
 contains
 
   !> Set up creases and moments of the pyramid of a lattice.
-  pure subroutine new_interior_pyramid(pyramid, basis)
+  pure subroutine new_interior_pyramid(pyramid, basis, sharp)
     !> Pyramid to be set up
     type(interior_pyramid_t), intent(out) :: pyramid
     !> Basis vectors of the lattice as columns [m]
     real(wp), intent(in) :: basis(2, 2)
+    !> Fields will be summed with large coefficients; absent: they will not
+    logical, intent(in), optional :: sharp
 
     complex(wp) :: moment(0:max_order, 0:max_order)
     real(wp) :: edges(2, 3)
     integer :: a, b, m
 
+    if (present(sharp)) pyramid%bands = merge(2, 1, sharp)
     call hat_creases(basis, pyramid%crease, edges, pyramid%spacing, pyramid%volume)
     moment = hat_moments(cmplx(edges(1, :), edges(2, :), wp))
     pyramid%fold = 6
@@ -103,29 +110,36 @@ contains
     !> Derivatives
     real(wp), intent(out) :: derivative(n, n_derivative)
 
-    real(wp) :: radius(most_points), far(most_points, n_derivative)
-    integer :: order(most_points), some(most_points), i, m, highest
+    real(wp) :: radius(most_points), at(most_points, 4), far(most_points, n_derivative)
+    integer :: order(most_points), some(most_points), i, k, m, highest
 
     do i = 1, n
       radius(i) = sqrt(x(i)**2 + y(i)**2 + z(i)**2)
-      order(i) = order_needed(radius(i))
+      order(i) = order_needed(self, radius(i))
       if (order(i) == 0) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
     end do
+    highest = maxval(order(:n))
+    if (highest > 0 .and. all(order(:n) == highest)) then
+      call far_potentials(self, n, highest, x, y, z, radius(:n), derivative)
+      return
+    end if
     ! together only points of one order, so that no value depends on the other points
-    do
-      highest = maxval(order(:n))
-      if (highest == 0) exit
+    do while (highest > 0)
       m = 0
       do i = 1, n
         if (order(i) /= highest) cycle
         m = m + 1
         some(m) = i
+        at(m, :) = [x(i), y(i), z(i), radius(i)]
         order(i) = 0
       end do
-      associate (at => some(:m))
-        call far_potentials(self, m, highest, x(at), y(at), z(at), radius(at), far(:m, :))
-        derivative(at, :) = far(:m, :)
-      end associate
+      call far_potentials(self, m, highest, at(:m, 1), at(:m, 2), at(:m, 3), at(:m, 4), far(:m, :))
+      do k = 1, n_derivative
+        do i = 1, m
+          derivative(some(i), k) = far(i, k)
+        end do
+      end do
+      highest = maxval(order(:n))
     end do
   end subroutine potentials
 
@@ -142,12 +156,12 @@ contains
 
     real(wp) :: d(most_points, n_derivative), depth(most_points)
     integer, allocatable :: band(:), node(:)
-    integer :: next(0:size(band_radius) + 2), first, last, n, i
+    integer :: next(0:size(band_order) + 2), first, last, n, i
 
     allocate (band(size(x)), node(size(x)))
     next = 1
     do i = 1, size(x)
-      band(i) = count(x(i)**2 + y(i)**2 + z**2 >= [far_radius, band_radius]**2)
+      band(i) = count(x(i)**2 + y(i)**2 + z**2 >= [far_radius, band_radius(:, self%bands)]**2)
       next(band(i) + 1:) = next(band(i) + 1:) + 1
     end do
     do i = 1, size(x)
@@ -200,14 +214,15 @@ contains
   end subroutine fields
 
   !> Return the order of the moments that suffices at a distance; 0: the point is too near for them.
-  pure integer function order_needed(radius)
+  pure integer function order_needed(self, radius)
+    type(interior_pyramid_t), intent(in) :: self
     !> Distance, in longest edges
     real(wp), intent(in) :: radius
     integer :: band
 
     order_needed = merge(max_order, 0, radius >= far_radius)
-    do band = 1, size(band_radius)
-      if (radius >= band_radius(band)) order_needed = band_order(band)
+    do band = 1, size(band_order)
+      if (radius >= band_radius(band, self%bands)) order_needed = band_order(band)
     end do
   end function order_needed
 

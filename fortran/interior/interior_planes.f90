@@ -145,7 +145,7 @@ contains
     if (lattice%is_periodic()) return
     call require_memory(planes_memory(lattice%extent, coated, planes%space%threads), error, planes%space%threads)
     if (allocated(error)) return
-    call new_interior_pyramid(planes%pyramid, lattice%unit_basis())
+    call new_interior_pyramid(planes%pyramid, lattice%unit_basis(), sharp=coated)
     allocate (planes%loads(lattice%extent(1), lattice%extent(2), 3), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the stress: use a smaller window')

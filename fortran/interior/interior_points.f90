@@ -75,7 +75,7 @@ contains
       call new_periodic_interior(repeating, lattice, body, inside, traction, shared, error)
       if (.not. allocated(error)) call repeating%at_points(points, displacement, stress, error)
     else
-      call new_loaded_nodes(loaded, lattice, traction, body, error)
+      call new_loaded_nodes(loaded, lattice, traction, body, size(inside%layer) > 0, error)
       if (.not. allocated(error)) call sum_at_points(loaded, inside, points, displacement, stress, shared, error)
     end if
     if (allocated(error)) return
@@ -157,13 +157,14 @@ contains
   end subroutine check_body
 
   !> Find the nodes that carry traction.
-  subroutine new_loaded_nodes(self, lattice, traction, body, error)
+  subroutine new_loaded_nodes(self, lattice, traction, body, coated, error)
     type(loaded_nodes_t), intent(out) :: self
     type(lattice_t), intent(in) :: lattice
     !> Pressure and traction on body 1 (n_col, n_row, component, step) [Pa]
     real(wp), intent(in) :: traction(:, :, :, :)
-    !> Number of the body
+    !> Number of the body, and whether it has layers
     integer, intent(in) :: body
+    logical, intent(in) :: coated
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
 
@@ -177,7 +178,7 @@ contains
       call raise(error, status%resources, 'not enough memory for the tractions: use fewer load steps')
       return
     end if
-    call new_interior_pyramid(self%pyramid, lattice%basis)
+    call new_interior_pyramid(self%pyramid, lattice%basis, coated)
     side = merge(1.0_wp, -1.0_wp, body == 1)
     n = 0
     do row = 1, size(traction, 2)

@@ -101,7 +101,7 @@ contains
     self%space = space
     surface = inside%material_at(0.0_wp)
     self%shear_modulus = surface%shear_modulus
-    call new_interior_pyramid(self%pyramid, lattice%basis)
+    call new_interior_pyramid(self%pyramid, lattice%basis, sharp=.true.)
     associate (n => lattice%extent, n_step => size(traction, 4))
       allocate (self%wave(n(2), n(1), 3, n_step), self%load(3*n_step, n(1), n(2)), field(n(1), n(2)), stat=stat)
       if (stat /= 0) then

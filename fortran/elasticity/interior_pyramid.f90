@@ -11,8 +11,7 @@
 module hc_interior_pyramid
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_hat_creases, only: crease_t, hat_creases
-  use hc_hat_moments, only: hat_moments, max_order
+  use hc_hat, only: crease_t, hat_creases, hat_moments, max_order
   use hc_segment_integrals, only: segment_integrals
   use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, psi, psi_z, z_psi_zz, &
                                 psi_x, psi_y, z_psi_xz, z_psi_yz, z_psi_xx, z_psi_xy, z_psi_yy, chi_x, chi_y, &

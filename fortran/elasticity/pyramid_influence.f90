@@ -16,15 +16,14 @@
 !> probability density of z = sum_q U_q d_q with U_q uniform on (-1/2, 1/2) and
 !> d_q the three edge directions, so that its moments are coefficients of
 !> product_q sinh(w_q/2)/(w_q/2), w_q = s d_q + t conj(d_q), and the kernels are
-!> power series in 1/z (hc_hat_moments). Both are valid for any lattice; lengths are in units of the
+!> power series in 1/z (hc_hat). Both are valid for any lattice; lengths are in units of the
 !> longest edge inside this module.
 !>
 !> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pyramid_influence
   use hc_precision, only: wp
-  use hc_hat_creases, only: crease_t, hat_creases
   use hc_segment_integrals, only: segment_integrals
-  use hc_hat_moments, only: hat_moments, binomial_series, max_order
+  use hc_hat, only: crease_t, hat_creases, hat_moments, binomial_series, max_order
   implicit none
   private
 

@@ -81,7 +81,7 @@ module hc_interior_planes
 
 contains
 
-  !> The tables of the stress, or of the displacement.
+  !> Return the tables of the stress, or of the displacement.
   pure type(tables_t) function tables_of(displaced, coated)
     !> Of the displacement; of a coated body
     logical, intent(in) :: displaced, coated
@@ -110,7 +110,7 @@ contains
     end if
   end function tables_of
 
-  !> Plans and scratch space.
+  !> Make plans and scratch space.
   subroutine new_interior_planes(planes, lattice, body, inside, error, space, displaced)
     !> Planes to be set up
     type(interior_planes_t), intent(out) :: planes
@@ -219,7 +219,7 @@ contains
     end associate
   end subroutine set_depth
 
-  !> Stress, or displacement times the shear modulus, at the nodes of the plane.
+  !> Compute the stress, or displacement times the shear modulus, at the nodes of the plane.
   subroutine apply(self, traction, field, error)
     class(interior_planes_t), intent(inout) :: self
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component) [Pa]
@@ -242,7 +242,7 @@ contains
     end associate
   end subroutine apply
 
-  !> Stress, or displacement times the shear modulus, at the nodes of several planes for a history of load steps.
+  !> Compute the stress, or displacement times the shear modulus, at the nodes of several planes for a history of steps.
   subroutine of_history(self, traction, depth, field, error, cache)
     class(interior_planes_t), intent(inout) :: self
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]

@@ -39,7 +39,7 @@ module hc_interior_points
 
 contains
 
-  !> Displacement and stress at points for a history of load steps.
+  !> Compute displacement and stress at points for a history of load steps.
   subroutine fields_at_points(lattice, traction, body, inside, points, displacement, stress, error, space)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice

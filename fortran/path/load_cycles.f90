@@ -11,7 +11,7 @@ module hc_load_cycles
 
 contains
 
-  !> Steps at which a quantity turns back, with the last one before it changes at all and its last extreme.
+  !> Find the steps at which a quantity turns back, with the last one before it changes at all and its last extreme.
   pure function turning_points(values) result(turns)
     !> Values of the steps
     real(wp), intent(in) :: values(:)
@@ -63,7 +63,7 @@ contains
     end do
   end subroutine find_cycles
 
-  !> Does a quantity come back to where it was two turning points before?
+  !> Return whether a quantity comes back to where it was two turning points before.
   pure logical function is_back(turns, closure)
     !> Its values at three turning points
     real(wp), intent(in) :: turns(3)
@@ -72,7 +72,7 @@ contains
     is_back = abs(turns(3) - turns(1)) < closure*abs(turns(2) - turns(1))
   end function is_back
 
-  !> Area of the loop of a load over its motion, closed by a straight line: the work of the load around it, (L3) [J].
+  !> Compute the area of the loop of a load over its motion, closed by a straight line: the work of the load around it, (L3) [J].
   pure real(wp) function loop_area(motion, load)
     !> Displacement [m] or rotation [rad] of the steps of a cycle
     real(wp), intent(in) :: motion(:)

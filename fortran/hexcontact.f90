@@ -62,7 +62,7 @@ module hexcontact
   use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
                                 moment_ellipse, edge_ellipse, ellipse_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
-  use hc_zone_edge, only: zone_edge_t, zone_mesh_t
+  use hc_zone_edge, only: edged_zone_t, zone_edge_t, zone_mesh_t
   use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_tractions, only: correct_at_edges
   use hc_load_cycles, only: find_cycles, loop_area

@@ -37,7 +37,6 @@ module hc_axisymmetric
     elemental function quantity_interface(self, radius) result(value)
       import :: axisymmetric_t, wp
       implicit none
-      !> Body
       class(axisymmetric_t), intent(in) :: self
       !> Contact radius a [m]
       real(wp), intent(in) :: radius
@@ -48,7 +47,6 @@ module hc_axisymmetric
     elemental function pressure_interface(self, radius, r) result(value)
       import :: axisymmetric_t, wp
       implicit none
-      !> Body
       class(axisymmetric_t), intent(in) :: self
       !> Contact radius a, distance from the axis [m]
       real(wp), intent(in) :: radius, r
@@ -59,7 +57,6 @@ module hc_axisymmetric
     pure function radius_interface(self, normal_load, approach) result(radius)
       import :: axisymmetric_t, wp
       implicit none
-      !> Body
       class(axisymmetric_t), intent(in) :: self
       !> Load [N] or approach [m]: one of them, above 0
       real(wp), intent(in), optional :: normal_load, approach
@@ -140,12 +137,10 @@ module hc_axisymmetric
 contains
 
   !> Compute the largest pressure by the contact radius [Pa]; there is one maximum between the axis and the edge.
-  pure function max_pressure(self, radius) result(peak)
-    !> Body
+  pure real(wp) function max_pressure(self, radius) result(peak)
     class(axisymmetric_t), intent(in) :: self
     !> Contact radius [m]
     real(wp), intent(in) :: radius
-    real(wp) :: peak
 
     integer, parameter :: n_sample = 400
     real(wp), parameter :: golden = 0.5_wp*(sqrt(5.0_wp) - 1.0_wp)
@@ -184,21 +179,17 @@ contains
   ! ------------------------------------------------------------------------------- power laws
 
   !> Compute delta = c C a^n, c = sqrt(pi) Gamma(n/2+1)/Gamma(n/2+1/2) [m].
-  elemental function power_law_approach(self, radius) result(value)
-    !> Body
+  elemental real(wp) function power_law_approach(self, radius) result(value)
     class(power_law_t), intent(in) :: self
     !> Contact radius a [m]
     real(wp), intent(in) :: radius
-    real(wp) :: value
 
     value = power_law_factor(self)*radius**self%exponent
   end function power_law_approach
 
   !> Compute c C of the approach [m^(1-n)].
-  elemental function power_law_factor(self) result(factor)
-    !> Body
+  elemental real(wp) function power_law_factor(self) result(factor)
     class(power_law_t), intent(in) :: self
-    real(wp) :: factor
 
     associate (n => self%exponent)
       factor = sqrt(pi)*exp(log_gamma(0.5_wp*n + 1.0_wp) - log_gamma(0.5_wp*n + 0.5_wp))*self%coefficient
@@ -206,23 +197,19 @@ contains
   end function power_law_factor
 
   !> Compute P = 2 E* n/(n+1) delta a [N].
-  elemental function power_law_load(self, radius) result(value)
-    !> Body
+  elemental real(wp) function power_law_load(self, radius) result(value)
     class(power_law_t), intent(in) :: self
     !> Contact radius a [m]
     real(wp), intent(in) :: radius
-    real(wp) :: value
 
     value = 2.0_wp*self%effective_modulus*self%exponent/(self%exponent + 1.0_wp)*self%approach(radius)*radius
   end function power_law_load
 
   !> Find the contact radius under a load or an approach [m].
-  pure function power_law_contact_radius(self, normal_load, approach) result(radius)
-    !> Body
+  pure real(wp) function power_law_contact_radius(self, normal_load, approach) result(radius)
     class(power_law_t), intent(in) :: self
     !> Load [N] or approach [m]: one of them, above 0
     real(wp), intent(in), optional :: normal_load, approach
-    real(wp) :: radius
 
     radius = 0.0_wp
     if (present(approach)) radius = (approach/power_law_factor(self))**(1.0_wp/self%exponent)
@@ -233,12 +220,10 @@ contains
   !>
   !> Integration by parts leads from I_(n-2) to I_n = (s + (n-2) r^2 I_(n-2))/(n-1), and x = r sinh u to a smooth
   !> integrand, I_n = integral_0^(arsinh s/r) (r cosh u)^(n-1) du.
-  elemental function power_law_pressure(self, radius, r) result(value)
-    !> Body
+  elemental real(wp) function power_law_pressure(self, radius, r) result(value)
     class(power_law_t), intent(in) :: self
     !> Contact radius a, distance from the axis [m]
     real(wp), intent(in) :: radius, r
-    real(wp) :: value
 
     real(wp) :: n, x, s, angle
     integer :: n_step, k
@@ -269,12 +254,10 @@ contains
   end function power_law_pressure
 
   !> Compute the largest pressure [Pa]: infinite for a cone, in the middle for n <= 2, where the pressure falls outwards.
-  pure function power_law_max_pressure(self, radius) result(peak)
-    !> Body
+  pure real(wp) function power_law_max_pressure(self, radius) result(peak)
     class(power_law_t), intent(in) :: self
     !> Contact radius [m]
     real(wp), intent(in) :: radius
-    real(wp) :: peak
 
     if (self%exponent <= 2.0_wp) then
       peak = self%pressure(radius, 0.0_wp)
@@ -284,12 +267,10 @@ contains
   end function power_law_max_pressure
 
   !> Compute (r cosh u)^(n-1).
-  pure function cosh_power(self, x) result(value)
-    !> Function
+  pure real(wp) function cosh_power(self, x) result(value)
     class(cosh_power_t), intent(in) :: self
     !> u
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = (self%scale*cosh(x))**self%power
   end function cosh_power
@@ -297,12 +278,10 @@ contains
   ! ------------------------------------------------------------------------------- punches
 
   !> Compute delta = (a/R) [sqrt(a^2-b^2) - b arccos(b/a)] [m].
-  elemental function rounded_approach(self, radius) result(value)
-    !> Body
+  elemental real(wp) function rounded_approach(self, radius) result(value)
     class(rounded_punch_t), intent(in) :: self
     !> Contact radius a >= b [m]
     real(wp), intent(in) :: radius
-    real(wp) :: value
 
     real(wp) :: leg
 
@@ -313,12 +292,10 @@ contains
   end function rounded_approach
 
   !> Compute P = 2 E* integral_b^a t delta'(t) dt, delta'(t) = [2 sqrt(t^2-b^2) - b arccos(b/t)]/R [N].
-  elemental function rounded_load(self, radius) result(value)
-    !> Body
+  elemental real(wp) function rounded_load(self, radius) result(value)
     class(rounded_punch_t), intent(in) :: self
     !> Contact radius a >= b [m]
     real(wp), intent(in) :: radius
-    real(wp) :: value
 
     associate (b => self%flat_radius)
       value = asinh(sqrt(max((radius - b)*(radius + b), 0.0_wp))/b)
@@ -328,23 +305,19 @@ contains
   end function rounded_load
 
   !> Evaluate the integrand of the load, lengths as shares of b.
-  pure function rounded_load_integrand(self, x) result(value)
-    !> Function
+  pure real(wp) function rounded_load_integrand(self, x) result(value)
     class(rounded_load_t), intent(in) :: self
     !> v
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = (2.0_wp*sinh(x) - atan(sinh(x)))*sinh(x)*cosh(x)
   end function rounded_load_integrand
 
   !> Find the contact radius under a load or an approach [m].
-  pure function rounded_contact_radius(self, normal_load, approach) result(radius)
-    !> Body
+  pure real(wp) function rounded_contact_radius(self, normal_load, approach) result(radius)
     class(rounded_punch_t), intent(in) :: self
     !> Load [N] or approach [m]: one of them, above 0
     real(wp), intent(in), optional :: normal_load, approach
-    real(wp) :: radius
 
     type(radius_error_t) :: error
 
@@ -360,12 +333,10 @@ contains
   end function rounded_contact_radius
 
   !> Compute the approach or load less the given one.
-  pure function radius_error(self, x) result(value)
-    !> Function
+  pure real(wp) function radius_error(self, x) result(value)
     class(radius_error_t), intent(in) :: self
     !> Contact radius [m]
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     if (self%by_load) then
       value = self%body%load(x) - self%target
@@ -375,12 +346,10 @@ contains
   end function radius_error
 
   !> Compute p(r) = E*/pi integral delta'(t)/t ds, s = sqrt(t^2-r^2), from t = max(r, b) to a [Pa].
-  elemental function rounded_pressure(self, radius, r) result(value)
-    !> Body
+  elemental real(wp) function rounded_pressure(self, radius, r) result(value)
     class(rounded_punch_t), intent(in) :: self
     !> Contact radius a, distance from the axis [m]
     real(wp), intent(in) :: radius, r
-    real(wp) :: value
 
     type(rounded_pressure_t) :: integrand
     real(wp) :: last
@@ -402,12 +371,10 @@ contains
   end function rounded_pressure
 
   !> Evaluate the integrand of the pressure, lengths as shares of b.
-  pure function rounded_pressure_integrand(self, x) result(value)
-    !> Function
+  pure real(wp) function rounded_pressure_integrand(self, x) result(value)
     class(rounded_pressure_t), intent(in) :: self
     !> v
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     real(wp) :: leg
 
@@ -417,21 +384,17 @@ contains
   end function rounded_pressure_integrand
 
   !> Compute P/delta = 2 E* a of a flat punch [N/m].
-  elemental function flat_stiffness(self) result(stiffness)
-    !> Body
+  elemental real(wp) function flat_stiffness(self) result(stiffness)
     class(flat_punch_t), intent(in) :: self
-    real(wp) :: stiffness
 
     stiffness = 2.0_wp*self%effective_modulus*self%radius
   end function flat_stiffness
 
   !> Compute p = P/(2 pi a sqrt(a^2-r^2)) of a flat punch; infinite at its edge, 0 outside [Pa].
-  elemental function flat_pressure(self, load, r) result(value)
-    !> Body
+  elemental real(wp) function flat_pressure(self, load, r) result(value)
     class(flat_punch_t), intent(in) :: self
     !> Load [N], distance from the axis [m]
     real(wp), intent(in) :: load, r
-    real(wp) :: value
 
     if (abs(r) < self%radius) then
       value = load/(2.0_wp*pi*self%radius*sqrt((self%radius - r)*(self%radius + r)))

@@ -16,10 +16,9 @@ module hc_carlson
 contains
 
   !> Compute R_F(x, y, z) = 1/2 integral_0^inf dt/sqrt((t+x)(t+y)(t+z)); x, y, z >= 0; infinite if two of them are 0.
-  elemental function carlson_rf(x, y, z) result(rf)
+  elemental real(wp) function carlson_rf(x, y, z) result(rf)
     !> Arguments
     real(wp), intent(in) :: x, y, z
-    real(wp) :: rf
 
     real(wp) :: v(3), mean, away, dx, dy, dz, e2, e3, lambda
 
@@ -46,10 +45,9 @@ contains
 
   !> Compute R_D(x, y, z) = 3/2 integral_0^inf dt/(sqrt((t+x)(t+y)) (t+z)^(3/2)); x, y, z >= 0;
   !> infinite if z or both x and y are 0.
-  elemental function carlson_rd(x, y, z) result(rd)
+  elemental real(wp) function carlson_rd(x, y, z) result(rd)
     !> Arguments
     real(wp), intent(in) :: x, y, z
-    real(wp) :: rd
 
     real(wp) :: v(3), mean, away, dx, dy, dz, e2, e3, e4, e5, lambda, power, total
 
@@ -82,10 +80,9 @@ contains
   end function carlson_rd
 
   !> Compute the complete elliptic integral K by the complementary parameter 1 - k^2 > 0.
-  elemental function complete_k(complement) result(k)
+  elemental real(wp) function complete_k(complement) result(k)
     !> 1 - k^2
     real(wp), intent(in) :: complement
-    real(wp) :: k
 
     k = carlson_rf(0.0_wp, complement, 1.0_wp)
   end function complete_k

@@ -89,12 +89,10 @@ contains
   end subroutine hertz_ellipse
 
   !> Compute log(A/B) of an ellipse less that of the gap, A = (1-m) R_D(0, 1, 1-m) and B = R_D(0, 1-m, 1) but for a factor.
-  pure function curvature_error(self, x) result(value)
-    !> Function
+  pure real(wp) function curvature_error(self, x) result(value)
     class(curvature_error_t), intent(in) :: self
     !> log(b/a)
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = exp(2.0_wp*x)
     value = log(carlson_rd(0.0_wp, value, 1.0_wp)/carlson_rd(0.0_wp, 1.0_wp, value)) - self%log_ratio
@@ -114,7 +112,6 @@ contains
 
   !> Return a point relative to the ellipse: coordinates along its axes, as shares of them.
   elemental subroutine local(self, x, y, along, across)
-    !> Contact
     class(elliptic_contact_t), intent(in) :: self
     !> Point [m]
     real(wp), intent(in) :: x, y
@@ -126,12 +123,10 @@ contains
   end subroutine local
 
   !> Compute the contact pressure [Pa] at a point; 0 outside the contact.
-  elemental function pressure(self, x, y)
-    !> Contact
+  elemental real(wp) function pressure(self, x, y)
     class(elliptic_contact_t), intent(in) :: self
     !> Point [m]
     real(wp), intent(in) :: x, y
-    real(wp) :: pressure
 
     real(wp) :: along, across
 

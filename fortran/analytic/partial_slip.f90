@@ -44,102 +44,84 @@ module hc_partial_slip
 contains
 
   !> Compute the tangential load mu P at which the spheres slide [N].
-  elemental function sliding_load(self)
-    !> Contact
+  elemental real(wp) function sliding_load(self)
     class(mindlin_t), intent(in) :: self
-    real(wp) :: sliding_load
 
     sliding_load = self%friction_coefficient*self%normal_load
   end function sliding_load
 
   !> Compute the rigid shift at which the spheres start to slide, Delta_s = 3 mu P S/(16 a) [m].
-  elemental function sliding_shift(self)
-    !> Contact
+  elemental real(wp) function sliding_shift(self)
     class(mindlin_t), intent(in) :: self
-    real(wp) :: sliding_shift
 
     sliding_shift = 3.0_wp*self%sliding_load()*self%compliance/(16.0_wp*self%contact_radius)
   end function sliding_shift
 
   !> Compute the radius of the stick circle under the first loading to Q: c = a (1 - Q/mu P)^(1/3) [m].
-  elemental function stick_radius(self, load)
-    !> Contact
+  elemental real(wp) function stick_radius(self, load)
     class(mindlin_t), intent(in) :: self
     !> Q [N]
     real(wp), intent(in) :: load
-    real(wp) :: stick_radius
 
     stick_radius = self%contact_radius*reserve(load, self%sliding_load())**(1.0_wp/3.0_wp)
   end function stick_radius
 
   !> Compute the rigid shift under the first loading to Q: Delta_s [1 - (1 - Q/mu P)^(2/3)] [m].
-  elemental function shift(self, load)
-    !> Contact
+  elemental real(wp) function shift(self, load)
     class(mindlin_t), intent(in) :: self
     !> Q [N]
     real(wp), intent(in) :: load
-    real(wp) :: shift
 
     shift = sign(self%sliding_shift(), load)*(1.0_wp - reserve(load, self%sliding_load())**(2.0_wp/3.0_wp))
   end function shift
 
   !> Compute the tangential load under a first prescribed shift: mu P [1 - (1 - Delta/Delta_s)^(3/2)] [N].
-  elemental function load(self, shift)
-    !> Contact
+  elemental real(wp) function load(self, shift)
     class(mindlin_t), intent(in) :: self
     !> Delta [m]
     real(wp), intent(in) :: shift
-    real(wp) :: load
 
     load = sign(self%sliding_load(), shift)*(1.0_wp - max(1.0_wp - abs(shift)/self%sliding_shift(), 0.0_wp)**1.5_wp)
   end function load
 
   !> Compute the shear traction under the first loading to Q [Pa]: semi-ellipsoids of the curvature of mu p over the contact
   !> and, with the opposite sign, over the stick circle.
-  elemental function traction(self, r, load)
-    !> Contact
+  elemental real(wp) function traction(self, r, load)
     class(mindlin_t), intent(in) :: self
     !> Distance from the axis [m]
     real(wp), intent(in) :: r
     !> Q [N]
     real(wp), intent(in) :: load
-    real(wp) :: traction
 
     traction = semicircles(self%contact_radius, self%stick_radius(load), r)
     traction = sign(1.5_wp*self%sliding_load()/(pi*self%contact_radius**3), load)*traction
   end function traction
 
   !> Compute the rigid shift at Q on the way back from the load Q* > 0 towards -Q*, P constant [m].
-  elemental function shift_unloading(self, load, peak) result(shift)
-    !> Contact
+  elemental real(wp) function shift_unloading(self, load, peak) result(shift)
     class(mindlin_t), intent(in) :: self
     !> Q and Q* [N]
     real(wp), intent(in) :: load, peak
-    real(wp) :: shift
 
     shift = self%shift(peak) - 2.0_wp*self%shift(0.5_wp*(peak - load))
   end function shift_unloading
 
   !> Compute the shear traction at Q on the way back from Q* > 0: slip reversed at the rim [Pa].
-  elemental function traction_unloading(self, r, load, peak) result(traction)
-    !> Contact
+  elemental real(wp) function traction_unloading(self, r, load, peak) result(traction)
     class(mindlin_t), intent(in) :: self
     !> Distance from the axis [m]
     real(wp), intent(in) :: r
     !> Q and Q* [N]
     real(wp), intent(in) :: load, peak
-    real(wp) :: traction
 
     traction = self%traction(r, peak) - 2.0_wp*self%traction(r, 0.5_wp*(peak - load))
   end function traction_unloading
 
   !> Compute the energy dissipated in one cycle between +Q* and -Q* at constant P [J].
-  elemental function energy_per_cycle(self, peak) result(energy)
-    !> Contact
+  elemental real(wp) function energy_per_cycle(self, peak) result(energy)
     class(mindlin_t), intent(in) :: self
     !> Q* [N]
     real(wp), intent(in) :: peak
-    real(wp) :: energy
 
     real(wp) :: f
 
@@ -149,45 +131,39 @@ contains
   end function energy_per_cycle
 
   !> Compute half the width of the stick strip under Q': c = b sqrt(1 - Q'/mu P') [m].
-  elemental function stick_half_width(self, load)
-    !> Contact
+  elemental real(wp) function stick_half_width(self, load)
     class(plane_cattaneo_t), intent(in) :: self
     !> Q' [N/m]
     real(wp), intent(in) :: load
-    real(wp) :: stick_half_width
 
     stick_half_width = self%half_width*sqrt(reserve(load, self%friction_coefficient*self%normal_load))
   end function stick_half_width
 
   !> Compute the shear traction under a first loading to Q' [Pa].
-  elemental function plane_traction(self, x, load) result(traction)
-    !> Contact
+  elemental real(wp) function plane_traction(self, x, load) result(traction)
     class(plane_cattaneo_t), intent(in) :: self
     !> Distance from the middle [m]
     real(wp), intent(in) :: x
     !> Q' [N/m]
     real(wp), intent(in) :: load
-    real(wp) :: traction
 
     traction = semicircles(self%half_width, self%stick_half_width(load), x)
     traction = sign(2.0_wp*self%friction_coefficient*self%normal_load/(pi*self%half_width**2), load)*traction
   end function plane_traction
 
   !> Compute 1 - |Q|/(mu P); not a number beyond sliding.
-  elemental function reserve(load, sliding)
+  elemental real(wp) function reserve(load, sliding)
     !> Q and mu P [N or N/m]
     real(wp), intent(in) :: load, sliding
-    real(wp) :: reserve
 
     reserve = 1.0_wp - abs(load)/sliding
     if (reserve < 0.0_wp) reserve = ieee_value(reserve, ieee_quiet_nan)
   end function reserve
 
   !> Compute sqrt(a^2 - x^2) - sqrt(c^2 - x^2), each 0 outside.
-  elemental function semicircles(a, c, x)
+  elemental real(wp) function semicircles(a, c, x)
     !> Half the width of the contact and of the stick zone, distance from the middle [m]
     real(wp), intent(in) :: a, c, x
-    real(wp) :: semicircles
 
     semicircles = sqrt(max(a**2 - x**2, 0.0_wp)) - sqrt(max(c**2 - x**2, 0.0_wp))
   end function semicircles

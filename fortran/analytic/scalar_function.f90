@@ -21,7 +21,6 @@ module hc_scalar_function
     pure function value_interface(self, x) result(value)
       import :: scalar_function_t, wp
       implicit none
-      !> Function
       class(scalar_function_t), intent(in) :: self
       !> Where
       real(wp), intent(in) :: x
@@ -38,14 +37,13 @@ contains
   !>
   !> Bisection, secant and inverse quadratic interpolation: R. P. Brent, Algorithms for Minimization Without
   !> Derivatives (1973), chapter 4.
-  pure function zero_between(f, first, last, tolerance) result(b)
+  pure real(wp) function zero_between(f, first, last, tolerance) result(b)
     !> Function
     class(scalar_function_t), intent(in) :: f
     !> Ends of the interval
     real(wp), intent(in) :: first, last
     !> Absolute error that is accepted beside four units of rounding
     real(wp), intent(in) :: tolerance
-    real(wp) :: b
 
     !> Bisection alone would take as many for the longest interval of numbers.
     integer, parameter :: most_steps = 2100
@@ -114,14 +112,13 @@ contains
   end function zero_between
 
   !> Integrate a function that is smooth on each of equal panels, by Gauss's rule.
-  pure function integral(f, first, last, n_panel)
+  pure real(wp) function integral(f, first, last, n_panel)
     !> Function
     class(scalar_function_t), intent(in) :: f
     !> Ends of the interval
     real(wp), intent(in) :: first, last
     !> Number of panels
     integer, intent(in) :: n_panel
-    real(wp) :: integral
 
     real(wp) :: node(n_gauss), weight(n_gauss), length
     integer :: i, k

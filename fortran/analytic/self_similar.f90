@@ -57,12 +57,10 @@ contains
   end subroutine no_slip_constants
 
   !> Evaluate the integrand of 1/(2 chi).
-  pure function no_slip_integrand(self, x) result(value)
-    !> Function
+  pure real(wp) function no_slip_integrand(self, x) result(value)
     class(no_slip_integrand_t), intent(in) :: self
     !> s
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = tanh(0.5_wp*x)*cos(self%frequency*x)/(2.0_wp*cosh(0.5_wp*x)**2)
   end function no_slip_integrand
@@ -71,23 +69,20 @@ contains
   !>
   !> Solves (a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a) with K'(k) = K(sqrt(1-k^2)); not a number where c/a is not
   !> distinct from 0 and 1.
-  elemental function goodman_stick_ratio(beta, friction_coefficient) result(stick_ratio)
+  elemental real(wp) function goodman_stick_ratio(beta, friction_coefficient) result(stick_ratio)
     !> beta, not 0
     real(wp), intent(in) :: beta
     !> mu > 0
     real(wp), intent(in) :: friction_coefficient
-    real(wp) :: stick_ratio
 
     stick_ratio = tanh(zero_between(goodman_error_t(friction_coefficient/abs(beta)), 1.0e-150_wp, 40.0_wp, 0.0_wp))
   end function goodman_stick_ratio
 
   !> Compute the left side of Goodman's condition less the right one.
-  pure function goodman_error(self, x) result(value)
-    !> Function
+  pure real(wp) function goodman_error(self, x) result(value)
     class(goodman_error_t), intent(in) :: self
     !> artanh(c/a)
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = x/tanh(x) - self%ratio*complete_k(tanh(x)**2)
   end function goodman_error
@@ -98,12 +93,11 @@ contains
   !> all self-similar contacts are made: a bounded traction in the stick strip needs
   !> integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0.
   !> Not a number where c/b is not distinct from 0 and 1.
-  elemental function goodman_stick_ratio_plane(beta, friction_coefficient) result(stick_ratio)
+  elemental real(wp) function goodman_stick_ratio_plane(beta, friction_coefficient) result(stick_ratio)
     !> beta, not 0
     real(wp), intent(in) :: beta
     !> mu > 0
     real(wp), intent(in) :: friction_coefficient
-    real(wp) :: stick_ratio
 
     real(wp) :: z
 
@@ -112,21 +106,18 @@ contains
   end function goodman_stick_ratio_plane
 
   !> Compute K(k) less mu/|beta| K'(k).
-  pure function plane_error(self, x) result(value)
-    !> Function
+  pure real(wp) function plane_error(self, x) result(value)
     class(plane_error_t), intent(in) :: self
     !> z
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = complete_k(logistic(-x)) - self%ratio*complete_k(logistic(x))
   end function plane_error
 
   !> Compute 1/(1 + exp(-z)).
-  elemental function logistic(z)
+  elemental real(wp) function logistic(z)
     !> Where
     real(wp), intent(in) :: z
-    real(wp) :: logistic
 
     logistic = 1.0_wp/(1.0_wp + exp(-z))
   end function logistic

@@ -42,50 +42,41 @@ module hc_torsion
 contains
 
   !> Compute the largest shear traction mu p0 [Pa].
-  elemental function peak(self)
-    !> Contact
+  elemental real(wp) function peak(self)
     class(lubkin_t), intent(in) :: self
-    real(wp) :: peak
 
     peak = 1.5_wp*self%friction_coefficient*self%normal_load/(pi*self%contact_radius**2)
   end function peak
 
   !> Compute the torque of full slip, 3 pi mu P a/16 [N m].
-  elemental function sliding_torque(self)
-    !> Contact
+  elemental real(wp) function sliding_torque(self)
     class(lubkin_t), intent(in) :: self
-    real(wp) :: sliding_torque
 
     sliding_torque = 3.0_wp*pi/16.0_wp*self%friction_coefficient*self%normal_load*self%contact_radius
   end function sliding_torque
 
   !> Compute K(k) - E(k), k^2 = 1 - r^2/a^2, in Carlson's form (no cancellation, no overflow).
-  elemental function twist_factor(ratio)
+  elemental real(wp) function twist_factor(ratio)
     !> r/a
     real(wp), intent(in) :: ratio
-    real(wp) :: twist_factor
 
     twist_factor = (1.0_wp - ratio**2)*carlson_rd(0.0_wp, ratio**2, 1.0_wp)/3.0_wp
   end function twist_factor
 
   !> Compute the twist at which the stick radius is c: (S_t mu p0/2) (K(k) - E(k)), k^2 = 1 - c^2/a^2 [rad].
-  elemental function twist(self, stick_radius)
-    !> Contact
+  elemental real(wp) function twist(self, stick_radius)
     class(lubkin_t), intent(in) :: self
     !> c [m]
     real(wp), intent(in) :: stick_radius
-    real(wp) :: twist
 
     twist = 0.5_wp*self%compliance*peak(self)*twist_factor(stick_radius/self%contact_radius)
   end function twist
 
   !> Compute the torque at which the stick radius is c [N m].
-  elemental function torque(self, stick_radius)
-    !> Contact
+  elemental real(wp) function torque(self, stick_radius)
     class(lubkin_t), intent(in) :: self
     !> c [m]
     real(wp), intent(in) :: stick_radius
-    real(wp) :: torque
 
     real(wp) :: c, slip
 
@@ -95,12 +86,10 @@ contains
   end function torque
 
   !> Compute the stick radius under a first torque below the sliding torque, to 1e-14 a; else not a number [m].
-  elemental function stick_radius(self, torque)
-    !> Contact
+  elemental real(wp) function stick_radius(self, torque)
     class(lubkin_t), intent(in) :: self
     !> Torque [N m]
     real(wp), intent(in) :: torque
-    real(wp) :: stick_radius
 
     if (torque >= 0.0_wp .and. torque < self%sliding_torque()) then
       stick_radius = zero_between(torque_error_t(lubkin_t(self%friction_coefficient, self%normal_load, self%contact_radius, &
@@ -112,23 +101,19 @@ contains
   end function stick_radius
 
   !> Evaluate the integrand of slip's share of the torque.
-  pure function slip_torque(self, x) result(value)
-    !> Function
+  pure real(wp) function slip_torque(self, x) result(value)
     class(slip_torque_t), intent(in) :: self
     !> sqrt(r/a)
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = 2.0_wp*x**5*twist_factor(x**2)
   end function slip_torque
 
   !> Compute the torque less the given one.
-  pure function torque_error(self, x) result(value)
-    !> Function
+  pure real(wp) function torque_error(self, x) result(value)
     class(torque_error_t), intent(in) :: self
     !> Stick radius [m]
     real(wp), intent(in) :: x
-    real(wp) :: value
 
     value = self%contact%torque(x) - self%torque
   end function torque_error

@@ -127,7 +127,7 @@ contains
     end do
   end subroutine scatter_columns
 
-  !> Multiply one field by one even kernel, the whole operator of frictionless contact: conjg(spectrum * field).
+  !> Multiply one field by one kernel, as in the operator of frictionless contact: conjg(spectrum * field).
   pure subroutine multiply_one(n, spectrum, field, total)
     !> Number of frequencies
     integer, intent(in) :: n
@@ -199,7 +199,7 @@ contains
         case (0)
           total(start:last, o) = (0.0_wp, 0.0_wp)
         case (1)
-          call add_1(sign, part(1)%spectrum, part(1)%value, total(start:last, o))
+          call multiply_one(m, sign(1)*part(1)%spectrum, part(1)%value, total(start:last, o))
         case (2)
           call add_2(sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, total(start:last, o))
         case default
@@ -222,23 +222,6 @@ contains
       rotated(f) = cmplx(-aimag(field(f)), real(field(f), wp), wp)
     end do
   end subroutine rotate
-
-  !> Compute total = conjg(sign * spectrum * field)
-  pure subroutine add_1(sign, s_1, f_1, total)
-    !> Sign and spectrum of the kernel
-    real(wp), intent(in) :: sign(1)
-    real(wp), intent(in), contiguous :: s_1(:)
-    !> Transformed field and result
-    complex(wp), intent(in), contiguous :: f_1(:)
-    complex(wp), intent(inout), contiguous :: total(:)
-    real(wp) :: a
-    integer :: f
-
-    do f = 1, size(total)
-      a = sign(1)*s_1(f)
-      total(f) = cmplx(a*real(f_1(f), wp), -a*aimag(f_1(f)), wp)
-    end do
-  end subroutine add_1
 
   !> Compute total = conjg(sum over two fields of sign * spectrum * field)
   pure subroutine add_2(sign, s_1, f_1, s_2, f_2, total)

@@ -12,9 +12,10 @@ module hc_depth_fields
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
-  use hc_image_fit, only: image_depths, wave_numbers, fit_images
+  use hc_image_fit, only: images_t, wave_numbers
   use hc_layer_response, only: layer_t, layered_body_t, n_wave, ll_p, tt_p, zz_p, lz_p, ll_q, tt_q, zz_q, lz_q, tz_t, lt_t, &
                                uz_p, ul_p, uz_q, ul_q, ut_t
+  use hc_interior_pyramid, only: interior_pyramid_t
   use hc_interior_fields, only: n_derivative, stresses, displacements, xx, yy, zz, xy, yz, xz, psi, psi_z, psi_x, psi_y, &
                                 chi_x, chi_y, chi_xx, chi_xy, chi_yy, omega_xx, omega_xy, omega_yy, omega_xxx, omega_xxy, &
                                 omega_xyy, omega_yyy
@@ -27,8 +28,8 @@ module hc_depth_fields
   real(wp), parameter :: deepest(6) = [24.0_wp, 60.0_wp, 150.0_wp, 400.0_wp, 1000.0_wp, 3000.0_wp]
   !> Errors of the fit over the largest response: good enough; too large.
   real(wp), parameter :: good = 1.0e-7_wp, largest_error = 1.0e-5_wp
-  !> Wave numbers of the fit, and those at which its error is measured.
-  integer, parameter :: n_fit = 240, n_check = 721
+  !> Wave numbers at which the error of the fit is measured.
+  integer, parameter :: n_check = 721
 
   !> The fields at one depth.
   type :: depth_fields_t
@@ -41,8 +42,9 @@ module hc_depth_fields
     !> Largest error of the images over the largest response
     real(wp) :: error = 0.0_wp
   contains
-    !> Displacement times the shear modulus, and stress, by potentials at one of the depths
-    procedure :: add
+    !> Displacement times the shear modulus, and stress, by a pyramid at some points; by many at one point
+    procedure :: of_pyramid, of_nodes
+    procedure, private :: add
   end type depth_fields_t
 
 contains
@@ -115,8 +117,8 @@ contains
     !> Allocated on failure: the error is too large
     type(error_t), allocatable, intent(out) :: error
     type(layered_body_t) :: half
-    real(wp) :: found(0:n_check, n_wave), size_of(0:n_check), back, whole, deviation
-    real(wp), allocatable :: k(:), depth(:), image(:, :)
+    type(images_t) :: images
+    real(wp) :: found(0:n_check, n_wave), size_of(0:n_check), k(n_check), back, whole
     character(len=16) :: number
     integer :: i, trial
 
@@ -125,7 +127,6 @@ contains
     ! waves come back from the base of the outermost layer, or have come down to the depth
     back = max(z, 2.0_wp*body%layer(1)%thickness - z)
     whole = max(back, sum(body%layer%thickness))
-    self%error = huge(1.0_wp)
     do trial = 1, size(deepest)
       k = wave_numbers(back, whole, deepest(trial), n_check)
       ! the shortest of all stands for k = 0
@@ -137,29 +138,73 @@ contains
           found(i, uz_p:) = self%shear_modulus*found(i, uz_p:)
         end associate
       end do
-      if (allocated(image)) deallocate (depth, image)
-      allocate (depth, source=image_depths(back, whole, deepest(trial)))
-      allocate (image(n_wave, size(depth)))
-      associate (some => [(1 + nint((i - 1)*(n_check - 1)/real(n_fit - 1, wp)), i=1, n_fit)])
-        call fit_images(depth, k(some), found(some, :), found(0, :), size_of([0, some]), image)
-      end associate
-      deviation = maxval(abs(found(0, :) - sum(image, dim=2)))/size_of(0)
-      do i = 1, n_check
-        deviation = max(deviation, maxval(abs(found(i, :) - matmul(image, exp(-k(i)*depth))))/size_of(i))
-      end do
-      if (deviation < self%error) then
-        self%error = deviation
-        self%depth = [z, depth]
-        self%weight = [1.0_wp, 0.0_wp*depth]
-        self%image = reshape([spread(0.0_wp, 1, n_wave), image], [n_wave, size(depth) + 1])
-      end if
-      if (self%error <= good) return
+      call images%improve(back, whole, deepest(trial), k, found, size_of)
+      if (images%error <= good) exit
     end do
+    self%error = images%error
+    self%depth = [z, images%depth]
+    self%weight = [1.0_wp, 0.0_wp*images%depth]
+    self%image = reshape([spread(0.0_wp, 1, n_wave), images%coefficient], [n_wave, size(images%depth) + 1])
     if (self%error <= largest_error) return
     write (number, '(es8.1)') self%error
     call raise(error, status%invalid_input, 'the stress in a coated body: its sum of images has an error of '// &
                trim(adjustl(number))//' of the largest one; at most 1e-5 expected, so ratios of moduli nearer to 1')
   end subroutine find_images
+
+  !> Compute displacement times the shear modulus, and stress, by unit peak tractions of a pyramid.
+  pure subroutine of_pyramid(self, pyramid, spacing, x, y, displacement, stress)
+    class(depth_fields_t), intent(in) :: self
+    type(interior_pyramid_t), intent(in) :: pyramid
+    !> Longest edge [m]
+    real(wp), intent(in) :: spacing
+    !> Points relative to the node, at most most_points, in longest edges
+    real(wp), intent(in), contiguous :: x(:), y(:)
+    !> Point; direction x, y, z or component; load. Lengths are over the spacing
+    real(wp), intent(out), contiguous :: displacement(:, :, :), stress(:, :, :)
+    real(wp) :: d(size(x), n_derivative), z(size(x))
+    integer :: j
+
+    displacement = 0.0_wp
+    stress = 0.0_wp
+    do j = 1, size(self%depth)
+      z = self%depth(j)/spacing
+      call pyramid%potentials(size(x), x, y, z, d)
+      call self%add(j, d, d, d, spacing, displacement, stress)
+    end do
+  end subroutine of_pyramid
+
+  !> Compute displacement times the shear modulus, and stress, by the tractions of many nodes at a point for a history of steps.
+  pure subroutine of_nodes(self, pyramid, x, y, load, displacement, stress)
+    class(depth_fields_t), intent(in) :: self
+    !> Pyramid of one of them
+    type(interior_pyramid_t), intent(in) :: pyramid
+    !> The point relative to the nodes, in longest edges
+    real(wp), intent(in) :: x(:), y(:)
+    !> Tractions (node, component of the steps one after the other) [Pa]
+    real(wp), intent(in) :: load(:, :)
+    !> Displacement (direction, step) [Pa m] and stress (component, step) [Pa]
+    real(wp), intent(out) :: displacement(:, :), stress(:, :)
+    real(wp), allocatable :: sums(:, :)
+    real(wp) :: u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
+    integer :: j, step
+
+    displacement = 0.0_wp
+    stress = 0.0_wp
+    allocate (sums(n_derivative, size(load, 2)))
+    associate (spacing => pyramid%spacing)
+      do j = 1, size(self%depth)
+        call pyramid%sum_over_nodes(x, y, self%depth(j)/spacing, load, sums)
+        do step = 1, size(stress, 2)
+          d(1, :, :) = sums(:, 3*step - 2:3*step)
+          u = 0.0_wp
+          s = 0.0_wp
+          call self%add(j, d(:, :, 1), d(:, :, 2), d(:, :, 3), spacing, u, s)
+          displacement(:, step) = displacement(:, step) + spacing*sum(u(1, :, :), dim=2)
+          stress(:, step) = stress(:, step) + sum(s(1, :, :), dim=2)
+        end do
+      end do
+    end associate
+  end subroutine of_nodes
 
   !> Add displacement times the shear modulus, and stress, by the potentials of the three loads at one of the depths.
   pure subroutine add(self, j, p, q_x, q_y, spacing, displacement, stress)

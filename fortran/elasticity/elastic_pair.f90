@@ -27,7 +27,7 @@ module hc_elastic_pair
   implicit none
   private
 
-  public :: material_t, elastic_pair_t, new_elastic_pair, find_bulk_strain
+  public :: material_t, elastic_pair_t, new_elastic_pair, find_bulk_strain, shear_modulus
 
   !> An isotropic elastic or a rigid material.
   type :: material_t
@@ -187,10 +187,11 @@ contains
     if (.not. body%rigid) tangential = body%poisson_ratio/(2.0_wp*pi*shear_modulus(body))
   end function tangential
 
-  !> Return the shear modulus [Pa]
+  !> Return the shear modulus; 0: rigid [Pa].
   elemental real(wp) function shear_modulus(body)
     type(material_t), intent(in) :: body
-    shear_modulus = body%young_modulus/(2.0_wp*(1.0_wp + body%poisson_ratio))
+    shear_modulus = 0.0_wp
+    if (.not. body%rigid) shear_modulus = body%young_modulus/(2.0_wp*(1.0_wp + body%poisson_ratio))
   end function shear_modulus
 
   !> Return E* [Pa]

@@ -11,7 +11,7 @@ module hc_image_fit
   implicit none
   private
 
-  public :: image_depths, wave_numbers, fit_images
+  public :: images_t, wave_numbers
 
   !> Smallest depth over the smallest thickness.
   real(wp), parameter :: nearest = 0.5_wp
@@ -21,6 +21,19 @@ module hc_image_fit
   real(wp), parameter :: lowest = 1.0e-3_wp, highest = 25.0_wp
   !> Weight of k = 0; multiple of the unit matrix
   real(wp), parameter :: far_weight = 10.0_wp, bound = 1.0e-15_wp
+  !> Wave numbers of a fit, among those at which its error is measured
+  integer, parameter :: n_fit = 240
+
+  !> Sums of images: the best of several fits.
+  type :: images_t
+    !> Depths (n) [m], and coefficients (function, n)
+    real(wp), allocatable :: depth(:), coefficient(:, :)
+    !> Largest error over the size of the response
+    real(wp) :: error = huge(1.0_wp)
+  contains
+    !> Fit images of another largest depth, and take them if they are better
+    procedure :: improve
+  end type images_t
 
 contains
 
@@ -50,6 +63,34 @@ contains
       k = [(first*exp(log(last/first)*(real(i, wp)/(n - 1))), i=0, n - 1)]
     end associate
   end function wave_numbers
+
+  !> Fit images of a largest depth to functions that vanish for infinite k, and take them if their error is smaller.
+  pure subroutine improve(self, thinnest, whole, deepest, k, values, scale)
+    class(images_t), intent(inout) :: self
+    !> Smallest thickness and that of all layers [m]; largest depth over the latter
+    real(wp), intent(in) :: thinnest, whole, deepest
+    !> Wave numbers, see `wave_numbers` (m) [1/m]
+    real(wp), intent(in) :: k(:)
+    !> Functions at k = 0 and at the wave numbers (0:m, function), and sizes to which errors are referred (0:m)
+    real(wp), intent(in) :: values(0:, :), scale(0:)
+    real(wp), allocatable :: depth(:), coefficient(:, :)
+    real(wp) :: error
+    integer :: i
+
+    allocate (depth, source=image_depths(thinnest, whole, deepest))
+    allocate (coefficient(size(values, 2), size(depth)))
+    associate (some => [(1 + nint((i - 1)*(size(k) - 1)/real(n_fit - 1, wp)), i=1, n_fit)])
+      call fit_images(depth, k(some), values(some, :), values(0, :), scale([0, some]), coefficient)
+    end associate
+    error = maxval(abs(values(0, :) - sum(coefficient, dim=2)))/scale(0)
+    do i = 1, size(k)
+      error = max(error, maxval(abs(values(i, :) - matmul(coefficient, exp(-k(i)*depth))))/scale(i))
+    end do
+    if (.not. error < self%error) return
+    self%error = error
+    call move_alloc(depth, self%depth)
+    call move_alloc(coefficient, self%coefficient)
+  end subroutine improve
 
   !> Fit sums of images to functions that vanish for infinite k.
   pure subroutine fit_images(depth, k, values, limit, scale, coefficient)

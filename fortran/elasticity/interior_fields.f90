@@ -15,7 +15,7 @@ module hc_interior_fields
   implicit none
   private
 
-  public :: stresses, displacements, check_interior
+  public :: stresses, displacements, point_load, check_interior
 
   !> Largest coordinate, whose powers are finite
   real(wp), parameter, public :: largest = 1.0e100_wp
@@ -125,5 +125,36 @@ contains
     end associate
     displacement = displacement/(4.0_wp*pi)
   end subroutine displacements
+
+  !> Compute the derivatives of the potentials of a unit point load at the origin.
+  pure function point_load(at, z) result(d)
+    !> The point, and its depth
+    real(wp), intent(in) :: at(2), z
+    real(wp) :: d(n_derivative)
+
+    real(wp) :: r, k, m, h, s
+    real(wp) :: xx2(3), xxx3(4), delta(3), mixed(4)
+
+    r = sqrt(sum(at**2) + z*z)
+    s = r + z
+    xx2 = [at(1)**2, at(1)*at(2), at(2)**2]
+    xxx3 = [at(1)**3, at(1)**2*at(2), at(1)*at(2)**2, at(2)**3]
+    delta = [1.0_wp, 0.0_wp, 1.0_wp]
+    mixed = [3.0_wp*at(1), at(2), at(1), 3.0_wp*at(2)]
+    k = 1.0_wp/(r*s)
+    m = (r + s)/(r**3*s**2)
+    h = 1.0_wp/(r*s**2)
+    d(psi) = 1.0_wp/r
+    d(psi_z) = -z/r**3
+    d(z_psi_zz) = z*(3.0_wp*z*z/r**5 - 1.0_wp/r**3)
+    d(psi_x:psi_y) = -at/r**3
+    d(z_psi_xz:z_psi_yz) = 3.0_wp*z*z*at/r**5
+    d(z_psi_xx:z_psi_yy) = z*(3.0_wp*xx2/r**5 - delta/r**3)
+    d(chi_x:chi_y) = at*k
+    d(chi_xx:chi_yy) = delta*k - xx2*m
+    d(z_chi_xxx:z_chi_yyy) = z*(xxx3*(8.0_wp*r*r + 9.0_wp*r*z + 3.0_wp*z*z)/(r**5*s**3) - mixed*m)
+    d(omega_xx:omega_yy) = xx2*h - delta/s
+    d(omega_xxx:omega_yyy) = mixed*h - xxx3*(3.0_wp*r + z)/(r**3*s**3)
+  end function point_load
 
 end module hc_interior_fields

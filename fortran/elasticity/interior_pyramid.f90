@@ -11,8 +11,7 @@
 module hc_interior_pyramid
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_hat_creases, only: crease_t, hat_creases
-  use hc_hat_moments, only: hat_moments, max_order
+  use hc_hat, only: crease_t, hat_creases, hat_moments, max_order
   use hc_segment_integrals, only: segment_integrals
   use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, psi, psi_z, z_psi_zz, &
                                 psi_x, psi_y, z_psi_xz, z_psi_yz, z_psi_xx, z_psi_xy, z_psi_yy, chi_x, chi_y, &
@@ -25,8 +24,10 @@ module hc_interior_pyramid
 
   !> Distance from which the moment expansion is used, in longest edges.
   real(wp), parameter :: far_radius = 3.0_wp
-  !> Beyond band_radius(k) the moments up to the order band_order(k) suffice (truncation < 1e-14 of the envelopes).
-  real(wp), parameter :: band_radius(7) = [6.0_wp, 7.0_wp, 9.0_wp, 14.0_wp, 25.0_wp, 57.0_wp, 200.0_wp]
+  !> Beyond band_radius(k, :) the moments up to the order band_order(k) suffice: truncation < 1e-14 of the envelopes, or < 3e-17 where
+  !> fields are summed with large coefficients of either sign.
+  real(wp), parameter :: band_radius(7, 2) = reshape([6.0_wp, 7.0_wp, 9.0_wp, 14.0_wp, 25.0_wp, 57.0_wp, 200.0_wp, &
+                                                      9.0_wp, 11.0_wp, 15.0_wp, 25.0_wp, 52.0_wp, 140.0_wp, 630.0_wp], [7, 2])
   integer, parameter :: band_order(7) = [16, 14, 12, 10, 8, 6, 4]
   !> Points that are worked on at a time.
   integer, parameter, public :: most_points = 64
@@ -43,6 +44,8 @@ module hc_interior_pyramid
     real(wp) :: volume = 0.0_wp
     !> Harmonics are multiples of it (6 if the lattice is equilateral, else 2)
     integer :: fold = 2
+    !> Column of `band_radius`
+    integer :: bands = 1
     !> Signed coefficients of the moments: order of the moment, harmonic, order of the derivative (0...3)
     complex(wp) :: moment(0:max_order, -max_order:max_order, 0:3) = 0.0_wp
   contains
@@ -65,16 +68,19 @@ module hc_interior_pyramid
 contains
 
   !> Set up creases and moments of the pyramid of a lattice.
-  pure subroutine new_interior_pyramid(pyramid, basis)
+  pure subroutine new_interior_pyramid(pyramid, basis, sharp)
     !> Pyramid to be set up
     type(interior_pyramid_t), intent(out) :: pyramid
     !> Basis vectors of the lattice as columns [m]
     real(wp), intent(in) :: basis(2, 2)
+    !> Fields will be summed with large coefficients; absent: they will not
+    logical, intent(in), optional :: sharp
 
     complex(wp) :: moment(0:max_order, 0:max_order)
     real(wp) :: edges(2, 3)
     integer :: a, b, m
 
+    if (present(sharp)) pyramid%bands = merge(2, 1, sharp)
     call hat_creases(basis, pyramid%crease, edges, pyramid%spacing, pyramid%volume)
     moment = hat_moments(cmplx(edges(1, :), edges(2, :), wp))
     pyramid%fold = 6
@@ -103,25 +109,36 @@ contains
     !> Derivatives
     real(wp), intent(out) :: derivative(n, n_derivative)
 
-    real(wp) :: radius(most_points), at(most_points, 3), least
-    integer :: i
+    real(wp) :: radius(most_points), at(most_points, 4), far(most_points, n_derivative)
+    integer :: order(most_points), some(most_points), i, k, m, highest
 
-    least = huge(1.0_wp)
     do i = 1, n
       radius(i) = sqrt(x(i)**2 + y(i)**2 + z(i)**2)
-      at(i, :) = [x(i), y(i), z(i)]
-      if (radius(i) < far_radius) then
-        radius(i) = far_radius
-        at(i, :) = [0.0_wp, 0.0_wp, far_radius]
-      else
-        least = min(least, radius(i))
-      end if
+      order(i) = order_needed(self, radius(i))
+      if (order(i) == 0) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
     end do
-    if (least < huge(1.0_wp)) then
-      call far_potentials(self, n, order_needed(least), at(:n, 1), at(:n, 2), at(:n, 3), radius(:n), derivative)
+    highest = maxval(order(:n))
+    if (highest > 0 .and. all(order(:n) == highest)) then
+      call far_potentials(self, n, highest, x, y, z, radius(:n), derivative)
+      return
     end if
-    do i = 1, n
-      if (x(i)**2 + y(i)**2 + z(i)**2 < far_radius**2) derivative(i, :) = near_potentials(self%crease, x(i), y(i), z(i))
+    ! together only points of one order, so that no value depends on the other points
+    do while (highest > 0)
+      m = 0
+      do i = 1, n
+        if (order(i) /= highest) cycle
+        m = m + 1
+        some(m) = i
+        at(m, :) = [x(i), y(i), z(i), radius(i)]
+        order(i) = 0
+      end do
+      call far_potentials(self, m, highest, at(:m, 1), at(:m, 2), at(:m, 3), at(:m, 4), far(:m, :))
+      do k = 1, n_derivative
+        do i = 1, m
+          derivative(some(i), k) = far(i, k)
+        end do
+      end do
+      highest = maxval(order(:n))
     end do
   end subroutine potentials
 
@@ -138,12 +155,12 @@ contains
 
     real(wp) :: d(most_points, n_derivative), depth(most_points)
     integer, allocatable :: band(:), node(:)
-    integer :: next(0:size(band_radius) + 2), first, last, n, i
+    integer :: next(0:size(band_order) + 2), first, last, n, i
 
     allocate (band(size(x)), node(size(x)))
     next = 1
     do i = 1, size(x)
-      band(i) = count(x(i)**2 + y(i)**2 + z**2 >= [far_radius, band_radius]**2)
+      band(i) = count(x(i)**2 + y(i)**2 + z**2 >= [far_radius, band_radius(:, self%bands)]**2)
       next(band(i) + 1:) = next(band(i) + 1:) + 1
     end do
     do i = 1, size(x)
@@ -195,14 +212,16 @@ contains
     !$omp end parallel do
   end subroutine fields
 
-  !> Compute the order of the moments that suffices from a distance on.
-  pure integer function order_needed(radius)
+  !> Return the order of the moments that suffices at a distance; 0: the point is too near for them.
+  pure integer function order_needed(self, radius)
+    type(interior_pyramid_t), intent(in) :: self
+    !> Distance, in longest edges
     real(wp), intent(in) :: radius
     integer :: band
 
-    order_needed = max_order
-    do band = 1, size(band_radius)
-      if (radius >= band_radius(band)) order_needed = band_order(band)
+    order_needed = merge(max_order, 0, radius >= far_radius)
+    do band = 1, size(band_order)
+      if (radius >= band_radius(band, self%bands)) order_needed = band_order(band)
     end do
   end function order_needed
 

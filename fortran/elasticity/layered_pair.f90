@@ -19,9 +19,9 @@ module hc_layered_pair
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_elastic_medium, only: elastic_medium_t, influence_t, block_symbols_t, n_word, n_block
-  use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
+  use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair, shear_modulus
   use hc_layer_response, only: layer_t, layered_body_t, n_response, of_normal, of_along, of_across, of_coupling
-  use hc_image_fit, only: image_depths, wave_numbers, fit_images
+  use hc_image_fit, only: images_t, wave_numbers
   use hc_periodic_symbol, only: sinc
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_fields, only: n_derivative, psi, chi_x, chi_y, omega_xx, omega_xy, omega_yy
@@ -43,8 +43,8 @@ module hc_layered_pair
   real(wp), parameter :: deepest(9) = [24.0_wp, 60.0_wp, 150.0_wp, 400.0_wp, 1.0e3_wp, 3.0e3_wp, 1.0e4_wp, 3.0e4_wp, 1.0e5_wp]
   !> Errors of the fit, relative to the response: good enough; too large.
   real(wp), parameter :: good = 1.0e-7_wp, largest_error = 1.0e-6_wp
-  !> Wave numbers of the fit, and those at which its error is measured.
-  integer, parameter :: n_fit = 240, n_check = 1501
+  !> Wave numbers at which the error of the fit is measured.
+  integer, parameter :: n_check = 1501
   !> Coupling below which two bodies count as alike.
   real(wp), parameter :: alike = 1.0e-12_wp
   !> Wave number times the smallest thickness from which responses are those of the outermost materials.
@@ -149,67 +149,46 @@ contains
     body%base = layer_t(0.0_wp, shear_modulus(material), material%poisson_ratio)
   end subroutine make_body
 
-  !> Return the shear modulus; 0: rigid [Pa].
-  pure real(wp) function shear_modulus(of)
-    type(material_t), intent(in) :: of
-    shear_modulus = 0.0_wp
-    if (.not. of%rigid) shear_modulus = of%young_modulus/(2.0_wp*(1.0_wp + of%poisson_ratio))
-  end function shear_modulus
-
   !> Find the images: with the largest depth from which on the error is small.
   pure subroutine find_images(self, error)
     type(layered_pair_t), intent(inout) :: self
     !> Allocated on failure: the error is too large
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: limit(n_response), found(n_check, n_response), whole, thinnest, deviation
-    real(wp), allocatable :: depth(:), image(:, :), k(:)
+    type(images_t) :: images
+    real(wp) :: found(0:n_check, n_response), k(n_check), whole, thinnest
     character(len=16) :: number
     integer :: i, trial
 
     self%surface = [self%lambda_1, self%lambda_1, self%lambda_1 + self%lambda_5, self%lambda_2]
-    limit = self%response(0.0_wp)
     whole = max(sum(self%body(1)%layer%thickness), sum(self%body(2)%layer%thickness))
     thinnest = least_thickness(self)
-    self%fit_error = huge(1.0_wp)
     do trial = 1, size(deepest)
       k = wave_numbers(thinnest, whole, deepest(trial), n_check)
+      found(0, :) = self%response(0.0_wp)
       do i = 1, n_check
         found(i, :) = self%response(k(i))
       end do
-      associate (scale => max(self%surface(of_normal), [limit(of_normal), found(:, of_normal)]))
-        if (trial == 1) then
-          ! of the largest size, with its sign
-          associate (ratio => found(:, of_coupling)/found(:, of_normal))
-            self%largest_coupling = ratio(maxloc(abs(ratio), dim=1))
-          end associate
-          self%largest_response = maxval(found(:, :of_across))
-          if (abs(self%largest_coupling) < alike) self%largest_coupling = 0.0_wp
-        end if
-        if (.not. abs(self%largest_coupling) > 0.0_wp) then
-          self%lambda_2 = 0.0_wp
-          self%surface(of_coupling) = 0.0_wp
-          limit(of_coupling) = 0.0_wp
-          found(:, of_coupling) = 0.0_wp
-        end if
-        if (allocated(image)) deallocate (depth, image)
-        allocate (depth, source=image_depths(thinnest, whole, deepest(trial)))
-        allocate (image(n_response, size(depth)))
-        found = found - spread(self%surface, 1, n_check)
-        associate (some => [(1 + nint((i - 1)*(n_check - 1)/real(n_fit - 1, wp)), i=1, n_fit)])
-          call fit_images(depth, k(some), found(some, :), limit - self%surface, scale([1, some + 1]), image)
+      if (trial == 1) then
+        ! of the largest size, with its sign
+        associate (ratio => found(1:, of_coupling)/found(1:, of_normal))
+          self%largest_coupling = ratio(maxloc(abs(ratio), dim=1))
         end associate
-        deviation = maxval(abs(limit - self%surface - sum(image, dim=2)))/scale(1)
-        do i = 1, n_check
-          deviation = max(deviation, maxval(abs(found(i, :) - matmul(image, exp(-k(i)*depth))))/scale(i + 1))
-        end do
-      end associate
-      if (deviation < self%fit_error) then
-        self%fit_error = deviation
-        self%depth = depth
-        self%image = image
+        self%largest_response = maxval(found(1:, :of_across))
+        if (abs(self%largest_coupling) < alike) self%largest_coupling = 0.0_wp
       end if
-      if (self%fit_error <= good) return
+      if (.not. abs(self%largest_coupling) > 0.0_wp) then
+        self%lambda_2 = 0.0_wp
+        self%surface(of_coupling) = 0.0_wp
+        found(:, of_coupling) = 0.0_wp
+      end if
+      associate (scale => max(self%surface(of_normal), found(:, of_normal)))
+        call images%improve(thinnest, whole, deepest(trial), k, found - spread(self%surface, 1, n_check + 1), scale)
+      end associate
+      if (images%error <= good) exit
     end do
+    self%fit_error = images%error
+    call move_alloc(images%depth, self%depth)
+    call move_alloc(images%coefficient, self%image)
     if (self%fit_error <= largest_error) return
     write (number, '(es8.1)') self%fit_error
     call raise(error, status%invalid_input, 'the moduli of layers and bodies lie too far apart: the error of the kernels is '// &
@@ -361,10 +340,32 @@ contains
     class(image_influence_t), intent(in) :: self
     real(wp), intent(in), contiguous :: x(:), y(:)
     real(wp), intent(out), contiguous :: block(:, :)
+
+    call self%surface%blocks(x, y, block)
+    call add_images(self, x, y, block)
+  end subroutine blocks
+
+  !> Compute the block of the pressure.
+  pure subroutine closing(self, x, y, displacement)
+    class(image_influence_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: x(:), y(:)
+    real(wp), intent(out), contiguous :: displacement(:)
+    real(wp) :: block(1, size(x))
+
+    call self%surface%closing(x, y, block(1, :))
+    call add_images(self, x, y, block)
+    displacement = block(1, :)
+  end subroutine closing
+
+  !> Add the images to the block of the pressure, or to all.
+  pure subroutine add_images(self, x, y, block)
+    class(image_influence_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: x(:), y(:)
+    !> Displacement per traction (1 or n_block, n) [m/Pa]
+    real(wp), intent(inout), contiguous :: block(:, :)
     real(wp) :: d(most_points, n_derivative), z(most_points)
     integer :: first, last, j, n
 
-    call self%surface%blocks(x, y, block)
     associate (unit => self%pyramid%spacing)
       do first = 1, size(x), most_points
         last = min(first + most_points - 1, size(x))
@@ -375,6 +376,7 @@ contains
           associate (normal => unit*self%image(of_normal, j), along => unit*self%image(of_along, j), &
                      across => unit*self%image(of_across, j), couple => unit*self%image(of_coupling, j), b => block(:, first:last))
             b(1, :) = b(1, :) + normal*d(:n, psi)
+            if (size(block, 1) == 1) cycle
             b(2, :) = b(2, :) - along*d(:n, omega_xx) - across*d(:n, omega_yy)
             b(3, :) = b(3, :) - (along - across)*d(:n, omega_xy)
             b(4, :) = b(4, :) - along*d(:n, omega_yy) - across*d(:n, omega_xx)
@@ -384,29 +386,7 @@ contains
         end do
       end do
     end associate
-  end subroutine blocks
-
-  !> Compute the block of the pressure.
-  pure subroutine closing(self, x, y, displacement)
-    class(image_influence_t), intent(in) :: self
-    real(wp), intent(in), contiguous :: x(:), y(:)
-    real(wp), intent(out), contiguous :: displacement(:)
-    real(wp) :: d(most_points, n_derivative), z(most_points)
-    integer :: first, last, j, n
-
-    call self%surface%closing(x, y, displacement)
-    associate (unit => self%pyramid%spacing)
-      do first = 1, size(x), most_points
-        last = min(first + most_points - 1, size(x))
-        n = last - first + 1
-        do j = 1, size(self%depth)
-          z = self%depth(j)/unit
-          call self%pyramid%potentials(n, x(first:last)/unit, y(first:last)/unit, z(:n), d(:n, :))
-          displacement(first:last) = displacement(first:last) + unit*self%image(of_normal, j)*d(:n, psi)
-        end do
-      end do
-    end associate
-  end subroutine closing
+  end subroutine add_images
 
   !> Return whether the lattice is equilateral.
   pure logical function is_hexagonal(self)

@@ -16,14 +16,14 @@
 !> probability density of z = sum_q U_q d_q with U_q uniform on (-1/2, 1/2) and
 !> d_q the three edge directions, so that its moments are coefficients of
 !> product_q sinh(w_q/2)/(w_q/2), w_q = s d_q + t conj(d_q), and the kernels are
-!> power series in 1/z (hc_hat_moments). Both are valid for any lattice; lengths are in units of the
+!> power series in 1/z (hc_hat). Both are valid for any lattice; lengths are in units of the
 !> longest edge inside this module.
 !>
 !> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pyramid_influence
   use hc_precision, only: wp
-  use hc_hat_creases, only: crease_t, hat_creases
-  use hc_hat_moments, only: hat_moments, binomial_series, max_order
+  use hc_segment_integrals, only: segment_integrals
+  use hc_hat, only: crease_t, hat_creases, hat_moments, binomial_series, max_order
   implicit none
   private
 
@@ -143,7 +143,7 @@ contains
     !> K1, K_xx, K_xy, K_x, K_y over the longest edge
     real(wp) :: k(5)
 
-    real(wp) :: t, n, b, v, rim_b(2), rim_v(2), spoke_b, spoke_v
+    real(wp) :: t, n, sums(2)
     integer :: q
 
     k = 0.0_wp
@@ -151,66 +151,32 @@ contains
       associate (crease => self%crease(q))
         t = -(x*crease%along(1) + y*crease%along(2))
         n = x*crease%normal(1) + y*crease%normal(2)
-        call segment(n - crease%height, t + crease%skew, 0.5_wp*crease%length, rim_b(1), rim_v(1))
-        call segment(n + crease%height, t - crease%skew, 0.5_wp*crease%length, rim_b(2), rim_v(2))
-        call segment(n, t, crease%length, spoke_b, spoke_v)
-        b = ((rim_b(1) + rim_b(2)) - spoke_b)/crease%height
-        v = 0.5_wp*((rim_v(1) + rim_v(2)) - spoke_v)/crease%height
-        k(k_1) = k(k_1) + b
-        k(k_xx) = k(k_xx) + crease%normal(2)**2*b
-        k(k_xy) = k(k_xy) - crease%normal(1)*crease%normal(2)*b
-        k(k_x) = k(k_x) + crease%normal(1)*v
-        k(k_y) = k(k_y) + crease%normal(2)*v
+        sums = ((on_segment(n - crease%height, t + crease%skew, 0.5_wp*crease%length) &
+                 + on_segment(n + crease%height, t - crease%skew, 0.5_wp*crease%length)) &
+                - on_segment(n, t, crease%length))/crease%height
+        k(k_1) = k(k_1) + sums(1)
+        k(k_xx) = k(k_xx) + crease%normal(2)**2*sums(1)
+        k(k_xy) = k(k_xy) - crease%normal(1)*crease%normal(2)*sums(1)
+        k(k_x:k_y) = k(k_x:k_y) + 0.5_wp*crease%normal*sums(2)
       end associate
     end do
   end function near_kernels
 
-  !> Integrate rho and n*ln(rho) along a straight segment, in a form
-  !> that cancels nowhere; the constant -length*n of the second is left out,
-  !> it adds up to zero over a crease family.
-  pure subroutine segment(n, tm, half, s, w)
+  !> Integrate rho and n*ln(rho) along a straight segment; the constant -length*n of the second is left out, it adds up to zero
+  !> over a crease family.
+  pure function on_segment(n, tm, half)
     !> Signed distance of the field point from the line
     real(wp), intent(in) :: n
     !> Abscissa of the middle of the segment, from the foot of the point
     real(wp), intent(in) :: tm
     !> Half its length
     real(wp), intent(in) :: half
-    !> Integral of rho
-    real(wp), intent(out) :: s
-    !> n times the integral of ln(rho), less the constant
-    real(wp), intent(out) :: w
+    real(wp) :: on_segment(2)
 
-    real(wp) :: t1, t2, length, r1, r2, rs, q, log_ratio, lam
-
-    t1 = tm - half
-    t2 = tm + half
-    length = 2.0_wp*half
-    r1 = hypot(t1, n)
-    r2 = hypot(t2, n)
-    rs = r1 + r2
-    s = length*(tm*tm/rs + 0.25_wp*rs)
-    w = 0.0_wp
-    if (abs(n) < 1.0e-30_wp*length) return
-
-    q = length/rs
-    if (q < 0.5_wp) then
-      lam = 2.0_wp*atanh(q)
-    else if (t1 >= 0.0_wp) then
-      lam = log((r2 + t2)/(r1 + t1))
-    else if (t2 <= 0.0_wp) then
-      lam = log((r1 - t1)/(r2 - t2))
-    else
-      lam = log((r2 + t2)/abs(n)*((r1 - t1)/abs(n)))
-    end if
-    q = 2.0_wp*tm*length/rs**2
-    if (abs(q) < 0.5_wp) then
-      log_ratio = 2.0_wp*atanh(q)
-    else
-      log_ratio = log(r2/r1)
-    end if
-    s = s + 0.5_wp*n*n*lam
-    w = n*(tm*log_ratio + half*log(r1*r2) + n*atan2(n*length, n*n + t1*t2))
-  end subroutine segment
+    associate (s => segment_integrals(n, tm - half, tm + half, 2.0_wp*half, 0.0_wp))
+      on_segment = [-s%w_0, n*s%q_0]
+    end associate
+  end function on_segment
 
   !> Sum the moment series.
   pure function far_kernels(self, x, y) result(k)

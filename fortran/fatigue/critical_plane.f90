@@ -155,7 +155,7 @@ contains
     end do
   end subroutine find_arc
 
-  !> Unit matrix.
+  !> Return the unit matrix.
   pure function identity()
     real(wp) :: identity(3, 3)
 
@@ -204,7 +204,7 @@ contains
     self%values(k) = value
   end subroutine add
 
-  !> Normal at a place of a face: the cubic makes the angles between neighbors nearly equal.
+  !> Return the normal at a place of a face: the cubic makes the angles between neighbors nearly equal.
   pure function normal_at(face, place) result(normal)
     integer, intent(in) :: face
     real(wp), intent(in) :: place(2)
@@ -213,14 +213,14 @@ contains
     normal = unit(cshift([place*(0.25_wp*pi + (1.0_wp - 0.25_wp*pi)*place**2), 1.0_wp], face))
   end function normal_at
 
-  !> Vector of length 1 along another one.
+  !> Return the vector of length 1 along another one.
   pure function unit(vector)
     real(wp), intent(in) :: vector(3)
     real(wp) :: unit(3)
     unit = vector/norm2(vector)
   end function unit
 
-  !> Bounds of the stresses of a history, by its deviators: principal stresses differ by at most 2 sqrt(J2), and a normal
+  !> Bound the stresses of a history by its deviators: principal stresses differ by at most 2 sqrt(J2), and a normal
   !> stress is at most the hydrostatic one and 2 sqrt(J2/3).
   pure function extent_of(history) result(extent)
     real(wp), intent(in), contiguous :: history(:, :)
@@ -242,7 +242,7 @@ contains
     end do
   end function extent_of
 
-  !> Parameter on the plane of a normal.
+  !> Evaluate the parameter on the plane of a normal.
   pure real(wp) function value_on(criterion, path, normal, floor)
     class(plane_criterion_t), intent(in) :: criterion
     !> Stress (times, 6) [Pa]
@@ -263,7 +263,7 @@ contains
     value_on = criterion%value(sigma, shear, path(:, 1) + path(:, 2) + path(:, 3), floor)
   end function value_on
 
-  !> n . sigma m at all times.
+  !> Compute n . sigma m at all times.
   pure function component(path, weight)
     real(wp), intent(in), contiguous :: path(:, :)
     !> Weights of the six stresses
@@ -277,14 +277,14 @@ contains
     end do
   end function component
 
-  !> Weights of the six stresses in n . sigma m.
+  !> Return the weights of the six stresses in n . sigma m.
   pure function weights(n, m)
     real(wp), intent(in) :: n(3), m(3)
     real(wp) :: weights(6)
     weights = [n*m, n(1)*m(2) + n(2)*m(1), n(2)*m(3) + n(3)*m(2), n(1)*m(3) + n(3)*m(1)]
   end function weights
 
-  !> Two unit vectors at right angles to a normal and to each other.
+  !> Return two unit vectors at right angles to a normal and to each other.
   pure function tangents(normal) result(axes)
     real(wp), intent(in) :: normal(3)
     real(wp) :: axes(3, 2), along(3)

@@ -17,14 +17,14 @@ module hc_invariant_criteria
 
 contains
 
-  !> Hydrostatic part of a stress [Pa].
+  !> Compute the hydrostatic part of a stress [Pa].
   pure real(wp) function hydrostatic(stress)
     !> Stress (6) [Pa]
     real(wp), intent(in) :: stress(:)
     hydrostatic = sum(stress(:3))/3.0_wp
   end function hydrostatic
 
-  !> Coordinates of the deviator, in which the distance is sqrt(J2) [Pa].
+  !> Compute the coordinates of the deviator, in which the distance is sqrt(J2) [Pa].
   pure function deviator_coordinates(stress) result(s)
     !> Stress (6) [Pa]
     real(wp), intent(in) :: stress(:)
@@ -33,7 +33,7 @@ contains
          stress(5)]
   end function deviator_coordinates
 
-  !> Largest shear stress of a deviator in these coordinates: half the difference of the extreme principal stresses [Pa].
+  !> Compute the largest shear stress of a deviator in these coordinates: half the difference of extreme principal stresses [Pa].
   pure real(wp) function largest_shear(s)
     !> Coordinates (5) [Pa]
     real(wp), intent(in) :: s(:)
@@ -65,7 +65,7 @@ contains
     call find_smallest_ball(path, mean, amplitude)
   end subroutine deviator_amplitude
 
-  !> sqrt(J2,a) + slope sigma_h,max: endurance where it is below the bound of the material
+  !> Compute sqrt(J2,a) + slope sigma_h,max: endurance where it is below the bound of the material
   !> (B. Crossland, Int. Conf. on Fatigue of Metals, Inst. Mech. Eng., London 1956, 138-149).
   pure real(wp) function crossland(history, slope)
     !> Stress (6, number of times) [Pa]
@@ -80,7 +80,7 @@ contains
     crossland = amplitude + slope*highest
   end function crossland
 
-  !> Largest tau(t) + slope sigma_h(t), tau the largest shear of the deviator less its mean on the path: the stress of a
+  !> Compute the largest tau(t) + slope sigma_h(t), tau the largest shear of the deviator less its mean on the path: the stress of a
   !> grain that has shaken down (K. Dang Van, ASTM STP 1191 (1993) 120-130).
   pure real(wp) function dang_van(history, slope)
     !> Stress (6, number of times) [Pa]

@@ -174,7 +174,7 @@ contains
                            + 2.0_wp*(most_slope + most_amplitude)*slope*extent%spread)/self%shear_modulus
   end function curvature_of_fatemi_socie
 
-  !> Amplitude tau_a of a shear traction; where it is certainly below `floor`, a bound that is below it [Pa].
+  !> Compute the amplitude tau_a of a shear traction; where it is certainly below `floor`, a bound that is below it [Pa].
   pure real(wp) function shear_amplitude(shear, floor) result(amplitude)
     !> Shear traction (times, 2) [Pa]
     real(wp), intent(in), contiguous :: shear(:, :)
@@ -204,7 +204,7 @@ contains
     if (0.5_wp*sqrt(square) < (1.0_wp - opposite)*amplitude) call find_smallest_ball(transpose(shear), center, amplitude)
   end function shear_amplitude
 
-  !> Largest of some numbers, none of which is NaN: maxval, which looks for those, takes several times as long.
+  !> Return the largest of some numbers, none of which is NaN: maxval, which looks for those, takes several times as long.
   pure real(wp) function largest(values)
     real(wp), intent(in), contiguous :: values(:)
     real(wp) :: lane(4)

@@ -41,7 +41,7 @@ contains
     curve = strain_life_t(young_modulus, strength, b, ductility, c)
   end subroutine new_strain_life
 
-  !> Parameter after N cycles [Pa].
+  !> Compute the parameter after N cycles [Pa].
   elemental real(wp) function parameter_at(self, n)
     class(strain_life_t), intent(in) :: self
     !> Cycles
@@ -50,7 +50,7 @@ contains
                    + self%strength*self%ductility*(2.0_wp*n)**(self%b + self%c)
   end function parameter_at
 
-  !> Cycles N for a parameter: halved in log N, from 1/2 (0 for more than that) to 1e30 (infinity for less); of NaN, NaN.
+  !> Find the cycles N for a parameter: halved in log N, from 1/2 (0 for more than that) to 1e30 (infinity for less); of NaN, NaN.
   elemental real(wp) function cycles(self, parameter)
     use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf, ieee_is_nan
     class(strain_life_t), intent(in) :: self

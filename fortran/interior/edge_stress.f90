@@ -15,10 +15,7 @@ module hc_edge_stress
   use hc_lattice, only: lattice_t
   use hc_interpolation, only: interpolate
   use hc_edge_root, only: edge_root_t, gauss_rule
-  use hc_interior_fields, only: n_derivative, stresses, psi, psi_z, z_psi_zz, psi_x, psi_y, z_psi_xz, z_psi_yz, z_psi_xx, &
-                                z_psi_xy, z_psi_yy, chi_x, chi_y, chi_xx, chi_xy, chi_yy, z_chi_xxx, z_chi_xxy, z_chi_xyy, &
-                                z_chi_yyy, omega_xx, omega_xy, omega_yy, omega_xxx, omega_xxy, omega_xyy, omega_yyy, &
-                                xx, yy, zz, xz, yz
+  use hc_interior_fields, only: n_derivative, stresses, point_load, xx, yy, zz, xz, yz
   implicit none
   private
 
@@ -90,7 +87,7 @@ contains
             r = low + length*stretched(points(i))
             factor(i) = length*stretch(points(i))*weights(i)*r*(1.0_wp - step((r - 0.5_wp*radius)/(0.5_wp*radius))) &
                         *(difference(root, lattice, field, point + r*direction) - here)
-            derivative(i, :) = of_point_load(-r*direction, depth)
+            derivative(i, :) = point_load(-r*direction, depth)
           end do
         end associate
         call stresses(n_ray, derivative, derivative, derivative, poisson_ratio, part)
@@ -154,40 +151,6 @@ contains
     n = n + 1
     ends(n) = radius
   end subroutine break_ray
-
-  !> Compute the derivatives of the potentials of a point load, seen from it.
-  pure function of_point_load(at, z) result(d)
-    real(wp), intent(in) :: at(2), z
-    real(wp) :: d(n_derivative)
-    real(wp) :: r, s, g, h, h_2, k, k_1, k_2
-
-    associate (x => at(1), y => at(2))
-      r = sqrt(x**2 + y**2 + z**2)
-      s = r + z
-      d = 0.0_wp
-      d(psi) = 1.0_wp/r
-      d(psi_z) = -z/r**3
-      d(z_psi_zz) = z*(3.0_wp*z**2/r**5 - 1.0_wp/r**3)
-      d([psi_x, psi_y]) = -at/r**3
-      d([z_psi_xz, z_psi_yz]) = 3.0_wp*z**2*at/r**5
-      d(z_psi_xx) = z*(3.0_wp*x**2/r**5 - 1.0_wp/r**3)
-      d(z_psi_xy) = z*3.0_wp*x*y/r**5
-      d(z_psi_yy) = z*(3.0_wp*y**2/r**5 - 1.0_wp/r**3)
-      g = 1.0_wp/(r*s) ! X_x = x g, g_x = x h, h_x = x h_2
-      h = -(2.0_wp*r + z)/(r**3*s**2)
-      h_2 = (8.0_wp*r**2 + 9.0_wp*r*z + 3.0_wp*z**2)/(r**5*s**3)
-      d([chi_x, chi_y]) = at*g
-      d([chi_xx, chi_xy, chi_yy]) = [g + x**2*h, x*y*h, g + y**2*h]
-      d([z_chi_xxx, z_chi_xxy, z_chi_xyy, z_chi_yyy]) = z*[3.0_wp*x*h + x**3*h_2, y*h + x**2*y*h_2, x*h + x*y**2*h_2, &
-                                                         3.0_wp*y*h + y**3*h_2]
-      k = -1.0_wp/s ! Omega_x = x k, k_x = x k_1, ...
-      k_1 = 1.0_wp/(r*s**2)
-      k_2 = -(3.0_wp*r + z)/(r**3*s**3)
-      d([omega_xx, omega_xy, omega_yy]) = [k + x**2*k_1, x*y*k_1, k + y**2*k_1]
-      d([omega_xxx, omega_xxy, omega_xyy, omega_yyy]) = [3.0_wp*x*k_1 + x**3*k_2, y*k_1 + x**2*y*k_2, x*k_1 + x*y**2*k_2, &
-                                                        3.0_wp*y*k_1 + y**3*k_2]
-    end associate
-  end function of_point_load
 
   !> Compute the stress below the middle of a disc of the load 1, tapered like the integral.
   pure function disc(z, load, poisson_ratio) result(stress)

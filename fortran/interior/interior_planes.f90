@@ -13,7 +13,7 @@ module hc_interior_planes
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
-  use hc_interior_fields, only: n_derivative, check_interior, xx, yy, zz, xy, yz, xz
+  use hc_interior_fields, only: check_interior, xx, yy, zz, xy, yz, xz
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_points, only: check_body
@@ -81,7 +81,7 @@ module hc_interior_planes
 
 contains
 
-  !> The tables of the stress, or of the displacement.
+  !> Return the tables of the stress, or of the displacement.
   pure type(tables_t) function tables_of(displaced, coated)
     !> Of the displacement; of a coated body
     logical, intent(in) :: displaced, coated
@@ -110,7 +110,7 @@ contains
     end if
   end function tables_of
 
-  !> Plans and scratch space.
+  !> Make plans and scratch space.
   subroutine new_interior_planes(planes, lattice, body, inside, error, space, displaced)
     !> Planes to be set up
     type(interior_planes_t), intent(out) :: planes
@@ -145,7 +145,7 @@ contains
     if (lattice%is_periodic()) return
     call require_memory(planes_memory(lattice%extent, coated, planes%space%threads), error, planes%space%threads)
     if (allocated(error)) return
-    call new_interior_pyramid(planes%pyramid, lattice%unit_basis())
+    call new_interior_pyramid(planes%pyramid, lattice%unit_basis(), sharp=coated)
     allocate (planes%loads(lattice%extent(1), lattice%extent(2), 3), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the stress: use a smaller window')
@@ -219,7 +219,7 @@ contains
     end associate
   end subroutine set_depth
 
-  !> Stress, or displacement times the shear modulus, at the nodes of the plane.
+  !> Compute the stress, or displacement times the shear modulus, at the nodes of the plane.
   subroutine apply(self, traction, field, error)
     class(interior_planes_t), intent(inout) :: self
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component) [Pa]
@@ -242,7 +242,7 @@ contains
     end associate
   end subroutine apply
 
-  !> Stress, or displacement times the shear modulus, at the nodes of several planes for a history of load steps.
+  !> Compute the stress, or displacement times the shear modulus, at the nodes of several planes for a history of steps.
   subroutine of_history(self, traction, depth, field, error, cache)
     class(interior_planes_t), intent(inout) :: self
     !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
@@ -302,9 +302,9 @@ contains
     integer, intent(in) :: j
     real(wp), intent(out) :: k(:, :)
 
-    real(wp) :: x(most_points), y(most_points), z(most_points), d(most_points, n_derivative)
-    real(wp) :: u(most_points, 3, 3), s(most_points, 6, 3)
-    integer :: i, depth, n, m, middle, first, t
+    real(wp), allocatable :: u(:, :, :), s(:, :, :)
+    real(wp) :: x(most_points), y(most_points)
+    integer :: i, n, m, middle, first, t
 
     n = size(k, 2)/2
     middle = n + 1
@@ -317,17 +317,13 @@ contains
         x(i) = (first + i - 1)*self%basis(1, 1) + j*self%basis(1, 2)
         y(i) = (first + i - 1)*self%basis(2, 1) + j*self%basis(2, 2)
       end do
-      u = 0.0_wp
-      s = 0.0_wp
-      do depth = 1, size(self%fields%depth)
-        z = self%fields%depth(depth)/self%spacing
-        call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-        call self%fields%add(depth, d(:m, :), d(:m, :), d(:m, :), self%spacing, u(:m, :, :), s(:m, :, :))
-      end do
+      allocate (u(m, 3, 3), s(m, 6, 3))
+      call self%fields%of_pyramid(self%pyramid, self%spacing, x(:m), y(:m), u, s)
       if (self%tables%kind == of_displacement) s(:, :3, :) = u
       do t = 1, size(k, 1)
-        k(t, middle + first:middle + first + m - 1) = s(:m, self%tables%component(t), self%tables%load(t))
+        k(t, middle + first:middle + first + m - 1) = s(:, self%tables%component(t), self%tables%load(t))
       end do
+      deallocate (u, s)
       first = first + m
     end do
     if (self%mirrored) then

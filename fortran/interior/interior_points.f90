@@ -13,11 +13,10 @@ module hc_interior_points
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
-  use hc_interior_fields, only: n_derivative, check_interior, yz, xz
+  use hc_interior_fields, only: check_interior, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior
-  !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
 
@@ -40,7 +39,7 @@ module hc_interior_points
 
 contains
 
-  !> Displacement and stress at points for a history of load steps.
+  !> Compute displacement and stress at points for a history of load steps.
   subroutine fields_at_points(lattice, traction, body, inside, points, displacement, stress, error, space)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -76,7 +75,7 @@ contains
       call new_periodic_interior(repeating, lattice, body, inside, traction, shared, error)
       if (.not. allocated(error)) call repeating%at_points(points, displacement, stress, error)
     else
-      call new_loaded_nodes(loaded, lattice, traction, body, error)
+      call new_loaded_nodes(loaded, lattice, traction, body, size(inside%layer) > 0, error)
       if (.not. allocated(error)) call sum_at_points(loaded, inside, points, displacement, stress, shared, error)
     end if
     if (allocated(error)) return
@@ -93,42 +92,21 @@ contains
     real(wp), intent(in) :: points(:, :)
     real(wp), intent(out) :: displacement(:, :, :), stress(:, :, :)
     type(field_space_t), intent(in) :: space
-    !> Allocated on failure: layers that images do not describe, not enough memory
+    !> Allocated on failure: layers that images do not describe
     type(error_t), allocatable, intent(out) :: error
 
     type(depth_fields_t), allocatable :: fields(:)
-    real(wp), allocatable :: sums(:, :, :)
     integer, allocatable :: level(:)
-    real(wp) :: u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
-    integer :: i, j, step, k, thread, stat
+    integer :: i
 
     call find_levels(inside, points(3, :), level, fields, error)
     if (allocated(error)) return
-    ! of each thread; no stack holds those of many steps
-    allocate (sums(n_derivative, size(loaded%traction, 2), space%threads), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
-      return
-    end if
-
-    !$omp parallel do num_threads(space%threads) schedule(dynamic) private(u, s, d, j, step, k, thread) if (size(points, 2) > 1)
+    !$omp parallel do num_threads(space%threads) schedule(dynamic) if (size(points, 2) > 1)
     do i = 1, size(points, 2)
-      thread = 1
-      !$ thread = omp_get_thread_num() + 1
-      displacement(:, i, :) = 0.0_wp
-      stress(:, i, :) = 0.0_wp
-      do j = 1, size(fields(level(i))%depth)
-        call sum_pyramids(loaded, [points(:2, i), fields(level(i))%depth(j)], sums(:, :, thread))
-        do step = 1, size(displacement, 3)
-          k = 3*(step - 1)
-          d(1, :, :) = sums(:, k + 1:k + 3, thread)
-          u = 0.0_wp
-          s = 0.0_wp
-          call fields(level(i))%add(j, d(:, :, 1), d(:, :, 2), d(:, :, 3), loaded%pyramid%spacing, u, s)
-          displacement(:, i, step) = displacement(:, i, step) + loaded%pyramid%spacing*sum(u(1, :, :), dim=2)
-          stress(:, i, step) = stress(:, i, step) + sum(s(1, :, :), dim=2)
-        end do
-      end do
+      associate (spacing => loaded%pyramid%spacing, node => loaded%position)
+        call fields(level(i))%of_nodes(loaded%pyramid, (points(1, i) - node(:, 1))/spacing, (points(2, i) - node(:, 2))/spacing, &
+                                       loaded%traction, displacement(:, i, :), stress(:, i, :))
+      end associate
     end do
     !$omp end parallel do
   end subroutine sum_at_points
@@ -179,13 +157,14 @@ contains
   end subroutine check_body
 
   !> Find the nodes that carry traction.
-  subroutine new_loaded_nodes(self, lattice, traction, body, error)
+  subroutine new_loaded_nodes(self, lattice, traction, body, coated, error)
     type(loaded_nodes_t), intent(out) :: self
     type(lattice_t), intent(in) :: lattice
     !> Pressure and traction on body 1 (n_col, n_row, component, step) [Pa]
     real(wp), intent(in) :: traction(:, :, :, :)
-    !> Number of the body
+    !> Number of the body, and whether it has layers
     integer, intent(in) :: body
+    logical, intent(in) :: coated
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
 
@@ -199,7 +178,7 @@ contains
       call raise(error, status%resources, 'not enough memory for the tractions: use fewer load steps')
       return
     end if
-    call new_interior_pyramid(self%pyramid, lattice%basis)
+    call new_interior_pyramid(self%pyramid, lattice%basis, coated)
     side = merge(1.0_wp, -1.0_wp, body == 1)
     n = 0
     do row = 1, size(traction, 2)
@@ -214,19 +193,5 @@ contains
       end do
     end do
   end subroutine new_loaded_nodes
-
-  !> Derivatives of the potentials of all loads at a point.
-  pure subroutine sum_pyramids(loaded, point, sums)
-    type(loaded_nodes_t), intent(in) :: loaded
-    !> The point [m]
-    real(wp), intent(in) :: point(3)
-    !> Sums (derivative, load), lengths in longest edges
-    real(wp), intent(out) :: sums(:, :)
-
-    associate (spacing => loaded%pyramid%spacing, node => loaded%position)
-      call loaded%pyramid%sum_over_nodes( &
-        (point(1) - node(:, 1))/spacing, (point(2) - node(:, 2))/spacing, point(3)/spacing, loaded%traction, sums)
-    end associate
-  end subroutine sum_pyramids
 
 end module hc_interior_points

@@ -23,7 +23,7 @@ module hc_periodic_interior
   use hc_layer_response, only: layer_t, layered_body_t, n_wave, ll_p, tt_p, zz_p, lz_p, ll_q, tt_q, zz_q, lz_q, tz_t, lt_t, &
                                uz_p, ul_p, uz_q, ul_q, ut_t
   use hc_depth_fields, only: depth_fields_t
-  use hc_interior_fields, only: n_derivative, xx, yy, zz, xy, yz, xz
+  use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_periodic_symbol, only: sinc
   !$ use omp_lib, only: omp_get_thread_num
@@ -101,7 +101,7 @@ contains
     self%space = space
     surface = inside%material_at(0.0_wp)
     self%shear_modulus = surface%shear_modulus
-    call new_interior_pyramid(self%pyramid, lattice%basis)
+    call new_interior_pyramid(self%pyramid, lattice%basis, sharp=.true.)
     associate (n => lattice%extent, n_step => size(traction, 4))
       allocate (self%wave(n(2), n(1), 3, n_step), self%load(3*n_step, n(1), n(2)), field(n(1), n(2)), stat=stat)
       if (stat /= 0) then
@@ -365,37 +365,30 @@ contains
     real(wp), intent(in) :: points(:, :)
     !> Sums (component, step, point)
     real(wp), intent(inout) :: total(:, :, :)
-    real(wp) :: sums(n_derivative, size(self%load, 1), n_level + 1), u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
-    integer :: i, j, step
+    real(wp), allocatable :: load(:, :), x(:, :), u(:, :), s(:, :)
+    integer :: i
 
-    !$omp parallel do num_threads(self%space%threads) schedule(dynamic) private(sums, u, s, d, j, step)
+    !$omp parallel do num_threads(self%space%threads) schedule(dynamic) private(load, x, u, s)
     do i = 1, size(points, 2)
-      call sum_near(self, at, points(:2, i), sums)
-      do step = 1, size(total, 2)
-        u = 0.0_wp
-        s = 0.0_wp
-        do j = 1, n_level + 1
-          d(1, :, :) = sums(:, 3*step - 2:3*step, j)
-          call at%near%add(j, d(:, :, 1), d(:, :, 2), d(:, :, 3), self%pyramid%spacing, u, s)
-        end do
-        total(:xz, step, i) = total(:xz, step, i) + sum(s(1, :, :), dim=2)
-        total(u_x:, step, i) = total(u_x:, step, i) + self%pyramid%spacing*sum(u(1, :, :), dim=2)
-      end do
+      call find_near(self, points(:2, i), x, load)
+      allocate (u(3, size(total, 2)), s(xz, size(total, 2)))
+      call at%near%of_nodes(self%pyramid, x(:, 1), x(:, 2), load, u, s)
+      total(:xz, :, i) = total(:xz, :, i) + s
+      total(u_x:, :, i) = total(u_x:, :, i) + u
+      deallocate (u, s)
     end do
     !$omp end parallel do
   end subroutine add_near
 
-  !> Sum the potentials of the pyramids near a point at all depths.
-  pure subroutine sum_near(self, at, point, sums)
+  !> Find the nodes near a point that carry traction.
+  pure subroutine find_near(self, point, x, load)
     type(periodic_interior_t), intent(in) :: self
-    type(depth_t), intent(in) :: at
     !> x and y [m]
     real(wp), intent(in) :: point(2)
-    !> Sums (derivative, component and step, depth)
-    real(wp), intent(out) :: sums(:, :, :)
-    real(wp), allocatable :: load(:, :), x(:, :)
+    !> The point relative to them (node, direction), in longest edges, and their tractions (node, component and step) [Pa]
+    real(wp), allocatable, intent(out) :: x(:, :), load(:, :)
     integer, allocatable :: node(:, :)
-    integer :: n, i, j
+    integer :: n, i
 
     associate (lattice => self%lattice, spacing => self%pyramid%spacing)
       call nodes_around(lattice, point, near*spacing, node)
@@ -409,11 +402,10 @@ contains
           x(n, :) = (point - lattice%origin - matmul(lattice%basis, real(node(:, i), wp)))/spacing
         end associate
       end do
-      do j = 1, size(sums, 3)
-        call self%pyramid%sum_over_nodes(x(:n, 1), x(:n, 2), at%near%depth(j)/spacing, load(:n, :), sums(:, :, j))
-      end do
+      load = load(:n, :)
+      x = x(:n, :)
     end associate
-  end subroutine sum_near
+  end subroutine find_near
 
   !> List the nodes of the endless lattice within a distance of a point, column and row (2, n).
   pure subroutine nodes_around(lattice, point, distance, node)
@@ -534,10 +526,10 @@ contains
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
     complex(wp), allocatable :: table(:, :, :, :)
-    real(wp), dimension(most_points) :: x, y, z
-    real(wp) :: d(most_points, n_derivative), u(most_points, 3, 3), s(most_points, 6, 3)
+    real(wp), allocatable :: u(:, :, :), s(:, :, :)
+    real(wp), dimension(most_points) :: x, y
     integer, allocatable :: node(:, :)
-    integer :: i, j, m, c, load, from, last, there(2)
+    integer :: i, m, c, load, from, last, there(2)
 
     associate (lattice => self%lattice, spacing => self%pyramid%spacing)
       allocate (table(lattice%extent(1), lattice%extent(2), size(response, 3), 3))
@@ -552,13 +544,8 @@ contains
             y(i) = away(2)
           end associate
         end do
-        u = 0.0_wp
-        s = 0.0_wp
-        do j = 1, n_level + 1
-          z = at%near%depth(j)/spacing
-          call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
-          call at%near%add(j, d(:m, :), d(:m, :), d(:m, :), spacing, u(:m, :, :), s(:m, :, :))
-        end do
+        allocate (u(m, 3, 3), s(m, xz, 3))
+        call at%near%of_pyramid(self%pyramid, spacing, x(:m), y(:m), u, s)
         do i = 1, m
           there = modulo(node(:, from + i - 1), lattice%extent) + 1
           if (first == 0) then
@@ -567,6 +554,7 @@ contains
             table(there(1), there(2), :, :) = table(there(1), there(2), :, :) + spacing*u(i, :, :)
           end if
         end do
+        deallocate (u, s)
       end do
       do load = 1, 3
         do c = 1, size(response, 3)

@@ -11,11 +11,11 @@ module hc_stress_invariants
 
 contains
 
-  !> Principal stresses, von Mises and Tresca at many points.
+  !> Compute principal stresses, von Mises and Tresca at many points.
   subroutine stress_invariants(stress, scalars)
     !> Stress (component xx, yy, zz, xy, yz, xz; point)
     real(wp), intent(in) :: stress(:, :)
-    !> Principal stresses, the largest first, von Mises, Tresca (scalar, point)
+    !> Compute the principal stresses, the largest first, von Mises, Tresca (scalar, point)
     real(wp), intent(out) :: scalars(:, :)
     integer :: i
 
@@ -28,7 +28,7 @@ contains
     !$omp end parallel do
   end subroutine stress_invariants
 
-  !> Equivalent stress of von Mises.
+  !> Compute the equivalent stress of von Mises.
   pure real(wp) function von_mises(s)
     !> Stress xx, yy, zz, xy, yz, xz
     real(wp), intent(in) :: s(6)

@@ -289,19 +289,11 @@ contains
   real(wp) function window_max(self, x)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
-    real(wp), intent(in), contiguous :: x(:, :)
-    integer :: col, row
+    real(wp), intent(in), contiguous, target :: x(:, :)
+    real(wp), pointer, contiguous :: values(:)
 
-    window_max = -huge(1.0_wp)
-    !$omp parallel do schedule(static) num_threads(self%threads) private(col) reduction(max: window_max)
-    do row = 1, size(x, 2)
-      !$omp simd reduction(max: window_max)
-      do col = 1, size(x, 1)
-        window_max = max(window_max, x(col, row))
-      end do
-    end do
-    !$omp end parallel do
-    window_max = largest(self, window_max)
+    values(1:size(x)) => x
+    window_max = vector_max(self, values)
   end function window_max
 
   !> Return the largest element on a set of nodes.
@@ -326,18 +318,15 @@ contains
   real(wp) function window_max_on(self, x, nodes)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
-    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous, target :: x(:, :)
     !> True on the nodes of the set (n_col, n_row)
-    logical(lk), intent(in), contiguous :: nodes(:, :)
-    integer :: row
+    logical(lk), intent(in), contiguous, target :: nodes(:, :)
+    real(wp), pointer, contiguous :: values(:)
+    logical(lk), pointer, contiguous :: set(:)
 
-    window_max_on = -huge(1.0_wp)
-    !$omp parallel do schedule(static) num_threads(self%threads) reduction(max: window_max_on)
-    do row = 1, size(x, 2)
-      window_max_on = max(window_max_on, maxval(x(:, row), mask=nodes(:, row)))
-    end do
-    !$omp end parallel do
-    window_max_on = largest(self, window_max_on)
+    values(1:size(x)) => x
+    set(1:size(x)) => nodes
+    window_max_on = vector_max_on(self, values, set)
   end function window_max_on
 
   !> Return the smallest element on a set of nodes.
@@ -362,18 +351,15 @@ contains
   real(wp) function window_min(self, x, nodes)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
-    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous, target :: x(:, :)
     !> True on the nodes of the set (n_col, n_row)
-    logical(lk), intent(in), contiguous :: nodes(:, :)
-    integer :: row
+    logical(lk), intent(in), contiguous, target :: nodes(:, :)
+    real(wp), pointer, contiguous :: values(:)
+    logical(lk), pointer, contiguous :: set(:)
 
-    window_min = huge(1.0_wp)
-    !$omp parallel do schedule(static) num_threads(self%threads) reduction(min: window_min)
-    do row = 1, size(x, 2)
-      window_min = min(window_min, minval(x(:, row), mask=nodes(:, row)))
-    end do
-    !$omp end parallel do
-    window_min = -largest(self, -window_min)
+    values(1:size(x)) => x
+    set(1:size(x)) => nodes
+    window_min = vector_min(self, values, set)
   end function window_min
 
   !> Return the largest absolute value, 0 of nothing.
@@ -396,16 +382,11 @@ contains
   integer function count_window(self, nodes)
     class(field_space_t), intent(in) :: self
     !> True on the nodes of the set (n_col, n_row)
-    logical(lk), intent(in), contiguous :: nodes(:, :)
-    integer :: row
+    logical(lk), intent(in), contiguous, target :: nodes(:, :)
+    logical(lk), pointer, contiguous :: set(:)
 
-    count_window = 0
-    !$omp parallel do schedule(static) num_threads(self%threads) reduction(+: count_window)
-    do row = 1, size(nodes, 2)
-      count_window = count_window + count(nodes(:, row))
-    end do
-    !$omp end parallel do
-    count_window = number(self, count_window)
+    set(1:size(nodes)) => nodes
+    count_window = count_nodes(self, set)
   end function count_window
 
   !> Count the nodes of the window with a value above zero.

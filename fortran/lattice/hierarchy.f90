@@ -8,7 +8,7 @@ module hc_hierarchy
   use hc_communicator, only: rows_held
   use hc_lattice, only: lattice_t, floor_half
   use hc_field_space, only: field_space_t
-  use hc_transfer, only: restrict_field, restrict_mask
+  use hc_transfer, only: restrict_field
   implicit none
   private
 
@@ -100,10 +100,10 @@ contains
     coarse%space = self%space
     coarse%space%ranks = self%space%ranks%over(coarse%lattice%extent)
     call self%coarsen_gap(coarse)
+    call find_fine_rows(self, coarse, first, n)
     if (self%space%ranks%size == 1) then
-      coarse%candidate = restrict_mask(self%lattice, self%candidate, coarse%lattice)
+      coarse%candidate = self%candidate(first(1)::2, first(2)::2)
     else
-      call find_fine_rows(self, coarse, first, n)
       allocate (rows(self%lattice%extent(1), n))
       call self%space%fetch(self%lattice%extent(2), self%candidate, first(2), rows)
       coarse%candidate = rows(first(1)::2, ::2)

@@ -66,9 +66,8 @@ module hc_lattice
     !> Whether the window repeats, both ways
     procedure :: is_periodic
     !> Values of the neighbors at all nodes
-    procedure, private :: shifted_field, shifted_zone
-    generic :: shifted => shifted_field, shifted_zone
-    !> Sum and largest value over each node and its neighbors; nodes within some steps of a zone
+    procedure :: shifted
+    !> Sum and largest value over each node and its neighbors; nodes of a zone and those next to it
     procedure :: ring_sum, ring_max, dilated
     !> The part of the window around some nodes: its columns and rows, whether it pays, its lattice
     procedure :: enclose, enclose_lines, subwindow
@@ -279,7 +278,7 @@ contains
   end function is_periodic
 
   !> Return the values of a field at a neighbor of each node; 0 beyond the end of the window.
-  pure function shifted_field(self, field, k) result(shifted)
+  pure function shifted(self, field, k)
     class(lattice_t), intent(in) :: self
     !> Field over the window (n_col, n_row)
     real(wp), intent(in) :: field(:, :)
@@ -296,27 +295,7 @@ contains
         shifted = eoshift(shifted, neighbors(d, k), dim=d)
       end if
     end do
-  end function shifted_field
-
-  !> Return which nodes have a neighbor in a zone; there is none beyond the end of the window.
-  pure function shifted_zone(self, zone, k) result(shifted)
-    class(lattice_t), intent(in) :: self
-    !> Nodes of the zone (n_col, n_row)
-    logical, intent(in) :: zone(:, :)
-    !> Number of the neighbor in `neighbors`
-    integer, intent(in) :: k
-    logical :: shifted(size(zone, 1), size(zone, 2))
-    integer :: d
-
-    shifted = zone
-    do d = 1, 2
-      if (self%periodic(d)) then
-        shifted = cshift(shifted, neighbors(d, k), dim=d)
-      else
-        shifted = eoshift(shifted, neighbors(d, k), dim=d)
-      end if
-    end do
-  end function shifted_zone
+  end function shifted
 
   !> Sum a field over each node and its neighbors.
   pure function ring_sum(self, field) result(total)
@@ -346,25 +325,16 @@ contains
     end do
   end function ring_max
 
-  !> Find the nodes within some steps of a zone.
-  pure function dilated(self, zone, steps) result(wider)
+  !> Find the nodes of a zone and those next to it.
+  pure function dilated(self, zone) result(wider)
     class(lattice_t), intent(in) :: self
     !> Nodes of the zone (n_col, n_row)
     logical, intent(in) :: zone(:, :)
-    !> Steps; absent: one
-    integer, intent(in), optional :: steps
-    logical :: wider(size(zone, 1), size(zone, 2)), before(size(zone, 1), size(zone, 2))
-    integer :: k, step, n
+    logical :: wider(size(zone, 1), size(zone, 2))
+    real(wp) :: largest(size(zone, 1), size(zone, 2))
 
-    n = 1
-    if (present(steps)) n = steps
-    wider = zone
-    do step = 1, n
-      before = wider
-      do k = 1, size(neighbors, 2)
-        wider = wider .or. self%shifted(before, k)
-      end do
-    end do
+    largest = self%ring_max(merge(1.0_wp, 0.0_wp, zone))
+    wider = largest > 0.5_wp
   end function dilated
 
   !> Return the steps to the neighbors in a list of the nodes of a window, column by column.

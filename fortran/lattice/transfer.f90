@@ -6,13 +6,13 @@
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_transfer
-  use hc_precision, only: wp, lk
+  use hc_precision, only: wp
   use hc_lattice, only: lattice_t, neighbors, floor_half
   use hc_field_space, only: field_space_t
   implicit none
   private
 
-  public :: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
+  public :: prolong, prolong_edge, prolong_shear, restrict_field, restrict_vector
 
 contains
 
@@ -150,25 +150,6 @@ contains
     !$omp end parallel do
   end subroutine prolong_edge
 
-  !> Interpolate all components of a field.
-  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine, space)
-    !> Coarse lattice and window
-    type(lattice_t), intent(in) :: coarse_lattice
-    !> Coarse field (n_col, n_row, number of components)
-    real(wp), intent(in) :: coarse(:, :, :)
-    !> Fine lattice and window
-    type(lattice_t), intent(in) :: fine_lattice
-    !> Fine field (n_col, n_row, number of components)
-    real(wp), intent(out) :: fine(:, :, :)
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    integer :: m
-
-    do m = 1, size(fine, 3)
-      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m), space)
-    end do
-  end subroutine prolong_vector
-
   !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
   subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine, space)
     !> Coarse lattice and window
@@ -208,7 +189,9 @@ contains
       end do
     end do
     !$omp end parallel do
-    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine, space)
+    do k = 1, size(fine, 3)
+      call prolong(coarse_lattice, ratio(:, :, k), fine_lattice, fine(:, :, k), space)
+    end do
     !$omp parallel do schedule(static) private(k) num_threads(space%threads_for(size(fine_pressure)))
     do row = 1, size(fine, 2)
       do k = 1, size(fine, 3)
@@ -250,21 +233,5 @@ contains
       coarse(:, :, m) = restrict_field(fine_lattice, fine(:, :, m), coarse_lattice)
     end do
   end function restrict_vector
-
-  !> Return the values of a mask at the coarse nodes.
-  pure function restrict_mask(fine_lattice, fine, coarse_lattice) result(coarse)
-    !> Fine lattice and window
-    type(lattice_t), intent(in) :: fine_lattice
-    !> Fine mask (n_col, n_row)
-    logical(lk), intent(in) :: fine(:, :)
-    !> Coarse lattice and window, inside the fine one
-    type(lattice_t), intent(in) :: coarse_lattice
-    !> Coarse mask (n_col, n_row)
-    logical(lk) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
-    integer :: start(2)
-
-    start = 2*coarse_lattice%first - fine_lattice%first + 1
-    coarse = fine(start(1)::2, start(2)::2)
-  end function restrict_mask
 
 end module hc_transfer

@@ -15,34 +15,22 @@ module hc_contact_edges
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
-  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, mesh_of_zone, distance_field
+  use hc_zone_edge, only: edged_zone_t
   implicit none
   private
 
   public :: contact_edges_t, new_contact_edges
 
-  !> A contact and its edges.
-  type :: contact_edges_t
-    private
-    type(lattice_t) :: lattice
-    !> Nodes in contact, and those that can touch (n_col, n_row)
-    logical, allocatable :: contact(:, :), candidate(:, :)
-    !> Nodes about the edge of the contact, their pressure and their distance from it
-    type(edge_band_t) :: band
-    real(wp), allocatable :: pressure(:), distance(:)
-    !> Tuning numbers
-    type(edge_options_t) :: options
+  !> The zone in contact, and its edge.
+  type, extends(edged_zone_t) :: contact_edges_t
+    !> Pressure at the nodes about the edge
+    real(wp), allocatable, private :: pressure(:)
   contains
-    !> The edges of the contact area and of the part of it that sticks; sums of them by row
-    procedure :: contact_edge, contact_sums, stick_edge, stick_sums
-    !> Triangles that fill either of them, and a field there
-    procedure :: contact_mesh, stick_mesh
-    !> Distances of all nodes from either edge
-    procedure :: contact_distances, stick_distances
+    !> The part of the contact that sticks
+    procedure :: find_stick
     !> Squares of the pressure near the edge of the contact, and of the reserve near that of the stick area, good to
     !> interpolate
     procedure :: squares, stick_squares
-    procedure, private :: from_stick
   end type contact_edges_t
 
   !> Data about the edge of a zone from its own nodes.
@@ -75,7 +63,7 @@ contains
 
     if (present(options)) edges%options = options
     edges%lattice = lattice
-    edges%contact = contact
+    edges%zone = contact
     edges%candidate = candidate
     call new_edge_band(edges%band, contact, edges%options)
     associate (band => edges%band, options => edges%options)
@@ -91,111 +79,15 @@ contains
     end associate
   end subroutine new_contact_edges
 
-  !> Find the edge of the contact area.
-  pure function contact_edge(self) result(edge)
-    class(contact_edges_t), intent(in) :: self
-    type(zone_edge_t) :: edge
-    edge = edge_of_zone(self%lattice, self%candidate, self%contact, self%band, self%distance)
-  end function contact_edge
-
-  !> Sum the cells of the contact by row, of which `edge_of_sums` finds its area.
-  pure subroutine contact_sums(self, rows, sums)
-    class(contact_edges_t), intent(in) :: self
-    !> First and last row of cells, each named by the row of nodes below it, and rows of the window before those of the fields
-    integer, intent(in) :: rows(3)
-    !> Sums of each row
-    real(wp), allocatable, intent(out) :: sums(:, :)
-    real(wp), allocatable :: segments(:, :, :)
-
-    call sum_cells(self%lattice, self%candidate, self%contact, self%band, self%distance, rows, sums, segments)
-  end subroutine contact_sums
-
-  !> Sum the cells of the part of it that sticks, as `contact_sums`.
-  pure subroutine stick_sums(self, stick, reserve, rows, sums)
-    class(contact_edges_t), intent(in) :: self
-    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
-    logical, intent(in) :: stick(:, :)
-    real(wp), intent(in) :: reserve(:, :)
-    integer, intent(in) :: rows(3)
-    real(wp), allocatable, intent(out) :: sums(:, :)
-    type(edge_band_t) :: band
-    real(wp), allocatable :: distance(:), segments(:, :, :)
-
-    call self%from_stick(stick, reserve, band, distance)
-    call sum_cells(self%lattice, self%candidate, stick, band, distance, rows, sums, segments)
-  end subroutine stick_sums
-
-  !> Fill the contact area with triangles, and carry a field to its edge.
-  pure function contact_mesh(self, field, vanishes) result(mesh)
-    class(contact_edges_t), intent(in) :: self
-    !> Values at the nodes, and whether they vanish at the edge
-    real(wp), intent(in) :: field(:, :)
-    logical, intent(in) :: vanishes
-    type(zone_mesh_t) :: mesh
-    mesh = mesh_of_zone(self%lattice, self%candidate, self%contact, self%band, self%distance, field, vanishes)
-  end function contact_mesh
-
-  !> Return the distances of the nodes from the edge of the contact, in spacings, positive inside.
-  pure function contact_distances(self) result(field)
-    class(contact_edges_t), intent(in) :: self
-    real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
-    field = distance_field(self%candidate, self%contact, self%band, self%distance, self%options)
-  end function contact_distances
-
-  !> Find the edge of the part of the contact area that sticks.
-  pure function stick_edge(self, stick, reserve) result(edge)
-    class(contact_edges_t), intent(in) :: self
-    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
-    logical, intent(in) :: stick(:, :)
-    real(wp), intent(in) :: reserve(:, :)
-    type(zone_edge_t) :: edge
-    type(edge_band_t) :: band
-    real(wp), allocatable :: distance(:)
-
-    call self%from_stick(stick, reserve, band, distance)
-    edge = edge_of_zone(self%lattice, self%candidate, stick, band, distance)
-  end function stick_edge
-
-  !> Fill the stick area with triangles, and carry a field to its edge.
-  pure function stick_mesh(self, stick, reserve, field) result(mesh)
-    class(contact_edges_t), intent(in) :: self
-    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
-    logical, intent(in) :: stick(:, :)
-    real(wp), intent(in) :: reserve(:, :)
-    !> Values at the nodes
-    real(wp), intent(in) :: field(:, :)
-    type(zone_mesh_t) :: mesh
-    type(edge_band_t) :: band
-    real(wp), allocatable :: distance(:)
-
-    call self%from_stick(stick, reserve, band, distance)
-    mesh = mesh_of_zone(self%lattice, self%candidate, stick, band, distance, field, vanishes=.false.)
-  end function stick_mesh
-
-  !> Return the distances of the nodes from the edge of the stick area, in spacings, positive inside.
-  pure function stick_distances(self, stick, reserve) result(field)
-    class(contact_edges_t), intent(in) :: self
-    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
-    logical, intent(in) :: stick(:, :)
-    real(wp), intent(in) :: reserve(:, :)
-    real(wp) :: field(size(stick, 1), size(stick, 2))
-    type(edge_band_t) :: band
-    real(wp), allocatable :: distance(:)
-
-    call self%from_stick(stick, reserve, band, distance)
-    field = distance_field(self%candidate, stick, band, distance, self%options)
-  end function stick_distances
-
-  !> Find the distances of nodes from the edge of the part of the contact area that sticks.
-  pure subroutine from_stick(self, stick, reserve, band, distance)
+  !> Find the part of the contact that sticks, and the distances of nodes from its edge.
+  pure subroutine find_stick(self, stick, reserve, sticking)
     class(contact_edges_t), intent(in) :: self
     !> Nodes that stick, all in contact
     logical, intent(in) :: stick(:, :)
     !> Reserve of friction, mu p - |q|; only its values at these nodes matter [Pa]
     real(wp), intent(in) :: reserve(:, :)
-    !> Nodes about the edge, and their distances
-    type(edge_band_t), intent(out) :: band
-    real(wp), allocatable, intent(out) :: distance(:)
+    !> The part
+    type(edged_zone_t), intent(out) :: sticking
     type(one_sided_t) :: seen
     real(wp), allocatable :: square(:)
     logical, allocatable :: inside(:), slipping(:), at_slip(:)
@@ -203,41 +95,47 @@ contains
     integer :: k, j, n_seen
 
     to = to_neighbors()
-    call new_edge_band(band, stick, self%options)
-    inside = band%part_of(stick)
-    slipping = band%part_of(self%contact) .and. .not. inside
-    square = band%values_of(reserve)
-    where (.not. inside) square = 0.0_wp
-    call find_inner_slopes(band, self%options, inside, square**2, seen)
-    at_slip = inside .and. band%next_to(slipping)
-    allocate (distance(band%n), source=huge(1.0_wp))
-    do k = 1, band%n
-      if (at_slip(k)) then
-        distance(k) = self%options%unknown_distance
-        if (seen%has_distance(k)) distance(k) = max(seen%distance(k), self%options%least_distance)
-      else if (slipping(k)) then
-        ! The power of the slip depends on how far the edge moved in the step, so that slip is no measure of the distance:
-        ! nodes outside have that of the nodes inside.
-        total = 0.0_wp
-        n_seen = 0
-        do j = 1, size(to, 2)
-          associate (m => band%beside(j, k))
-            if (m == 0) cycle
-            if (.not. (inside(m) .and. seen%has_distance(m) .and. seen%has_direction(m))) cycle
-            total = total + seen%distance(m) - dot_product(to(:, j), seen%direction(:, m))
-            n_seen = n_seen + 1
-          end associate
-        end do
-        distance(k) = -self%options%unknown_distance
-        if (n_seen > 0) distance(k) = min(total/n_seen, 0.0_wp)
-      end if
-      ! where the stick area reaches the edge of the contact, that is its edge
-      associate (at => band%node(:, k))
-        j = self%band%place(at(1), at(2))
-        if (j > 0) distance(k) = min(distance(k), self%distance(j))
-      end associate
-    end do
-  end subroutine from_stick
+    sticking%lattice = self%lattice
+    sticking%options = self%options
+    sticking%zone = stick
+    sticking%candidate = self%candidate
+    call new_edge_band(sticking%band, stick, self%options)
+    allocate (sticking%distance(sticking%band%n), source=huge(1.0_wp))
+    associate (band => sticking%band, distance => sticking%distance)
+      inside = band%part_of(stick)
+      slipping = band%part_of(self%zone) .and. .not. inside
+      square = band%values_of(reserve)
+      where (.not. inside) square = 0.0_wp
+      call find_inner_slopes(band, self%options, inside, square**2, seen)
+      at_slip = inside .and. band%next_to(slipping)
+      do k = 1, band%n
+        if (at_slip(k)) then
+          distance(k) = self%options%unknown_distance
+          if (seen%has_distance(k)) distance(k) = max(seen%distance(k), self%options%least_distance)
+        else if (slipping(k)) then
+          ! The power of the slip depends on how far the edge moved in the step, so that slip is no measure of the distance:
+          ! nodes outside have that of the nodes inside.
+          total = 0.0_wp
+          n_seen = 0
+          do j = 1, size(to, 2)
+            associate (m => band%beside(j, k))
+              if (m == 0) cycle
+              if (.not. (inside(m) .and. seen%has_distance(m) .and. seen%has_direction(m))) cycle
+              total = total + seen%distance(m) - dot_product(to(:, j), seen%direction(:, m))
+              n_seen = n_seen + 1
+            end associate
+          end do
+          distance(k) = -self%options%unknown_distance
+          if (n_seen > 0) distance(k) = min(total/n_seen, 0.0_wp)
+        end if
+        ! where the stick area reaches the edge of the contact, that is its edge
+        associate (at => band%node(:, k))
+          j = self%band%place(at(1), at(2))
+          if (j > 0) distance(k) = min(distance(k), self%distance(j))
+        end associate
+      end do
+    end associate
+  end subroutine find_stick
 
   !> Return squares of the pressure that are good to interpolate linearly (n_col, n_row) [Pa^2].
   !>
@@ -245,66 +143,64 @@ contains
   !> zero. They are NaN away from the edge, and where it is not defined.
   pure function squares(self) result(field)
     class(contact_edges_t), intent(in) :: self
-    real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
+    real(wp) :: field(size(self%zone, 1), size(self%zone, 2))
 
-    field = squares_in_band(self%band, self%options, self%contact, self%candidate, self%pressure**2, self%distance, &
-                            known_beyond=.true.)
+    field = squares_near_edge(self%edged_zone_t, self%candidate, self%pressure**2, known_beyond=.true.)
   end function squares
 
   !> Return squares of the reserve of friction that are good to interpolate linearly, see `squares`.
   pure function stick_squares(self, stick, reserve) result(field)
     class(contact_edges_t), intent(in) :: self
-    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    !> Nodes that stick, and their reserve of friction, see `find_stick` [Pa]
     logical, intent(in) :: stick(:, :)
     real(wp), intent(in) :: reserve(:, :)
     real(wp) :: field(size(stick, 1), size(stick, 2))
-    type(edge_band_t) :: band
-    real(wp), allocatable :: distance(:)
+    type(edged_zone_t) :: sticking
 
-    call self%from_stick(stick, reserve, band, distance)
-    field = squares_in_band(band, self%options, stick, self%contact .or. self%candidate, band%values_of(reserve)**2, distance, &
-                            known_beyond=.false.)
+    call self%find_stick(stick, reserve, sticking)
+    field = squares_near_edge(sticking, self%zone .or. self%candidate, sticking%band%values_of(reserve)**2, known_beyond=.false.)
   end function stick_squares
 
   !> Compute squares, good to interpolate, of a field that vanishes at the edge of a zone.
-  pure function squares_in_band(band, options, zone, around, square, distance, known_beyond) result(field)
-    !> Nodes about the edge
-    type(edge_band_t), intent(in) :: band
-    type(edge_options_t), intent(in) :: options
-    !> Nodes of the zone, and those to which it could extend (n_col, n_row)
-    logical, intent(in) :: zone(:, :), around(:, :)
-    !> Squares at the nodes of the band, and their distances from the edge
-    real(wp), intent(in) :: square(:), distance(:)
+  pure function squares_near_edge(self, around, square, known_beyond) result(field)
+    !> The zone
+    type(edged_zone_t), intent(in) :: self
+    !> Nodes to which it could extend (n_col, n_row)
+    logical, intent(in) :: around(:, :)
+    !> Squares at the nodes about the edge
+    real(wp), intent(in) :: square(:)
     !> Distances of nodes beyond the edge are given, and do not follow from the direction of the edge at nodes inside
     logical, intent(in) :: known_beyond
-    real(wp) :: field(size(zone, 1), size(zone, 2))
+    real(wp) :: field(size(self%zone, 1), size(self%zone, 2))
     type(one_sided_t) :: seen
-    real(wp) :: inwards(2, band%n), rises(band%n)
-    logical :: inside(band%n), beyond(band%n), known(band%n)
+    real(wp) :: inwards(2, self%band%n), rises(self%band%n)
+    logical :: inside(self%band%n), beyond(self%band%n), known(self%band%n)
     integer :: k
 
-    inside = band%part_of(zone)
-    beyond = band%part_of(around) .and. .not. inside
-    call find_inner_slopes(band, options, inside, merge(square, 0.0_wp, inside), seen)
-    ! under the rim of a punch the pressure rises towards the edge: its square has no zero there
-    known = inside .and. band%next_to(.not. inside)
-    inwards = band%gradient(merge(1.0_wp, 0.0_wp, inside), known)
-    rises = merge(1.0_wp, 0.0_wp, seen%has_direction .and. sum(inwards*seen%direction, dim=1) < 0.0_wp)
-    call band%extend(1, rises, known)
-    field = ieee_value(1.0_wp, ieee_quiet_nan)
-    do k = 1, band%n
-      if (.not. (known(k) .and. seen%has_slope(k)) .or. any(band%node(:, k) < 1 .or. band%node(:, k) > shape(field))) cycle
-      if (rises(k) >= 0.5_wp .or. (seen%is_guessed(k) .and. .not. known_beyond)) cycle
-      associate (there => field(band%node(1, k), band%node(2, k)))
-        if (inside(k)) then
-          there = square(k)
-          if (seen%has_distance(k) .and. seen%distance(k) < layer_end(options)) there = seen%slope(k)*seen%distance(k)
-        else if (beyond(k)) then
-          there = seen%slope(k)*min(distance(k), 0.0_wp)
-        end if
-      end associate
-    end do
-  end function squares_in_band
+    associate (band => self%band)
+      inside = band%part_of(self%zone)
+      beyond = band%part_of(around) .and. .not. inside
+      call find_inner_slopes(band, self%options, inside, merge(square, 0.0_wp, inside), seen)
+      ! under the rim of a punch the pressure rises towards the edge: its square has no zero there
+      known = inside .and. band%next_to(.not. inside)
+      inwards = band%gradient(merge(1.0_wp, 0.0_wp, inside), known)
+      rises = merge(1.0_wp, 0.0_wp, seen%has_direction .and. sum(inwards*seen%direction, dim=1) < 0.0_wp)
+      call band%extend(1, rises, known)
+      field = ieee_value(1.0_wp, ieee_quiet_nan)
+      do k = 1, band%n
+        if (.not. (known(k) .and. seen%has_slope(k)) .or. any(band%node(:, k) < 1 .or. band%node(:, k) > shape(field))) cycle
+        if (rises(k) >= 0.5_wp .or. (seen%is_guessed(k) .and. .not. known_beyond)) cycle
+        associate (there => field(band%node(1, k), band%node(2, k)))
+          if (inside(k)) then
+            there = square(k)
+            if (seen%has_distance(k) .and. seen%distance(k) < layer_end(self%options)) there = seen%slope(k)*seen%distance(k)
+          else if (beyond(k)) then
+            there = seen%slope(k)*min(self%distance(k), 0.0_wp)
+          end if
+        end associate
+      end do
+    end associate
+  end function squares_near_edge
 
   !> Find the distances of the nodes of a part from its edge, where some values vanish in proportion to them.
   pure function distances(band, options, part, values) result(away)

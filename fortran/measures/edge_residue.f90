@@ -103,7 +103,7 @@ contains
     end do
   end subroutine new_edge_residue
 
-  !> Position of a point of a cell, in columns and rows from its first node.
+  !> Return the position of a point of a cell, in columns and rows from its first node.
   pure function point(self, i) result(at)
     class(edge_residue_t), intent(in) :: self
     !> Number of the point
@@ -122,7 +122,7 @@ contains
     edge_residue_memory = int(cells_of_zone*sqrt(real(n_zone, wp)), long)*8*(samples**2*n + 1)
   end function edge_residue_memory
 
-  !> Values of hats at the nodes that have the means of the points about each node, (I17).
+  !> Find the hats that have the means of the points about each node, (I17).
   subroutine hats(self, space, values, error)
     class(edge_residue_t), intent(in) :: self
     !> Space of the fields
@@ -186,14 +186,14 @@ contains
     end associate
   end subroutine hats
 
-  !> Value of a hat at a point of the fine lattice.
+  !> Evaluate a hat at a point of the fine lattice.
   pure real(wp) function hat(i, j, m)
     !> Steps from the node, and how many make a spacing
     integer, intent(in) :: i, j, m
     hat = real(max(m - max(abs(i), abs(j), abs(i + j)), 0), wp)/m
   end function hat
 
-  !> Weights of points in the mean about a node: a hat smoothed by a hat, their sum is 1.
+  !> Compute the weights of points in the mean about a node: a hat smoothed by a hat, their sum is 1.
   pure function smooth_weights(m) result(weight)
     !> Points along a spacing
     integer, intent(in) :: m
@@ -265,7 +265,7 @@ contains
     end do
   end subroutine take_off
 
-  !> Relative displacements of nodes by the values, as of hats of the fine lattice in the cells nearby.
+  !> Compute the relative displacements of nodes by the values, as of hats of the fine lattice in the cells nearby.
   function displacements(self, medium, wanted, onto) result(moved)
     class(edge_residue_t), intent(in) :: self
     !> The two bodies

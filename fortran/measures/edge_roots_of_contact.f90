@@ -8,7 +8,7 @@ module hc_edge_roots_of_contact
   use hc_stress_at_edges, only: edge_traction_t
   use hc_friction_law, only: friction_law_t
   use hc_contact_edges, only: contact_edges_t
-  use hc_zone_edge, only: zone_edge_t
+  use hc_zone_edge, only: edged_zone_t, zone_edge_t
   implicit none
   private
 
@@ -39,8 +39,8 @@ contains
     edge%zone = zones(:, :, 1)
     edge%field = corrected(:, :, 1)
     edge%squares = traction(:, :, 1)**2
-    edge%distance = edges%contact_distances()
-    outline = edges%contact_edge()
+    edge%distance = edges%distances()
+    outline = edges%edge()
     edge%segments = outline%segments
     allocate (edge%shares(size(edge%zone, 1), size(edge%zone, 2), 3), source=0.0_wp)
     edge%shares(:, :, 1) = 1.0_wp
@@ -61,6 +61,7 @@ contains
     class(friction_law_t), intent(in) :: friction
     real(wp), intent(in) :: traction(:, :, :), corrected(:, :, :)
     real(wp), allocatable :: reserve(:, :), shear(:, :), bound(:, :)
+    type(edged_zone_t) :: sticking
     type(zone_edge_t) :: outline
     integer :: k
 
@@ -75,8 +76,9 @@ contains
     bound = bound + friction%slopes_of(traction(:, :, 1))*(corrected(:, :, 1) - traction(:, :, 1))
     where (zones(:, :, 1) .and. shear > 0.0_wp) edge%field = bound - sum(corrected(:, :, 2:3)*traction(:, :, 2:3), dim=3)/shear
     edge%squares = reserve**2
-    edge%distance = edges%stick_distances(edge%zone, reserve)
-    outline = edges%stick_edge(edge%zone, reserve)
+    call edges%find_stick(edge%zone, reserve, sticking)
+    edge%distance = sticking%distances()
+    outline = sticking%edge()
     edge%segments = outline%segments
     allocate (edge%shares(size(edge%zone, 1), size(edge%zone, 2), 3), source=0.0_wp)
     do k = 2, 3

@@ -24,6 +24,7 @@ module hc_edge_tractions
   use hc_linear_system, only: linear_system_t, constraints_t, iteration_t, solution_accurate, precondition_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
+  use hc_zone_edge, only: edged_zone_t
   use hc_friction_law, only: friction_law_t
   use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
@@ -102,6 +103,7 @@ contains
 
     type(edge_options_t) :: tuning
     type(traction_field_t) :: edge_shape
+    type(edged_zone_t) :: sticking
     type(edge_residue_t) :: residue
     type(fft_flexibility_t), target :: flexibility
     type(elastic_part_t) :: system
@@ -134,11 +136,12 @@ contains
       if (allocated(error)) return
       if (pass == tuning%passes) exit
       at_nodes = traction(:, :, :n) + change + at_nodes - hats
-      call fit_squares(edge_shape%squares, merge(at_nodes(:, :, 1), 0.0_wp, contact), edges%contact_distances(), tuning)
+      call fit_squares(edge_shape%squares, merge(at_nodes(:, :, 1), 0.0_wp, contact), edges%distances(), tuning)
       if (n == 3) then
+        call edges%find_stick(stick, edge_shape%reserve, sticking)
         call fit_squares(edge_shape%stick_squares, &
                          merge(friction%bounds_of(at_nodes(:, :, 1)) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
-                         edges%stick_distances(stick, edge_shape%reserve), tuning)
+                         sticking%distances(), tuning)
       end if
       call edge_shape%renew()
     end do

@@ -9,7 +9,7 @@ module hc_edges_by_rows
   use hc_options, only: edge_options_t
   use hc_contact_state, only: contact_state_t, separated
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
-  use hc_zone_edge, only: zone_edge_t, edge_of_sums, n_cell_sum
+  use hc_zone_edge, only: edged_zone_t, zone_edge_t, edge_of_sums, n_cell_sum
   implicit none
   private
 
@@ -75,10 +75,8 @@ contains
   function contact_edge(self) result(edge)
     class(edges_by_rows_t), intent(in) :: self
     type(zone_edge_t) :: edge
-    real(wp), allocatable :: sums(:, :)
 
-    call self%edges%contact_sums(self%cells(), sums)
-    edge = self%whole_edge(sums)
+    edge = self%whole_edge(self%edges)
   end function contact_edge
 
   !> Find the edge of the part of the contact that sticks.
@@ -88,20 +86,21 @@ contains
     logical, intent(in), contiguous :: stick(:, :)
     real(wp), intent(in), contiguous :: reserve(:, :)
     type(zone_edge_t) :: edge
-    real(wp), allocatable :: sums(:, :), near(:, :)
+    type(edged_zone_t) :: zone
+    real(wp), allocatable :: near(:, :)
     logical(lk), allocatable :: sticking(:, :)
 
     if (self%space%ranks%size == 1) then
-      call self%edges%stick_sums(stick, reserve, self%cells(), sums)
+      call self%edges%find_stick(stick, reserve, zone)
     else
       associate (n => [size(stick, 1), self%near(2) - self%near(1) + 1], n_row => self%lattice%extent(2))
         allocate (near(n(1), n(2)), sticking(n(1), n(2)))
         call self%space%fetch(n_row, reserve, self%near(1), near)
         call self%space%fetch(n_row, logical(stick, lk), self%near(1), sticking)
       end associate
-      call self%edges%stick_sums(logical(sticking), near, self%cells(), sums)
+      call self%edges%find_stick(logical(sticking), near, zone)
     end if
-    edge = self%whole_edge(sums)
+    edge = self%whole_edge(zone)
   end function stick_edge
 
   !> Return the first and last row of cells of this rank among the rows nearby, each named by the row of nodes below it, and the
@@ -117,13 +116,16 @@ contains
   end function cells
 
   !> Find the edge of a zone from the sums of the cells of each rank.
-  function whole_edge(self, sums) result(edge)
+  function whole_edge(self, zone) result(edge)
     class(edges_by_rows_t), intent(in) :: self
-    real(wp), intent(in) :: sums(:, :)
+    !> The zone in own rows and those nearby
+    class(edged_zone_t), intent(in) :: zone
     type(zone_edge_t) :: edge
+    real(wp), allocatable :: sums(:, :), segments(:, :, :)
     real(wp) :: totals(n_cell_sum)
     integer :: k
 
+    call zone%sum_cells(self%cells(), sums, segments)
     do k = 1, n_cell_sum
       totals(k) = self%space%total(sums(k, :))
     end do

@@ -19,7 +19,7 @@ module hc_state_measures
   private
 
   public :: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
-  public :: state_measures_t, zone_measures_t, measure_state, measure_contact, rises_to_end
+  public :: state_measures_t, zone_measures_t, measure_state, measure_contact, friction_reserve, rises_to_end
 
   !> Size of a zone: of the cells of its nodes, and to its edge between the nodes.
   type :: zone_measures_t
@@ -250,36 +250,44 @@ contains
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     type(edges_by_rows_t) :: edges
-    real(wp), allocatable :: reserve(:, :), length(:)
     logical, allocatable :: zone(:, :)
-    integer :: row
 
     call measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
     if (.not. allocated(state%traction)) return
     found%elastic_energy = found%elastic_energy + space%total(shear_energy(lattice, state, &
                                                                                   space%ranks%first_row(lattice%extent(2)) - 1))
-    allocate (reserve, mold=initial_gap)
-    reserve = 0.0_wp ! of no use where nothing slips
-    if (friction%is_bounded()) then
-      allocate (length(size(reserve, 1)))
-      do row = 1, size(reserve, 2)
-        call friction%find_bounds((row - 1)*size(reserve, 1) + 1, state%pressure(:, row), reserve(:, row))
-        call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
-        reserve(:, row) = reserve(:, row) - length
-      end do
-    end if
     zone = state%zone == stick
     found%max_traction = space%max(norm2(state%traction, dim=3))
     found%stick_center = ieee_value(1.0_wp, ieee_quiet_nan)
     found%stick_lower = found%stick_center
     found%stick_upper = found%stick_center
     if (lattice%is_periodic()) then
-      found%stick = cells_of(lattice, space%count(logical(zone, lk)))
+      found%stick = size_of(lattice, space%count(logical(zone, lk)))
       return
     end if
-    found%stick = size_of(lattice, space%count(logical(zone, lk)), edges%stick_edge(zone, reserve))
+    found%stick = size_of(lattice, space%count(logical(zone, lk)), edges%stick_edge(zone, friction_reserve(friction, state)))
     call zone_extent(lattice, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
   end function measure_state
+
+  !> Compute the reserve of friction, b(p) - |q|; 0, of no use, where nothing slips [Pa].
+  function friction_reserve(friction, state) result(reserve)
+    !> Law of friction
+    class(friction_law_t), intent(in) :: friction
+    !> State, of which pressure and shear traction matter
+    type(contact_state_t), intent(in) :: state
+    real(wp), allocatable :: reserve(:, :), length(:)
+    integer :: row
+
+    allocate (reserve, mold=state%pressure)
+    reserve = 0.0_wp
+    if (.not. friction%is_bounded()) return
+    allocate (length(size(reserve, 1)))
+    do row = 1, size(reserve, 2)
+      call friction%find_bounds((row - 1)*size(reserve, 1) + 1, state%pressure(:, row), reserve(:, row))
+      call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
+      reserve(:, row) = reserve(:, row) - length
+    end do
+  end function friction_reserve
 
   !> Measure the area of contact, the pressure and its energy.
   subroutine measure_contact(lattice, initial_gap, candidate, state, space, found, edges)
@@ -306,7 +314,7 @@ contains
       if (lattice%is_periodic()) then
         ! a contact across the end of the window has its edge on the other side, and there is no center
         found%pressure_center = ieee_value(1.0_wp, ieee_quiet_nan)
-        found%contact = cells_of(lattice, space%count(logical(contact, lk)))
+        found%contact = size_of(lattice, space%count(logical(contact, lk)))
         found%contact%area_error = lattice%cell_area()*cells_in_doubt(contact, lattice%extent(2), space)
         found%mean_gap = space%sum(state%gap)/lattice%size()
         return
@@ -420,30 +428,20 @@ contains
     cells = 0.2_wp*counts(1) + 0.3_wp*counts(2)
   end function cells_in_doubt
 
-  !> Measure the cells of a zone alone; its edge stays unknown.
-  pure type(zone_measures_t) function cells_of(lattice, n_node) result(found)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes of the zone
-    integer, intent(in) :: n_node
-    real(wp) :: unknown
-
-    unknown = ieee_value(1.0_wp, ieee_quiet_nan)
-    found = zone_measures_t(lattice%cell_area()*n_node, area_radius(n_node, lattice%cell_area()), unknown, unknown, unknown, &
-                            unknown)
-  end function cells_of
-
-  !> Measure a zone with this edge.
+  !> Measure a zone, whose edge may be unknown.
   pure type(zone_measures_t) function size_of(lattice, n_node, edge) result(found)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Nodes of the zone
     integer, intent(in) :: n_node
-    !> Its edge
-    type(zone_edge_t), intent(in) :: edge
+    !> Its edge; absent: unknown
+    type(zone_edge_t), intent(in), optional :: edge
+    real(wp) :: to_edge(4)
 
-    found = zone_measures_t(lattice%cell_area()*n_node, area_radius(n_node, lattice%cell_area()), &
-                            edge%area, edge%radius(), edge%ellipse%semi_major, edge%ellipse%semi_minor)
+    to_edge = ieee_value(1.0_wp, ieee_quiet_nan)
+    if (present(edge)) to_edge = [edge%area, edge%radius(), edge%ellipse%semi_major, edge%ellipse%semi_minor]
+    found = zone_measures_t(lattice%cell_area()*n_node, area_radius(n_node, lattice%cell_area()), to_edge(1), to_edge(2), &
+                            to_edge(3), to_edge(4))
   end function size_of
 
 end module hc_state_measures

@@ -15,13 +15,34 @@ module hc_zone_edge
   implicit none
   private
 
-  public :: zone_edge_t, zone_mesh_t, edge_of_zone, sum_cells, edge_of_sums, n_cell_sum, mesh_of_zone, distance_field, cut_triangles
+  public :: edged_zone_t, zone_edge_t, zone_mesh_t, edge_of_sums, n_cell_sum, cut_triangles
 
   !> Corners of the lower and of the upper triangle of a cell, counterclockwise: column and row.
   integer, parameter :: corner(2, 3, 2) = reshape([0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 1, 0], [2, 3, 2])
 
   !> Sums over the cells of a row: covered triangles, six moments, and the length of the edge.
   integer, parameter :: n_cell_sum = 8
+
+  !> Nodes of a zone, and the distances from its edge of those about it.
+  type :: edged_zone_t
+    !> Lattice and window
+    type(lattice_t) :: lattice
+    !> Nodes of the zone, and those that can touch (n_col, n_row)
+    logical, allocatable :: zone(:, :), candidate(:, :)
+    !> Nodes about the edge, and their distances from it in spacings, positive inside
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:)
+    !> Tuning numbers
+    type(edge_options_t) :: options
+  contains
+    !> The edge; sums over its cells by row
+    procedure :: edge => edge_of_zone
+    procedure :: sum_cells
+    !> Triangles that fill the zone, and a field there
+    procedure :: mesh => mesh_of_zone
+    !> Distances of all nodes from the edge
+    procedure :: distances => distance_field
+  end type edged_zone_t
 
   !> An area of the plane whose edge runs between the nodes.
   type :: zone_edge_t
@@ -103,60 +124,48 @@ contains
   end function nodes_inside
 
   !> Cut the triangles at the edge of a zone.
-  pure function edge_of_zone(lattice, candidate, zone, band, distance) result(edge)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that can touch, nodes of the zone
-    logical, intent(in) :: candidate(:, :), zone(:, :)
-    !> Nodes about its edge, and their distances from it
-    type(edge_band_t), intent(in) :: band
-    real(wp), intent(in) :: distance(:)
+  pure function edge_of_zone(self) result(edge)
+    class(edged_zone_t), intent(in) :: self
     type(zone_edge_t) :: edge
     real(wp), allocatable :: segments(:, :, :), sums(:, :)
     integer :: n, k
 
-    call sum_cells(lattice, candidate, zone, band, distance, [0, size(zone, 2), 0], sums, segments)
-    edge = edge_of_sums(lattice, [(sum(sums(k, :)), k=1, n_cell_sum)])
+    call self%sum_cells([0, size(self%zone, 2), 0], sums, segments)
+    edge = edge_of_sums(self%lattice, [(sum(sums(k, :)), k=1, n_cell_sum)])
     allocate (edge%segments, mold=segments)
     do n = 1, size(segments, 3)
       do k = 1, 2
-        edge%segments(:, k, n) = position(lattice, segments(:, k, n))
+        edge%segments(:, k, n) = position(self%lattice, segments(:, k, n))
       end do
     end do
   end function edge_of_zone
 
   !> Sum the cells of a zone by row: covered triangles, moments of the area (1, x, y, xx, xy, yy) in columns and rows, and the
   !> length of its edge [m].
-  pure subroutine sum_cells(lattice, candidate, zone, band, distance, rows, sums, segments)
-    !> Lattice
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that can touch, nodes of the zone
-    logical, intent(in) :: candidate(:, :), zone(:, :)
-    !> Nodes about its edge, and their distances from it
-    type(edge_band_t), intent(in) :: band
-    real(wp), intent(in) :: distance(:)
+  pure subroutine sum_cells(self, rows, sums, segments)
+    class(edged_zone_t), intent(in) :: self
     !> First and last row of cells, each named by the row of nodes below it, and rows of the window before those of the zone
     integer, intent(in) :: rows(3)
     !> Sums of each row of cells
     real(wp), allocatable, intent(out) :: sums(:, :)
     !> Pieces of the edge, in columns and rows (2, 2, n)
     real(wp), allocatable, intent(out) :: segments(:, :, :)
-    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    integer(int8) :: padded(0:size(self%zone, 1) + 1, 0:size(self%zone, 2) + 1)
     logical, allocatable :: can_touch(:)
     real(wp) :: moments(6), sign
     integer(int64) :: whole(3, 2)  ! whole triangles of a row, sums of columns and of their squares over them
     integer :: n_with(0:3), inside(2), local(2, 3), corners(2, 3), at(3), lone, col, row, half, n
 
-    padded = with_rim(zone)
+    padded = with_rim(self%zone)
     n_with = triangles(padded)
-    can_touch = band%part_of(candidate)
+    can_touch = self%band%part_of(self%candidate)
     allocate (segments(2, 2, n_with(1) + n_with(2)), sums(n_cell_sum, rows(1):rows(2)))
     n = 0
     do row = rows(1), rows(2)
       whole = 0_int64
       moments = 0.0_wp
       sums([1, 8], row) = 0.0_wp
-      do col = 0, size(zone, 1)
+      do col = 0, size(self%zone, 1)
         inside = nodes_inside(padded(col:col + 1, row:row + 1))
         do half = 1, 2
           if (inside(half) == 0) cycle
@@ -166,11 +175,11 @@ contains
           end if
           local = corners_of(half) + spread([col, row], 2, 3)
           corners = local + spread([0, rows(3)], 2, 3)
-          at = [band%place(local(1, 1), local(2, 1)), band%place(local(1, 2), local(2, 2)), band%place(local(1, 3), local(2, 3))]
+          at = [(self%band%place(local(1, lone), local(2, lone)), lone=1, 3)]
           if (all(can_touch(at))) then
             n = n + 1
-            call cut(real(corners, wp), distance(at), lone, segments(:, :, n), sums(1, row))
-            sums(8, row) = sums(8, row) + norm2(matmul(lattice%basis, segments(:, 2, n) - segments(:, 1, n)))
+            call cut(real(corners, wp), self%distance(at), lone, segments(:, :, n), sums(1, row))
+            sums(8, row) = sums(8, row) + norm2(matmul(self%lattice%basis, segments(:, 2, n) - segments(:, 1, n)))
             sign = merge(1.0_wp, -1.0_wp, inside(half) == 1)
             if (inside(half) == 2) moments = moments + moments_of(real(corners, wp))
             moments = moments + sign*moments_of(reshape([real(corners(:, lone), wp), segments(:, :, n)], [2, 3]))
@@ -309,22 +318,16 @@ contains
   end subroutine cut
 
   !> Return the distances of all nodes from the edge, in spacings, cut off far away; at the rim of a punch the edge is half-way.
-  pure function distance_field(candidate, zone, band, distance, options) result(field)
-    !> Nodes that can touch, nodes of the zone
-    logical, intent(in) :: candidate(:, :), zone(:, :)
-    !> Nodes about its edge, and their distances from it
-    type(edge_band_t), intent(in) :: band
-    real(wp), intent(in) :: distance(:)
-    !> Tuning numbers
-    type(edge_options_t), intent(in) :: options
-    real(wp) :: field(size(zone, 1), size(zone, 2))
+  pure function distance_field(self) result(field)
+    class(edged_zone_t), intent(in) :: self
+    real(wp) :: field(size(self%zone, 1), size(self%zone, 2))
     logical, allocatable :: inside(:), can_touch(:)
     integer :: k, j
 
-    associate (away => options%largest_distance)
+    associate (away => self%options%largest_distance, zone => self%zone, band => self%band, distance => self%distance)
       field = merge(away, -away, zone)
       allocate (inside, source=band%part_of(zone))
-      can_touch = band%part_of(candidate)
+      can_touch = band%part_of(self%candidate)
       do k = 1, band%n
         associate (col => band%node(1, k), row => band%node(2, k))
           if (min(col, row) < 1 .or. col > size(zone, 1) .or. row > size(zone, 2)) cycle
@@ -345,36 +348,30 @@ contains
   !>
   !> At the edge the field vanishes, or is extrapolated from the last two nodes on its line of nodes. Half-way to a
   !> node that can never touch it is that of the node inside.
-  pure function mesh_of_zone(lattice, candidate, zone, band, distance, field, vanishes) result(mesh)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Nodes that can touch, nodes of the zone
-    logical, intent(in) :: candidate(:, :), zone(:, :)
-    !> Nodes about its edge, and their distances from it
-    type(edge_band_t), intent(in) :: band
-    real(wp), intent(in) :: distance(:)
+  pure function mesh_of_zone(self, field, vanishes) result(mesh)
+    class(edged_zone_t), intent(in) :: self
     !> Values at the nodes; only those of the zone matter
     real(wp), intent(in) :: field(:, :)
     !> Whether they vanish at the edge, like tractions
     logical, intent(in) :: vanishes
     type(zone_mesh_t) :: mesh
-    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    integer(int8) :: padded(0:size(self%zone, 1) + 1, 0:size(self%zone, 2) + 1)
     logical, allocatable :: can_touch(:)
     integer, allocatable :: at_node(:, :), at_cut(:, :, :)
     integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, col, row, half, k
     real(wp) :: part, value
     logical :: touches
 
-    padded = with_rim(zone)
+    padded = with_rim(self%zone)
     n_with = triangles(padded)
-    can_touch = band%part_of(candidate)
-    associate (n_cut => n_with(1) + n_with(2), n_node => count(zone))
+    can_touch = self%band%part_of(self%candidate)
+    associate (n_cut => n_with(1) + n_with(2), n_node => count(self%zone))
       allocate (mesh%points(2, n_node + 2*n_cut), mesh%values(n_node + 2*n_cut), mesh%triangles(3, n_with(3) + 2*n_cut))
     end associate
-    allocate (at_node(0:size(zone, 1) + 1, 0:size(zone, 2) + 1), source=0)
-    allocate (at_cut(0:size(zone, 1) + 1, 0:size(zone, 2) + 1, 3), source=0)
-    do row = 0, size(zone, 2)
-      do col = 0, size(zone, 1)
+    allocate (at_node(0:size(self%zone, 1) + 1, 0:size(self%zone, 2) + 1), source=0)
+    allocate (at_cut(0:size(self%zone, 1) + 1, 0:size(self%zone, 2) + 1, 3), source=0)
+    do row = 0, size(self%zone, 2)
+      do col = 0, size(self%zone, 1)
         do half = 1, 2
           length = 0
           do k = 1, 3
@@ -382,7 +379,7 @@ contains
             ends(:, 2) = [col, row] + corner(:, modulo(k, 3) + 1, half)
             associate (here => ends(:, 1), next => ends(:, 2), number => at_node(ends(1, 1), ends(2, 1)))
               if (padded(here(1), here(2)) /= 0) then
-                if (number == 0) call mesh%add_point(position(lattice, real(here, wp)), field(here(1), here(2)), number)
+                if (number == 0) call mesh%add_point(position(self%lattice, real(here, wp)), field(here(1), here(2)), number)
                 length = length + 1
                 polygon(length) = number
               end if
@@ -390,7 +387,7 @@ contains
               if (padded(here(1), here(2)) == 0) ends = ends(:, 2:1:-1)
             end associate
             associate (node => ends(:, 1), beyond => ends(:, 2), link => ends(:, 2) - ends(:, 1))
-              touches = can_touch(band%place(beyond(1), beyond(2)))
+              touches = can_touch(self%band%place(beyond(1), beyond(2)))
               length = length + 1
               base = merge(node, beyond, link(2) > 0 .or. (link(2) == 0 .and. link(1) > 0))
               kind = merge(1, merge(2, 3, link(1) == 0), link(2) == 0)
@@ -398,14 +395,14 @@ contains
                 part = 0.5_wp  ! the edge of the cells
                 value = field(node(1), node(2))
                 if (touches) then
-                  part = part_inside(distance([band%place(node(1), node(2)), band%place(beyond(1), beyond(2))]))
+                  part = part_inside(self%distance([self%band%place(node(1), node(2)), self%band%place(beyond(1), beyond(2))]))
                   if (vanishes) then
                     value = 0.0_wp
                   else if (padded(node(1) - link(1), node(2) - link(2)) /= 0) then
                     value = value + part*(value - field(node(1) - link(1), node(2) - link(2)))
                   end if
                 end if
-                call mesh%add_point(position(lattice, node + part*link), value, at_cut(base(1), base(2), kind))
+                call mesh%add_point(position(self%lattice, node + part*link), value, at_cut(base(1), base(2), kind))
               end if
               polygon(length) = at_cut(base(1), base(2), kind)
             end associate

@@ -64,9 +64,7 @@ module hc_inverse_symbol
     procedure :: set_springs
     !> Return whether springs count as loose
     procedure :: is_loose
-    !> Traction that causes a given displacement, approximately, in any units of ratio `unit`
-    procedure :: apply_single
-    !> The same in the place of the displacement, and memory for it
+    !> Traction that causes a given displacement, approximately, in its place, and memory for it
     procedure :: apply_in_place, beside
   end type inverse_symbol_t
 
@@ -169,59 +167,19 @@ contains
                                                threads)
   end function preconditioner_memory
 
-  !> Estimate the traction that causes a given displacement, in any units of ratio `unit`.
-  subroutine apply_single(self, displacement, traction, edge)
-    class(inverse_symbol_t), intent(inout) :: self
-    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
-    real(sp), intent(inout), target :: displacement(self%shape(1), self%shape(2), self%shape(3))
-    !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
-    real(sp), intent(out), target :: traction(self%shape(1), self%shape(2), self%shape(3))
-    !> Continuation beyond the nodes where displacements are given
-    type(edge_extension_t), intent(in), optional :: edge
-    real(sp), pointer, contiguous :: field(:), sprung(:)
-    integer :: m
-
-    if (allocated(self%sprung)) then
-      associate (n => self%shape(1)*self%shape(2))
-        field(1:n) => displacement(:, :, 1)
-        sprung(1:n) => traction(:, :, 1)
-      end associate
-      call apply_on_springs(self, field, sprung, edge)
-      return
-    end if
-    if (present(edge)) then
-      do m = 1, size(displacement, 3)
-        field(1:size(displacement, 1)*size(displacement, 2)) => displacement(:, :, m)
-        call edge%extend(field)
-      end do
-    end if
-    if (self%tangential) then
-      call self%convolution%convolve(tangential_block, displacement, traction)
-    else
-      call self%convolution%convolve(normal_block, displacement, traction)
-    end if
-    if (.not. present(edge)) return
-    do m = 1, size(displacement, 3)
-      field(1:size(displacement, 1)*size(displacement, 2)) => traction(:, :, m)
-      call edge%fold(field)
-    end do
-  end subroutine apply_single
-
-  !> Estimate it in the place of the displacement.
+  !> Estimate the traction that causes a given displacement, in its place and in any units of ratio `unit`.
   subroutine apply_in_place(self, values, edge)
     class(inverse_symbol_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements; then pressure, or shear tractions (n_col, n_row, 1 or 2)
     real(sp), intent(inout), target :: values(self%shape(1), self%shape(2), self%shape(3))
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable :: traction(:, :, :)
     real(sp), pointer, contiguous :: field(:)
     integer :: m
 
     if (allocated(self%sprung)) then
-      allocate (traction, mold=values)
-      call self%apply_single(values, traction, edge)
-      values = traction
+      field(1:size(values)) => values
+      call apply_on_springs(self, field, edge)
       return
     end if
     if (present(edge)) then
@@ -311,27 +269,25 @@ contains
   end function is_loose
 
   !> Apply the inverse for nodes on springs along the normal.
-  subroutine apply_on_springs(self, displacement, traction, edge)
+  subroutine apply_on_springs(self, values, edge)
     class(inverse_symbol_t), intent(inout) :: self
-    !> Closing of the gap (n)
-    real(sp), intent(in), contiguous :: displacement(:)
-    !> Pressure (n)
-    real(sp), intent(out), contiguous, target :: traction(:)
+    !> Closing of the gap, then pressure (n)
+    real(sp), intent(inout), contiguous :: values(:)
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable, target :: passed(:)
+    real(sp), allocatable, target :: passed(:), traction(:)
     real(sp), pointer, contiguous :: from(:, :, :), onto(:, :, :)
 
-    allocate (passed(size(displacement)))
-    passed = self%share*displacement
+    allocate (passed(size(values)), traction(size(values)))
+    passed = self%share*values
     if (present(edge)) call edge%extend(passed, self%share, self%height)
     from(1:self%shape(1), 1:self%shape(2), 1:1) => passed
     onto(1:self%shape(1), 1:self%shape(2), 1:1) => traction
     call self%sprung%convolve(normal_block, from, onto)
-    passed = self%stiffness*(displacement - passed)
+    passed = self%stiffness*(values - passed)
     traction = traction - passed
     if (present(edge)) call edge%fold(traction, self%share, self%height)
-    traction = self%share*traction + passed
+    values = self%share*traction + passed
   end subroutine apply_on_springs
 
   !> Compute the compliance t_h of a node in the plane, with its spring: 2 lambda_1 (1 + gamma/2) l_e on half-spaces [m/Pa],

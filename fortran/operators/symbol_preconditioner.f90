@@ -248,12 +248,17 @@ contains
     real(sp), intent(inout), contiguous, target :: displacement(:)
     real(sp), intent(out), contiguous, target :: traction(:)
     real(wp), intent(inout) :: work
+    integer :: i
 
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+    do i = 1, size(traction)
+      traction(i) = displacement(i)
+    end do
+    !$omp end parallel do simd
     if (any(self%margin > 0)) then
-      traction = displacement
       call apply_wide(self, traction)
     else
-      call self%inverse%apply_single(displacement, traction, self%edge)
+      call self%inverse%apply_in_place(traction, self%edge)
     end if
     work = work + self%inverse%cost
   end subroutine apply_to_pressure_single

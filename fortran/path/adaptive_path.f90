@@ -24,12 +24,12 @@ module hc_adaptive_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
+  use hc_contact_state, only: contact_state_t, load_target_t, rim_reached, separated
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_problem, only: friction_problem_t
   use hc_edges_by_rows, only: edges_by_rows_t
   use hc_zone_edge, only: zone_edge_t
-  use hc_load_path, only: advance, join_steps, step_settings_t
+  use hc_load_path, only: advance, between, join_steps, step_settings_t
   use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, outgrown, rejected
   use hc_window_growth, only: extend_state, grown_window
   use hc_step_error, only: compare_halves, edges_of, shear_free, step_change_t
@@ -101,7 +101,7 @@ module hc_adaptive_path
     !> End of the path in whole steps, unless both are one
     type(contact_state_t), allocatable, private :: whole
     !> Loads and motions at the beginning of the segment
-    real(wp), private :: load(n_motion) = 0.0_wp, motion(n_motion) = 0.0_wp
+    type(contact_state_t), private :: begun
   contains
     !> Start a load history
     procedure :: initialize
@@ -109,7 +109,6 @@ module hc_adaptive_path
     procedure :: advance => advance_path
     !> Go on with the solver of a larger window
     procedure :: carry
-    procedure, private :: target_at
   end type adaptive_path_t
 
 contains
@@ -336,16 +335,16 @@ contains
       return
     end if
     if (self%fraction >= 1.0_wp) then
-      self%load = self%state%load
-      self%motion = self%state%motion
+      self%begun%load = self%state%load
+      self%begun%motion = self%state%motion
     end if
     if (self%verdict /= outgrown) call self%begin(most)
     before%halves => self%state
     if (allocated(self%whole)) before%whole => self%whole
     do
       parts = self%parts()
-      call self%attempt_step(solver, [self%target_at(target, parts(1)), self%target_at(target, parts(2))], settings, before, &
-                             after, error)
+      call self%attempt_step(solver, [between(self%begun, target, parts(1)), between(self%begun, target, parts(2))], settings, &
+                             before, after, error)
       if (allocated(error)) return
       if (self%verdict /= rejected) exit
       call after%free()
@@ -381,19 +380,5 @@ contains
     call extend_state(solver, lattice, self%state, extended, error)
     if (.not. allocated(error)) self%state = extended
   end subroutine carry
-
-  !> Return the target at a part of the segment.
-  pure type(load_target_t) function target_at(self, target, fraction) result(goal)
-    class(adaptive_path_t), intent(in) :: self
-    !> Loads or motions at the end of the segment
-    type(load_target_t), intent(in) :: target
-    !> Part of the segment
-    real(wp), intent(in) :: fraction
-
-    goal = target
-    associate (start => merge(self%load, self%motion, target%control == force_control))
-      if (fraction < 1.0_wp) goal%value = start + fraction*(target%value - start)
-    end associate
-  end function target_at
 
 end module hc_adaptive_path

@@ -347,12 +347,12 @@ contains
     measures(2) = gap
   end function measures
 
-  !> Sort the nodes of a set by their gap, the largest first: columns and rows (heap sort).
+  !> Sort the nodes of a set by their gap, the largest first: columns and rows. Equal ones stay in the order of the lattice.
   pure function by_falling_gap(set, gap) result(node)
     logical, intent(in) :: set(:, :)
     real(wp), intent(in) :: gap(:, :)
     integer, allocatable :: node(:, :)
-    integer :: col, row, n, last, swapped(2)
+    integer :: col, row, n
 
     allocate (node(2, count(set)))
     n = 0
@@ -363,51 +363,36 @@ contains
         node(:, n) = [col, row]
       end do
     end do
-    do n = size(node, 2)/2, 1, -1
-      call sink(node, n, size(node, 2))
-    end do
-    do last = size(node, 2), 2, -1
-      swapped = node(:, 1)
-      node(:, 1) = node(:, last)
-      node(:, last) = swapped
-      call sink(node, 1, last - 1)
-    end do
+    call sort(node)
 
   contains
 
-    !> Put a node of the heap, whose top is the smallest gap, into its place.
-    pure subroutine sink(node, first, n)
+    !> Sort both halves of a list, and merge them.
+    pure recursive subroutine sort(node)
       integer, intent(inout) :: node(:, :)
-      integer, intent(in) :: first, n
-      integer :: i, child, moved(2)
+      integer :: first(2, size(node, 2)/2), i, j, k
 
-      moved = node(:, first)
-      i = first
-      do
-        child = 2*i
-        if (child > n) exit
-        if (child < n) then
-          if (below(node(:, child + 1), node(:, child))) child = child + 1
-        end if
-        if (.not. below(node(:, child), moved)) exit
-        node(:, i) = node(:, child)
-        i = child
-      end do
-      node(:, i) = moved
-    end subroutine sink
-
-    !> Return whether the first node has the smaller gap; equal ones stay in the order of the lattice.
-    pure logical function below(a, b)
-      integer, intent(in) :: a(2), b(2)
-
-      if (gap(a(1), a(2)) < gap(b(1), b(2))) then
-        below = .true.
-      else if (gap(a(1), a(2)) > gap(b(1), b(2))) then
-        below = .false.
-      else
-        below = a(2) > b(2) .or. (a(2) == b(2) .and. a(1) > b(1))
-      end if
-    end function below
+      if (size(node, 2) < 2) return
+      associate (middle => size(first, 2))
+        call sort(node(:, :middle))
+        call sort(node(:, middle + 1:))
+        first = node(:, :middle)
+        i = 1
+        j = middle + 1
+        do k = 1, size(node, 2)
+          if (i > middle) exit
+          if (j <= size(node, 2)) then
+            if (gap(node(1, j), node(2, j)) > gap(first(1, i), first(2, i))) then
+              node(:, k) = node(:, j)
+              j = j + 1
+              cycle
+            end if
+          end if
+          node(:, k) = first(:, i)
+          i = i + 1
+        end do
+      end associate
+    end subroutine sort
 
   end function by_falling_gap
 

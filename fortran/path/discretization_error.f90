@@ -25,7 +25,7 @@ module hc_discretization_error
 contains
 
   !> Estimate how far values on the first, finest lattice are from their limit.
-  pure subroutine limits_of_error(spacings, values, errors, error, rough, unresolved, options)
+  pure subroutine limits_of_error(spacings, values, errors, error, rough, unresolved)
     !> Spacings, in units of the first
     real(wp), intent(in) :: spacings(:)
     !> Quantities on each of the lattices (lattice, quantity)
@@ -38,15 +38,12 @@ contains
     logical, intent(in), optional :: rough(:)
     !> Quantities that depend on a slip zone narrower than the lattice resolves, (A3)
     logical, intent(in), optional :: unresolved(:)
-    !> Tuning numbers; absent: the usual ones
-    type(accuracy_options_t), intent(in), optional :: options
     type(accuracy_options_t) :: tuning
     character(len=12) :: found
     real(wp) :: scale, scatter(size(tuning%orders)), width(size(tuning%orders)), any_scatter, wide, slow
     logical :: uneven, narrow
     integer :: k, m
 
-    if (present(options)) tuning = options
     errors = ieee_value(1.0_wp, ieee_quiet_nan)
     if (size(spacings) < tuning%least_lattices) then
       write (found, '(i0)') size(spacings)
@@ -76,19 +73,15 @@ contains
   !> Return whether a slip zone beside a stick zone is narrower than the lattice resolves, (A3).
   !>
   !> Without shear tractions, as of similar bodies under a normal load, nothing slips and there is no such zone.
-  elemental function is_slip_zone_unresolved(spacing, contact_area, stick_area, max_traction, max_pressure, options) result(narrow)
+  elemental logical function is_slip_zone_unresolved(spacing, contact_area, stick_area, max_traction, max_pressure) result(narrow)
     !> Spacing [m]
     real(wp), intent(in) :: spacing
     !> Areas to the edge between the nodes [m2]
     real(wp), intent(in) :: contact_area, stick_area
     !> Largest shear traction and pressure [Pa]
     real(wp), intent(in) :: max_traction, max_pressure
-    !> Tuning numbers; absent: the usual ones
-    type(accuracy_options_t), intent(in), optional :: options
-    logical :: narrow
     type(accuracy_options_t) :: tuning
 
-    if (present(options)) tuning = options
     narrow = stick_area > 0.0_wp .and. max_traction > tuning%least_shear*max_pressure .and. &
              contact_area - stick_area < tuning%resolved_width*spacing*2.0_wp*sqrt(pi*contact_area)
   end function is_slip_zone_unresolved

@@ -11,18 +11,15 @@ module hc_load_cycles
 
 contains
 
-  !> Steps at which a quantity turns back, with the last one before it changes at all and its last extreme.
-  pure function turning_points(values, options) result(turns)
+  !> Find the steps at which a quantity turns back, with the last one before it changes at all and its last extreme.
+  pure function turning_points(values) result(turns)
     !> Values of the steps
     real(wp), intent(in) :: values(:)
-    !> Tuning numbers; absent: the usual ones
-    type(cycle_options_t), intent(in), optional :: options
     type(cycle_options_t) :: tuning
     integer, allocatable :: turns(:)
     real(wp) :: least, direction
     integer :: k, extreme
 
-    if (present(options)) tuning = options
     allocate (turns(0))
     if (size(values) == 0) return
     least = tuning%noise*(maxval(values) - minval(values))
@@ -43,19 +40,16 @@ contains
   end function turning_points
 
   !> Find the closed cycles of a load over its motion: from one turning point to the next but one, where either is back.
-  pure subroutine find_cycles(motion, load, first, last, options)
+  pure subroutine find_cycles(motion, load, first, last)
     !> Values of the steps
     real(wp), intent(in) :: motion(:), load(:)
     !> First and last step of each cycle
     integer, allocatable, intent(out) :: first(:), last(:)
-    !> Tuning numbers; absent: the usual ones
-    type(cycle_options_t), intent(in), optional :: options
     type(cycle_options_t) :: tuning
     integer, allocatable :: turns(:)
     integer :: k
 
-    if (present(options)) tuning = options
-    allocate (turns, source=turning_points(motion, tuning))
+    allocate (turns, source=turning_points(motion))
     allocate (first(0), last(0))
     k = 1
     do while (k + 2 <= size(turns))
@@ -69,7 +63,7 @@ contains
     end do
   end subroutine find_cycles
 
-  !> Does a quantity come back to where it was two turning points before?
+  !> Return whether a quantity comes back to where it was two turning points before.
   pure logical function is_back(turns, closure)
     !> Its values at three turning points
     real(wp), intent(in) :: turns(3)
@@ -78,7 +72,7 @@ contains
     is_back = abs(turns(3) - turns(1)) < closure*abs(turns(2) - turns(1))
   end function is_back
 
-  !> Area of the loop of a load over its motion, closed by a straight line: the work of the load around it, (L3) [J].
+  !> Compute the area of the loop of a load over its motion, closed by a straight line: the work of the load around it, (L3) [J].
   pure real(wp) function loop_area(motion, load)
     !> Displacement [m] or rotation [rad] of the steps of a cycle
     real(wp), intent(in) :: motion(:)

@@ -27,7 +27,7 @@ module hc_load_path
   implicit none
   private
 
-  public :: step_settings_t, advance, join_steps
+  public :: step_settings_t, advance, join_steps, between
 
   !> How a load step is solved.
   type :: step_settings_t

@@ -11,9 +11,9 @@ module hc_step_error
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, separated, slip, stick
   use hc_contact_problem, only: friction_problem_t
-  use hc_friction_law, only: friction_law_t
   use hc_contact_residuals, only: least_traction
   use hc_edges_by_rows, only: edges_by_rows_t, new_edges_by_rows
+  use hc_state_measures, only: friction_reserve
   use hc_zone_edge, only: zone_edge_t
   implicit none
   private
@@ -59,7 +59,7 @@ contains
                friction => problem%friction)
       call edges_of(problem, halves, edges)
       contact = edges%contact_edge()
-      sticking = stick_edge_of(edges, friction, halves)
+      sticking = edges%stick_edge(halves%zone == stick, friction_reserve(friction, halves))
       entered = space%count(logical((halves%zone /= separated) .neqv. (halves_before%zone /= separated), lk))
       if (contact%radius() < steps%small_radius*spacing) then
         change%lattice = contact%area/area
@@ -121,29 +121,6 @@ contains
     call new_edges_by_rows(edges, here, state, logical(problem%candidate), problem%space, problem%options%edges)
   end subroutine edges_of
 
-  !> Find the edge of the stick area of a state.
-  function stick_edge_of(edges, friction, state) result(edge)
-    !> Edges of the contact
-    type(edges_by_rows_t), intent(in) :: edges
-    !> Friction law
-    class(friction_law_t), intent(in) :: friction
-    !> State
-    type(contact_state_t), intent(in) :: state
-    type(zone_edge_t) :: edge
-    real(wp), allocatable :: reserve(:, :)
-    integer :: row
-
-    ! without slip the reserve is of no use
-    allocate (reserve, source=0.0_wp*state%pressure)
-    if (friction%is_bounded()) then
-      do row = 1, size(reserve, 2)
-        call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), reserve(:, row))
-      end do
-      reserve = friction%bounds_of(state%pressure) - reserve
-    end if
-    edge = edges%stick_edge(state%zone == stick, reserve)
-  end function stick_edge_of
-
   !> Compute the stick area of a state [m^2].
   real(wp) function stick_area(problem, state)
     !> The problem
@@ -154,7 +131,7 @@ contains
     type(zone_edge_t) :: edge
 
     call edges_of(problem, state, edges)
-    edge = stick_edge_of(edges, problem%friction, state)
+    edge = edges%stick_edge(state%zone == stick, friction_reserve(problem%friction, state))
     stick_area = edge%area
   end function stick_area
 

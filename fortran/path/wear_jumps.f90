@@ -41,7 +41,7 @@ module hc_wear_jumps
 
 contains
 
-  !> Depth that is worn off where friction dissipates an energy, (V2) [m].
+  !> Compute the depth that is worn off where friction dissipates an energy, (V2) [m].
   elemental real(wp) function archard_depth(energy, coefficient, friction) result(depth)
     !> Dissipated energy by area [J/m^2]
     real(wp), intent(in) :: energy

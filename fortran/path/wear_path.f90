@@ -593,16 +593,14 @@ contains
     type(contact_state_t) :: extended
     integer :: i
 
-    associate (larger => solver%problem%lattice)
-      call carry_fields(self%cycle)
-      call carry_fields(self%next)
-      call embed(lattice, larger, solver%problem%space, self%next%state%accumulated_slip)
-      call embed(lattice, larger, solver%problem%space, self%next%state%dissipation_density)
-      call embed(lattice, larger, solver%problem%space, self%first)
-      call embed(lattice, larger, solver%problem%space, self%both)
-      call embed(lattice, larger, solver%problem%space, self%last)
-      call embed(lattice, larger, solver%problem%space, self%last_but_one)
-    end associate
+    call carry_fields(self%cycle)
+    call carry_fields(self%next)
+    call carry_field(self%next%state%accumulated_slip)
+    call carry_field(self%next%state%dissipation_density)
+    call carry_field(self%first)
+    call carry_field(self%both)
+    call carry_field(self%last)
+    call carry_field(self%last_but_one)
     self%friction = nodal_coefficients(solver%problem)
     ! the last solutions are of the smaller window
     do i = 1, size(self%steps)
@@ -623,14 +621,19 @@ contains
     subroutine carry_fields(cycle)
       type(wear_cycle_t), intent(inout) :: cycle
 
-      associate (larger => solver%problem%lattice)
-        call embed(lattice, larger, solver%problem%space, cycle%worn)
-        call embed(lattice, larger, solver%problem%space, cycle%change)
-        call embed(lattice, larger, solver%problem%space, cycle%energy)
-        call embed(lattice, larger, solver%problem%space, cycle%path)
-        call embed(lattice, larger, solver%problem%space, cycle%ahead)
-      end associate
+      call carry_field(cycle%worn)
+      call carry_field(cycle%change)
+      call carry_field(cycle%energy)
+      call carry_field(cycle%path)
+      call carry_field(cycle%ahead)
     end subroutine carry_fields
+
+    !> Put a field on the larger window.
+    subroutine carry_field(field)
+      real(wp), allocatable, intent(inout) :: field(:, :)
+
+      call embed(lattice, solver%problem%lattice, solver%problem%space, field)
+    end subroutine carry_field
 
   end subroutine carry
 

@@ -1,5 +1,6 @@
 !> Fatigue quantities: histories whose answer is a formula, and what rotations and constant stresses must not change.
 module test_fatigue
+  use hc_fatigue_fields, only: find_ruiz
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_smallest_ball, only: find_smallest_ball
@@ -7,7 +8,6 @@ module test_fatigue
   use hc_plane_criteria, only: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t
   use hc_critical_plane, only: find_critical_plane
   use hc_strain_life, only: strain_life_t, new_strain_life
-  use hc_fretting_parameters, only: find_ruiz
   use testing, only: test_t, new_test, check, check_raised, check_true
   implicit none
   private

@@ -8,12 +8,12 @@ module test_interior
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_interior_triangle, only: triangle_fields, mesh_fields
   use hc_depth_fields, only: half_space_of
   use hc_interior_points, only: fields_at_points
   use hc_interior_planes, only: interior_planes_t, new_interior_planes
-  use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
+  use hc_interior_fields, only: n_derivative, xx, yy, zz, xy, yz, xz
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_coulomb, only: coulomb_t
   use hc_edge_tractions, only: correct_at_edges
@@ -39,6 +39,7 @@ contains
       new_test('single triangles', test_triangles), &
       new_test('creases and vertices', test_creases), &
       new_test('oblique lattices', test_oblique), &
+      new_test('groups of points', test_groups), &
       new_test('planes', test_planes), &
       new_test('second body', test_second_body), &
       new_test('principal stresses', test_principal), &
@@ -204,6 +205,41 @@ contains
       end do
     end do
   end subroutine test_oblique
+
+  !> Potentials at points from near to far, in groups of different size: equal to the last bit.
+  subroutine test_groups(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    integer, parameter :: sizes(4) = [2, 7, 40, most_points]
+    type(interior_pyramid_t) :: pyramid
+    real(wp) :: x(most_points), y(most_points), z(most_points)
+    real(wp) :: alone(most_points, n_derivative), grouped(most_points, n_derivative)
+    integer :: i, k, first, last, lattice
+
+    do i = 1, most_points
+      ! distances from 0.5 to 500 spacings, far and near points side by side
+      associate (radius => 0.5_wp*1000.0_wp**(modulo(37*i, most_points)/real(most_points - 1, wp)), turn => real(i, wp))
+        x(i) = radius*cos(turn)*sin(3.0_wp*turn)
+        y(i) = radius*sin(turn)*sin(3.0_wp*turn)
+        z(i) = radius*abs(cos(3.0_wp*turn))
+      end associate
+    end do
+    do lattice = 1, 2
+      if (lattice == 1) call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
+      if (lattice == 2) call new_interior_pyramid(pyramid, reshape([1.0_wp, 0.0_wp, 0.3_wp, 0.8_wp], [2, 2]))
+      do i = 1, most_points
+        call pyramid%potentials(1, x(i:i), y(i:i), z(i:i), alone(i:i, :))
+      end do
+      do k = 1, size(sizes)
+        do first = 1, most_points, sizes(k)
+          last = min(first + sizes(k) - 1, most_points)
+          call pyramid%potentials(last - first + 1, x(first:last), y(first:last), z(first:last), grouped(first:last, :))
+        end do
+        call check(error, maxval(abs(grouped - alone)), 0.0_wp, 0.0_wp, 'potentials of points in groups')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_groups
 
   !> Planes by convolution are the sums at their nodes.
   subroutine test_planes(error)

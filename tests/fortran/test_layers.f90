@@ -41,6 +41,7 @@ contains
       new_test('limits', test_limits), &
       new_test('images', test_images), &
       new_test('far_field', test_far), &
+      new_test('rows_of_kernels', test_rows), &
       new_test('fits', test_fits), &
       new_test('symbols', test_symbols), &
       new_test('mean_on_rigid_bases', test_mean), &
@@ -346,6 +347,27 @@ contains
     call below%blocks([8.0e10_wp], [6.0e10_wp], expected)
     call check(error, found(:, 1)/expected(1, 1), expected(:, 1)/expected(1, 1), 1.0e-10_wp, 'blocks')
   end subroutine test_far
+
+  !> The kernel of a row of offsets is that of single ones, to the last bit: ranks evaluate rows, one rank a table.
+  subroutine test_rows(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(layered_pair_t) :: pair
+    class(influence_t), allocatable :: images
+    real(wp) :: x(150), y(150), row(150), single(150)
+    integer :: i
+
+    call new_layered_pair(pair, [material_t(1.0_wp, 0.3_wp), material_t(5.0_wp, 0.1_wp)], &
+                          [coating_t(1.0_wp, material_t(4.0_wp, 0.2_wp))], [coating_t :: ], error)
+    if (allocated(error)) return
+    call pair%new_influence(equilateral_basis(1.0_wp), images)
+    x = [(real(i, wp) - 75.5_wp, i=1, 150)]
+    y = 2.0_wp*sqrt(0.75_wp)
+    call images%closing(x, y, row)
+    do i = 1, size(x)
+      call images%closing(x(i:i), y(i:i), single(i:i))
+    end do
+    call check(error, maxval(abs(row - single)), 0.0_wp, 0.0_wp, 'kernel of a row')
+  end subroutine test_rows
 
   !> The kernels of layers are images to 1e-6, for moduli apart by a factor of a thousand, and for a soft layer below a hard one.
   subroutine test_fits(error)

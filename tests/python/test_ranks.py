@@ -69,6 +69,15 @@ normal_load = "10 N"
 [[load]]
 normal_load = "20 N"
 """
+COATED = (
+    PRESSED
+    + """
+[[body.1.coating]]
+thickness = "5 um"
+young_modulus = "300 GPa"
+poisson_ratio = 0.25
+"""
+)
 CHAMFER = ROLLER.replace('"logarithmic"\ndesign_load = "14.5 N"', '"chamfer"\nchamfer = "0.2 mm"')
 with_mpi = pytest.mark.skipif("MPI: yes" not in flat.BUILT, reason="this build has no MPI")
 
@@ -163,7 +172,16 @@ def launched(
 @with_mpi
 @pytest.mark.parametrize(
     ("ranks", "deck"),
-    [(2, PRESSED), (3, PRESSED), (2, WAVES), (3, ODD_WAVES), (2, REFINED), (3, ROLLER), (2, CHAMFER)],
+    [
+        (2, PRESSED),
+        (3, PRESSED),
+        (2, WAVES),
+        (3, ODD_WAVES),
+        (2, REFINED),
+        (3, ROLLER),
+        (2, CHAMFER),
+        (3, COATED),
+    ],
 )
 def test_several_processes_write_the_file_of_one(ranks: int, deck: str, tmp_path: Path) -> None:
     assert_same(*run_twice(ranks, deck, tmp_path))

@@ -421,7 +421,9 @@ class Problem:
             sentence = f"no window can be found: {error}{soft}"
             key: tuple[str, ...] = ("grid",)
             if not (self.plane_gap.given or grid.center):
-                key = (self.surfaces.key_of("2" if self.surfaces.surface_1.shape == "flat" else "1"),)
+                shapes = [one.shape for one in self.surfaces.surfaces]
+                at = int(shapes[0] == "flat")
+                key = ("body", "12"[at], "surface", *("expression",) * (shapes[at] == "formula"))
                 sentence = f"{error}{soft}; expected a shape of finite heights that bounds the contact"
                 if any(part.wave for part in self.shapes):
                     sentence += ', or a window that repeats, grid.boundary = "periodic"'

@@ -329,7 +329,7 @@ contains
 
     allocate (made)
     call self%elastic_pair_t%new_influence(basis, made%surface)
-    call new_interior_pyramid(made%pyramid, basis)
+    call new_interior_pyramid(made%pyramid, basis, sharp=.true.)
     made%depth = self%depth
     made%image = self%image
     call move_alloc(made, influence)

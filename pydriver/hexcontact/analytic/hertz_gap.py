@@ -123,12 +123,13 @@ def _hertz(
 ) -> Pressed | None:
     """Return Hertz's solution if the gap and the law of contact lead to an ellipse."""
     modulus = attribute_of(attributes, "effective_modulus")
+    if is_compliant(attributes):
+        return None
     try:
         hertz_ellipse(modulus, hessian, normal_load=1.0)
     except DeckError:  # a line contact, or an unknown modulus
         return None
-    contact = lambda load: hertz_ellipse(modulus, hessian, normal_load=load)  # noqa: E731
-    return None if is_compliant(attributes) else Pressed("Hertz", center, contact, 0.4, lowest)
+    return Pressed("Hertz", center, lambda p: hertz_ellipse(modulus, hessian, normal_load=p), 0.4, lowest)
 
 
 def roller_on_flat(deck: str, attributes: Mapping[Any, Any], load: float) -> Pressed | None:
@@ -147,8 +148,11 @@ def roller_on_flat(deck: str, attributes: Mapping[Any, Any], load: float) -> Pre
         hertz = _hertz(attributes, hessian, center)
         if hertz and hertz.contact(load).semi_major < surface.reach:
             return hertz
-    plane = SimpleNamespace(max_pressure=surface.plane_contact(modulus, load)[1])
-    return Pressed("Hertz, plane contact", center, lambda _: plane, 0.0)
+
+    def plane(load: float) -> SimpleNamespace:
+        return SimpleNamespace(max_pressure=surface.plane_contact(modulus, load)[1])
+
+    return Pressed("Hertz, plane contact", center, plane, 0.0)
 
 
 def against_hertz(

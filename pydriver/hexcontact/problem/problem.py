@@ -327,8 +327,11 @@ class Problem:
     def contact_nodes(self, lattice: Lattice) -> int:
         """Return the estimated number of nodes in contact at the largest load; all without an estimate."""
         if self.plane_gap.at_nodes and self.method_for(lattice) == "direct":
-            gap = self.plane_gap.over(lattice)
-            return window.nodes_in_contact(self.pair, gap, lattice, self.largest_drives)
+            gap, law = self.plane_gap.over(lattice), contact.UNILATERAL
+            pressures = [
+                contact.rough_pressure(lattice, self.pair, gap, law, **d) for d in self.largest_drives
+            ]
+            return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
         radius = math.inf if self.estimate is None else self.estimate.radius
         return math.ceil(min(math.pi * radius**2 / lattice.cell_area, lattice.size))
 

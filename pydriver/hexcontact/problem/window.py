@@ -212,12 +212,6 @@ def starting_half_size(
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: list[dict[str, float]]) -> int:
-    """Return the nodes of a window in contact at the largest of some drives, given the gap at all nodes."""
-    pressures = [rough_pressure(lattice, pair, gap, UNILATERAL, **drive) for drive in drives]
-    return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
-
-
 def _steepest(height: Array, lattice: Lattice, contact: Mask) -> float:
     """Return the largest slope of a surface within the contact."""
     heights = np.where(contact, height, np.nan)

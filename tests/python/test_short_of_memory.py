@@ -16,7 +16,7 @@ from numpy.testing import assert_array_equal
 
 from hexcontact import Case, ResourceError, open_result
 from hexcontact.cli import frame
-from hexcontact.core import memory
+from hexcontact.core import cores, memory
 from hexcontact.files import _is_running
 
 pytestmark = pytest.mark.skipif(
@@ -148,7 +148,8 @@ def test_a_machine_that_hides_its_processes(tmp_path: Path, monkeypatch: pytest.
     def hidden(path: str) -> bytes:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
 
-    monkeypatch.setattr(memory, "read", hidden)
+    for module in (memory, cores):
+        monkeypatch.setattr(module, "read", hidden)
     monkeypatch.setattr(psutil, "PROCFS_PATH", str(tmp_path))
     assert memory.resident() > MB
     assert memory.available() > 100 * MB

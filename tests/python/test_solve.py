@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
-from hexcontact.core import contact, memory
+from hexcontact.core import contact, cores, memory
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, ResourceError, StopRun
@@ -458,22 +458,22 @@ def test_cores_are_those_of_a_quota_of_processor_time(
     for name, text in files.items():
         (tmp_path / "sys" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "sys" / name).write_text(text)
-    assert memory.cores(tmp_path / "sys", tmp_path / "cgroup") == number
+    assert cores.cores(tmp_path / "sys", tmp_path / "cgroup") == number
 
 
 def test_openmp_heeds_a_quota_of_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.sched_getaffinity", lambda _: range(8))
     monkeypatch.setattr("os.cpu_count", lambda: 8)
-    monkeypatch.setattr(memory, "_quota", lambda *_: 3)
+    monkeypatch.setattr(cores, "_quota", lambda *_: 3)
     monkeypatch.setenv("OMP_NUM_THREADS", "6")
-    memory.limit_threads()
+    cores.limit_threads()
     assert memory.threads() == 6
     monkeypatch.delenv("OMP_NUM_THREADS")
-    memory.limit_threads()
+    cores.limit_threads()
     assert os.environ["OMP_NUM_THREADS"] == "3"
     monkeypatch.delenv("OMP_NUM_THREADS")
-    monkeypatch.setattr(memory, "_quota", lambda *_: 9)
-    memory.limit_threads()
+    monkeypatch.setattr(cores, "_quota", lambda *_: 9)
+    cores.limit_threads()
     assert "OMP_NUM_THREADS" not in os.environ
 
 

@@ -1,5 +1,5 @@
 """The compiled core as Python objects: arrays are checked here, failures become exceptions."""
 
-from .memory import limit_threads
+from .cores import limit_threads
 
 limit_threads()

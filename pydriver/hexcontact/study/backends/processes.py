@@ -16,7 +16,7 @@ from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, Thre
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from ...core.memory import cores
+from ...core.cores import cores
 from ...errors import DeckError, ResourceError
 from ..backend import Backend, Job, Outcome, backend
 

@@ -238,9 +238,9 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
     if case.maps:
         along = np.array(
             [
-                distance / case.lattice.apart(one.angle + axis * math.pi / 2)
+                one.map.distances[axis] / case.lattice.apart(one.angle + axis * math.pi / 2)
                 for one in case.maps
-                for axis, distance in zip(one.axes, one.distances, strict=True)
+                for axis in one.axes
             ]
         )
         found |= {

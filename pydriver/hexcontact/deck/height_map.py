@@ -211,16 +211,6 @@ class Placed(NamedTuple):
         return np.stack(self.in_plane(x[row], y[col]), axis=-1)
 
     @property
-    def names(self) -> str:
-        """Names of its own axes."""
-        return "st" if self.angle else "xy"
-
-    @property
-    def distances(self) -> tuple[float, ...]:
-        """Median distances (m) of its points along its axes."""
-        return tuple(self.map.distances[axis] for axis in self.axes)
-
-    @property
     def axes(self) -> tuple[int, ...]:
         """Axes along which it has an end."""
         return (1,) if self.extruded else (0, 1)

@@ -122,8 +122,8 @@ class Bodies(Table):
         """Initial gap between the two surfaces."""
         one, two = self.body_1, self.body_2
         modulus = 1.0 / (one.compliance + two.compliance)
-        gap = Separation(one.surface or Flat(), two.surface or Flat())
-        return gap.each(lambda part: part.beside(modulus))
+        surfaces = one.surface or Flat(), two.surface or Flat()
+        return Separation(surfaces[0].beside(modulus), surfaces[1].beside(modulus))
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Conflicts:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr, WrapValidator, model_validator
 
 from ..arrays import Array
 from ..errors import DeckError
@@ -23,7 +23,7 @@ from .faults import MISSING
 from .height_map import HeightMap, Placed, along_axes, place, rotated
 from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
-from .surfaces import Angle, Point, PositiveLength, Surface, shape
+from .surfaces import Angle, Point, Surface, shape
 from .table_base import Conflicts, meaning, not_both, refuse_key, refused
 from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
@@ -70,11 +70,16 @@ class Numbers(Kind):
         return found.tolist()
 
 
-_Pair = Read[tuple[float, float], Sequence[float | str]]
-HeightFile = Annotated[Read[Path, str | Path], FileName()] | None
-TwoLengths = Annotated[_Pair, Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', 2)] | None
-Line = Annotated[Read[list[Any], ArrayLike], Numbers()] | None
-Grid = Annotated[Read[list[Any], ArrayLike], Numbers(2)] | None
+_OR_NONE = WrapValidator(lambda value, read: None if value is None else read(value))
+HeightFile = Annotated[Read[Path | None, str | Path | None], FileName(), _OR_NONE]
+TwoLengths = Annotated[
+    Read[tuple[float, float] | None, Sequence[float | str] | None],
+    Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2),
+    _OR_NONE,
+]
+Width = Annotated[Read[float | None, float | str | None], Quantity(LENGTH, above=0), _OR_NONE]
+Line = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(), _OR_NONE]
+Grid = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(2), _OR_NONE]
 
 
 class Points(NamedTuple):
@@ -113,7 +118,7 @@ class Measured(Surface):
         "cubic",
         "cubic: a spline, near steps monotone between the points; linear: bilinear between four points",
     )
-    taper: PositiveLength | None = meaning(
+    taper: Width = meaning(
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
     of_points: ClassVar[bool] = True
@@ -399,7 +404,7 @@ class Map(Measured):
         units = f"heights in {found.value_units or self.height_units}"
         if of_file := found.units or self.units:
             units = f"x and y in {of_file}, {units}"
-        return Points(x, y, z, f"{self.file.name}, {units}; {how}")
+        return Points(x, y, z, f"{Path(self.file).name}, {units}; {how}")
 
     def _of_matrix(self, rows: Array) -> tuple[Array, Array, Array, str]:
         """Return the points of a matrix: columns along x, the first row at the top or at the bottom."""
@@ -514,7 +519,7 @@ class Profile(Measured):
             assert found.y is not None
             y = found.y * scale
             units = f"y in {found.units or self.units}, heights in {found.value_units or self.height_units}"
-            about = f"{self.file.name}, {units}"
+            about = f"{Path(self.file).name}, {units}"
             if self.center is not None:
                 y = y - (y.min() + y.max()) / 2 + self.center
         return Points(np.array([-_LONG, _LONG]), y, np.stack([z, z]), about)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
 from typing import Any
@@ -62,13 +61,9 @@ class Separation:
                 return (*key, "expression") if part.shape == "formula" else key
         return ("body",)
 
-    def each(self, changed: Callable[[Surface], Surface]) -> Separation:
-        """Return the gap of surfaces with each of their shapes changed."""
-        return Separation(self.surface_1.each(changed), self.surface_2.each(changed))
-
     def moved(self, by: ArrayLike) -> Separation:
         """Return the gap after the shapes that are bound to rolling bodies have moved by a vector (m)."""
-        return replace(self.each(lambda part: part.moved(by)), at_rest=self.at_rest or self)
+        return Separation(self.surface_1.moved(by), self.surface_2.moved(by), self.at_rest or self)
 
     @property
     def shapes(self) -> tuple[Surface, ...]:
@@ -155,7 +150,7 @@ class Separation:
 
     def repeating(self, sides: tuple[float, float] | None) -> Separation:
         """Return the gap over a window that repeats with two sides (m) along x and y; None: others."""
-        return self.each(lambda part: part.repeating(sides))
+        return Separation(self.surface_1.repeating(sides), self.surface_2.repeating(sides))
 
     @property
     def one_map(self) -> bool:

@@ -135,16 +135,12 @@ class Surface(Argument):
             height = height + math.tan(self.tilt[0]) * y + math.tan(self.tilt[1]) * x
         return height
 
-    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
-        """Return the surface with each of its shapes changed."""
-        return changed(self)
-
     def beside(self, modulus: float) -> Surface:
-        """Return the shape on bodies of a modulus E* (Pa), which few shapes depend on."""
+        """Return the surface on bodies of a modulus E* (Pa), which few shapes depend on."""
         return self
 
     def repeating(self, sides: tuple[float, float] | None) -> Surface:
-        """Return the shape over a window that repeats with two sides (m) along x and y; None: others."""
+        """Return the surface over a window that repeats with two sides (m) along x and y; None: others."""
         return self
 
     @property
@@ -153,7 +149,7 @@ class Surface(Argument):
         return tuple(filter(attrgetter("of_points"), self.shapes))
 
     def moved(self, by: ArrayLike) -> Surface:
-        """Return the shape after its body has moved by a vector (m), if it is bound to it."""
+        """Return the surface after its body has moved by a vector (m), with the shapes bound to it."""
         x, y = np.add(self.offset, by)
         return self.model_copy(update={"offset": (float(x), float(y))}) if self.moves else self
 
@@ -662,9 +658,17 @@ class SurfaceSum(Surface):
         """Return the sum of the heights (m)."""
         return np.asarray(sum(part.height(x, y) for part in self.parts))
 
-    def each(self, changed: Callable[[Surface], Surface]) -> Surface:
-        """Return the sum of the changed shapes."""
-        return SurfaceSum(parts=tuple(map(changed, self.parts)))
+    def beside(self, modulus: float) -> Surface:
+        """Return the sum of shapes of the modulus."""
+        return SurfaceSum(parts=tuple(part.beside(modulus) for part in self.parts))
+
+    def moved(self, by: ArrayLike) -> Surface:
+        """Return the sum of the moved shapes."""
+        return SurfaceSum(parts=tuple(part.moved(by) for part in self.parts))
+
+    def repeating(self, sides: tuple[float, float] | None) -> Surface:
+        """Return the sum of shapes over a window that repeats."""
+        return SurfaceSum(parts=tuple(part.repeating(sides) for part in self.parts))
 
     def written(self, defaults: bool = True) -> Any:
         """Return the shapes with their keys."""

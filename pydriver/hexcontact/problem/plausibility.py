@@ -223,9 +223,9 @@ def expected(case: Problem, estimated: bool = True) -> dict[str, Any]:
         found["pressure_ratio"] = known.max_pressure / case.pair.effective_modulus
     if case.maps:
         apart = [
-            distance / lattice.apart(one.angle + axis * math.pi / 2)
+            one.map.distances[axis] / lattice.apart(one.angle + axis * math.pi / 2)
             for one in case.maps
-            for axis, distance in zip(one.axes, one.distances, strict=True)
+            for axis in one.axes
         ]
         found |= {
             "spacings_between_points": float(max(apart)),

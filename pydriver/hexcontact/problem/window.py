@@ -385,7 +385,7 @@ def _beyond_maps(grid: Grid, lattice: Lattice, maps: Sequence[Placed]) -> Found:
         beyond = [axis for axis in one.axes if one.is_beyond(axis, at[axis])]
         if not beyond:
             continue
-        moved, names = along_axes(one.offset, one.angle), one.names
+        moved, names = along_axes(one.offset, one.angle), "st" if one.angle else "xy"
         theirs, ours = (
             " and ".join(
                 f"{names[i]} from {readable(low + moved[i])} to {readable(high + moved[i])}"

@@ -15,7 +15,7 @@ module hc_contact_edges
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
   use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
-  use hc_zone_edge, only: edged_zone_t
+  use hc_zone_edge, only: edged_zone_t, zone_edge_t
   implicit none
   private
 
@@ -26,8 +26,8 @@ module hc_contact_edges
     !> Pressure at the nodes about the edge
     real(wp), allocatable, private :: pressure(:)
   contains
-    !> The part of the contact that sticks
-    procedure :: find_stick
+    !> The part of the contact that sticks; its edge, and that of the contact
+    procedure :: find_stick, stick_edge, contact_edge
     !> Squares of the pressure near the edge of the contact, and of the reserve near that of the stick area, good to
     !> interpolate
     procedure :: squares, stick_squares
@@ -136,6 +136,25 @@ contains
       end do
     end associate
   end subroutine find_stick
+
+  !> Find the edge of the contact area.
+  pure type(zone_edge_t) function contact_edge(self)
+    class(contact_edges_t), intent(in) :: self
+
+    contact_edge = self%edge()
+  end function contact_edge
+
+  !> Find the edge of the part of the contact that sticks.
+  pure type(zone_edge_t) function stick_edge(self, stick, reserve)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `find_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    type(edged_zone_t) :: sticking
+
+    call self%find_stick(stick, reserve, sticking)
+    stick_edge = sticking%edge()
+  end function stick_edge
 
   !> Return squares of the pressure that are good to interpolate linearly (n_col, n_row) [Pa^2].
   !>

@@ -15,7 +15,7 @@ module test_edges
   use hc_coulomb, only: coulomb_t
   use hc_nodal_coulomb, only: nodal_coulomb_t
   use hc_traction_field, only: new_traction_field, traction_field_t
-  use hc_zone_edge, only: cut_triangles, edged_zone_t, zone_edge_t, zone_mesh_t
+  use hc_zone_edge, only: cut_triangles, zone_edge_t, zone_mesh_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
@@ -190,7 +190,7 @@ contains
     allocate (inside, source=min(hypot(x, y) - inner, outer - hypot(x, y)))
     call new_contact_edges(edges, lattice, sqrt(max(inside, 0.0_wp)), 3.0_wp*max(-inside, 0.0_wp)**1.5_wp, &
                            inside > 0.0_wp, inside < huge(1.0_wp))
-    edge = edges%edge()
+    edge = edges%contact_edge()
     call check(error, edge%area, pi*((outer + layer)**2 - (inner - layer)**2), 0.03_wp, 'area of a ring')
     if (allocated(error)) return
     call check(error, edge%radius(), sqrt(edge%area/pi), 1.0e-12_wp, 'its radius')
@@ -207,7 +207,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
-    type(edged_zone_t) :: zone
     type(zone_edge_t) :: edge
     real(wp), allocatable :: x(:, :), y(:, :)
     logical, allocatable :: punch(:, :)
@@ -216,13 +215,12 @@ contains
     if (allocated(error)) return
     allocate (punch, source=hypot(x, y) < 20.3_wp)
     call new_contact_edges(edges, lattice, merge(1.0_wp, 0.0_wp, punch), 0.0_wp*x, punch, punch)
-    edge = edges%edge()
+    edge = edges%contact_edge()
     call check(error, edge%area, count(punch)*lattice%cell_area(), 1.0e-9_wp, 'area of a punch')
     if (allocated(error)) return
     call check(error, size(edge%segments), 0, 'pieces of its edge')
     if (allocated(error)) return
-    call edges%find_stick(punch, 1.0_wp + 0.0_wp*x, zone)
-    edge = zone%edge()
+    edge = edges%stick_edge(punch, 1.0_wp + 0.0_wp*x)
     call check(error, edge%area, count(punch)*lattice%cell_area(), 1.0e-9_wp, 'area, all of it stuck')
     if (allocated(error)) return
     ! its outline is straight between the middles of links, so that a convex zone has a quarter of a cell less
@@ -261,7 +259,7 @@ contains
     allocate (square, source=1.0_wp - u**2 - v**2)
     call new_contact_edges(edges, lattice, sqrt(max(square, 0.0_wp)), max(-square, 0.0_wp)**1.5_wp, &
                            square > 0.0_wp, square < huge(1.0_wp))
-    edge = edges%edge()
+    edge = edges%contact_edge()
     associate (found => edge%ellipse)
       call check(error, [found%semi_major, found%semi_minor, found%center], [semi_major, semi_minor, center], 0.08_wp, &
                  'half-axes and center of an ellipse')
@@ -292,7 +290,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
-    type(edged_zone_t) :: zone
     type(zone_edge_t) :: edge, contact
     real(wp), allocatable :: x(:, :), y(:, :), inside(:, :), square(:, :)
     real(wp), parameter :: radius = 11.4_wp
@@ -302,18 +299,15 @@ contains
     allocate (inside, source=30.7_wp - hypot(x, y))
     call new_contact_edges(edges, lattice, sqrt(max(inside, 0.0_wp)), 3.0_wp*max(-inside, 0.0_wp)**1.5_wp, &
                            inside > 0.0_wp, inside < huge(1.0_wp))
-    contact = edges%edge()
-    call edges%find_stick(inside > 0.0_wp, 0.0_wp*x + 1.0_wp, zone)
-    edge = zone%edge()
+    contact = edges%contact_edge()
+    edge = edges%stick_edge(inside > 0.0_wp, 0.0_wp*x + 1.0_wp)
     call check(error, edge%area, contact%area, 1.0e-9_wp, 'stick up to the edge of the contact')
     if (allocated(error)) return
     allocate (square, source=1.0_wp - (x**2 + y**2)/radius**2)
-    call edges%find_stick(square > 0.0_wp, sqrt(max(square, 0.0_wp)), zone)
-    edge = zone%edge()
+    edge = edges%stick_edge(square > 0.0_wp, sqrt(max(square, 0.0_wp)))
     call check(error, edge%radius(), radius, 0.12_wp, 'a disc that sticks')
     if (allocated(error)) return
-    call edges%find_stick(square > 2.0_wp, square, zone)
-    edge = zone%edge()
+    edge = edges%stick_edge(square > 2.0_wp, square)
     call check(error, edge%area, 0.0_wp, 0.0_wp, 'no node sticks')
   end subroutine test_stick
 
@@ -322,7 +316,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
-    type(edged_zone_t) :: zone
     type(zone_edge_t) :: edge, again
     real(wp), allocatable :: x(:, :), y(:, :), reserve(:, :)
 
@@ -330,12 +323,10 @@ contains
     if (allocated(error)) return
     call new_contact_edges(edges, lattice, 0.0_wp*x + 1.0_wp, 0.0_wp*x, x < huge(1.0_wp), x < huge(1.0_wp))
     allocate (reserve, source=sqrt(max(1.0_wp - (x**2 + y**2)/1.4_wp**2, 0.0_wp)))
-    call edges%find_stick(hypot(x, y) < 1.1_wp, reserve, zone)
-    edge = zone%edge()
+    edge = edges%stick_edge(hypot(x, y) < 1.1_wp, reserve)
     call check(error, edge%radius(), 1.4_wp, 0.3_wp, 'seven nodes that stick')
     if (allocated(error)) return
-    call edges%find_stick(hypot(x, y) < 1.1_wp, reserve*(1.0_wp + 1.0e-15_wp*sin(9.0_wp*x + 5.0_wp*y)), zone)
-    again = zone%edge()
+    again = edges%stick_edge(hypot(x, y) < 1.1_wp, reserve*(1.0_wp + 1.0e-15_wp*sin(9.0_wp*x + 5.0_wp*y)))
     call check(error, again%area, edge%area, 1.0e-13_wp, 'the same, with other rounding errors')
   end subroutine test_few_nodes
 
@@ -344,7 +335,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
-    type(edged_zone_t) :: zone
     type(zone_edge_t) :: contact(2), sticking(2)
     real(wp), allocatable :: x(:, :), y(:, :), pressure(:, :), gap(:, :)
     real(wp), parameter :: radius(3) = [1.4_wp, 1.9_wp, 2.3_wp], noise = 1.0e-6_wp
@@ -358,9 +348,8 @@ contains
       do k = 1, 2
         pressure = sqrt(max(1.0_wp - (x**2 + y**2)/radius(i)**2, 0.0_wp))*(1.0_wp + (k - 1)*noise*sin(9.0_wp*x + 5.0_wp*y))
         call new_contact_edges(edges, lattice, pressure, gap, pressure > 0.0_wp, x < huge(1.0_wp))
-        contact(k) = edges%edge()
-        call edges%find_stick(pressure > 0.0_wp, 0.3_wp*pressure, zone)
-        sticking(k) = zone%edge()
+        contact(k) = edges%contact_edge()
+        sticking(k) = edges%stick_edge(pressure > 0.0_wp, 0.3_wp*pressure)
       end do
       call check(error, contact(1)%radius(), radius(i), 0.3_wp, 'radius')
       if (allocated(error)) return

@@ -24,8 +24,8 @@ module hc_interior_pyramid
 
   !> Distance from which the moment expansion is used, in longest edges.
   real(wp), parameter :: far_radius = 3.0_wp
-  !> Beyond band_radius(k, :) the moments up to the order band_order(k) suffice: truncation < 1e-14 of the envelopes, or < 3e-17 where
-  !> fields are summed with large coefficients of either sign.
+  !> Beyond band_radius(k, :) the moments up to the order band_order(k) suffice: truncation < 1e-14 of the envelopes, or < 3e-17
+  !> where fields are summed with large coefficients of either sign.
   real(wp), parameter :: band_radius(7, 2) = reshape([6.0_wp, 7.0_wp, 9.0_wp, 14.0_wp, 25.0_wp, 57.0_wp, 200.0_wp, &
                                                       9.0_wp, 11.0_wp, 15.0_wp, 25.0_wp, 52.0_wp, 140.0_wp, 630.0_wp], [7, 2])
   integer, parameter :: band_order(7) = [16, 14, 12, 10, 8, 6, 4]

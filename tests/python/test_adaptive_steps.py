@@ -362,7 +362,7 @@ def test_an_unfinished_run_does_not_name_a_number(tmp_path: Path) -> None:
     assert not part.complete
     assert repr(part).splitlines()[1].startswith("  1 load step (unfinished run), ")
     assert ("load steps", "1 (unfinished, their number was open)") in printed.file_rows(part)
-    journal = Journal(journal_of(out), companions=True)
+    journal = Journal(journal_of(out), restart=True)
     assert not journal.complete
     (step,) = journal
     assert step.companion and 0 < step.done < 1

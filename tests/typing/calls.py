@@ -37,6 +37,9 @@ radius: float = ball.radius
 center: tuple[float, float] = ball.offset
 shapes: list[surfaces.Surface] = [
     surfaces.Flat(),
+    surfaces.RectangularPunch(width="1 mm", length=1e-3, edge_radius="0.1 mm"),
+    surfaces.Roller(radius="10 mm", length="5 mm", profile="crown", crown_radius="1 m"),
+    surfaces.Roller(radius=0.01, length=0.005, profile="logarithmic", design_load="1 kN"),
     surfaces.Sphere(radius=1e-3, offset=(0.0, 1e-3)),
     surfaces.Sphere(radius=1e-3, offset=["0.1 mm", "0 mm"]),
     surfaces.Paraboloid(radius_x=1e-3, radius_y="2 mm", angle="30 deg"),

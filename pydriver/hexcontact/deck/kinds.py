@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, NoReturn, TypeVar
 
 import numpy as np
-from pydantic import ValidationInfo
+from pydantic import ValidationInfo, WrapValidator
 from pydantic_core import PydanticCustomError, core_schema
 
 from ..arrays import Array
@@ -177,6 +177,10 @@ class Read(Generic[_Value, _Given]):
         raise NotImplementedError
 
     def __set__(self, table: object, value: _Given) -> None: ...
+
+
+OR_NONE = WrapValidator(lambda value, read: None if value is None else read(value))
+"""After a kind: a field of `Read` may be None, too."""
 
 
 class Quantity(Kind):

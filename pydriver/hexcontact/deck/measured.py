@@ -14,16 +14,16 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import PrivateAttr, WrapValidator, model_validator
+from pydantic import PrivateAttr, model_validator
 
 from ..arrays import Array
 from ..errors import DeckError
 from ..text import counted, quantity
 from .faults import MISSING
 from .height_map import HeightMap, Placed, along_axes, place, rotated
-from .kinds import FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
+from .kinds import OR_NONE, FileName, Flag, Kind, Quantity, Read, Schema, Several, Text, Word, refuse
 from .map_file import NETCDF, MapFile, read_map
-from .surfaces import Angle, Point, Surface, shape
+from .surfaces import Angle, OptionalLength, Point, Surface, shape
 from .table_base import Conflicts, meaning, not_both, refuse_key, refused
 from .units import LENGTH, NUMBER, UnitError, readable, to_si
 
@@ -70,16 +70,14 @@ class Numbers(Kind):
         return found.tolist()
 
 
-_OR_NONE = WrapValidator(lambda value, read: None if value is None else read(value))
-HeightFile = Annotated[Read[Path | None, str | Path | None], FileName(), _OR_NONE]
+HeightFile = Annotated[Read[Path | None, str | Path | None], FileName(), OR_NONE]
 TwoLengths = Annotated[
     Read[tuple[float, float] | None, Sequence[float | str] | None],
     Several(Quantity(LENGTH, above=0), "lengths", '["1 mm", "1 mm"]', count=2),
-    _OR_NONE,
+    OR_NONE,
 ]
-Width = Annotated[Read[float | None, float | str | None], Quantity(LENGTH, above=0), _OR_NONE]
-Line = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(), _OR_NONE]
-Grid = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(2), _OR_NONE]
+Line = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(), OR_NONE]
+Grid = Annotated[Read[list[Any] | None, ArrayLike | None], Numbers(2), OR_NONE]
 
 
 class Points(NamedTuple):
@@ -118,7 +116,7 @@ class Measured(Surface):
         "cubic",
         "cubic: a spline, near steps monotone between the points; linear: bilinear between four points",
     )
-    taper: Width = meaning(
+    taper: OptionalLength = meaning(
         None, "width of the margins over which a window that repeats closes the step of its sides", '"10 um"'
     )
     of_points: ClassVar[bool] = True

@@ -23,6 +23,7 @@ from ..errors import DeckError
 from ..text import did_you_mean, quantity
 from .faults import MISSING
 from .kinds import (
+    OR_NONE,
     Flag,
     Formula,
     HeightFormula,
@@ -50,10 +51,12 @@ def _coefficient_dimension(exponent: float) -> Dimension:
 
 
 _Number = Read[float, float | str]
+_Optional = Read[float | None, float | str | None]
 _Pair = Read[tuple[float, float], Sequence[float | str]]
 PositiveNumber = Annotated[_Number, Quantity(NUMBER, above=0)]
 Radius = Annotated[_Number, Quantity(LENGTH, above=0)]
 PositiveLength = Radius
+OptionalLength = Annotated[_Optional, Quantity(LENGTH, above=0), OR_NONE]
 _HOLLOW = '; a hollow is an ellipsoid: { shape = "ellipsoid", radius_x = "-5 mm", radius_y = "20 mm" }'
 CurvatureRadius = Annotated[_Number, Quantity(LENGTH, above=0, remedy=_HOLLOW)]
 SignedRadius = Annotated[_Number, Quantity(LENGTH, nonzero=True)]
@@ -389,7 +392,7 @@ class RectangularPunch(Surface):
 
     width: Radius = meaning(..., "side of the flat end along x")
     length: Radius = meaning(..., "side of the flat end along y")
-    edge_radius: Radius | None = meaning(
+    edge_radius: OptionalLength = meaning(
         None, "radius of curvature R of the edges; sharp if absent", '"1 mm"'
     )
     formula: ClassVar[str] = (
@@ -490,9 +493,11 @@ class Roller(Surface):
     length: Radius = meaning(..., "length l; nothing can touch beyond the ends")
     angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
     profile: Annotated[str, Word(PROFILES)] = meaning("sharp", "profile f along the axis")
-    chamfer: Radius | None = meaning(None, "length of the chamfers at 45°", '"0.2 mm"')
-    crown_radius: CurvatureRadius | None = meaning(None, "radius of curvature along the axis", '"1 m"')
-    design_load: Annotated[float, Quantity(FORCE, above=0)] | None = meaning(
+    chamfer: OptionalLength = meaning(None, "length of the chamfers at 45°", '"0.2 mm"')
+    crown_radius: Annotated[_Optional, Quantity(LENGTH, above=0, remedy=_HOLLOW), OR_NONE] = meaning(
+        None, "radius of curvature along the axis", '"1 m"'
+    )
+    design_load: Annotated[_Optional, Quantity(FORCE, above=0), OR_NONE] = meaning(
         None, "load P under which the pressure of a logarithmic profile is even along the axis", '"1 kN"'
     )
     formula: ClassVar[str] = (

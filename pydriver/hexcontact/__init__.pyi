@@ -27,7 +27,7 @@ from .errors import StopRun as StopRun
 from .result.result import Result as Result
 from .result.step import Step as Step
 from .result.store import open_result as open_result
-from .solve.run import resume as resume
+from .solve.restart import resume as resume
 from .solve.session import Session as Session
 from .study.study import Study as Study
 from .study.study import run_study as run_study

@@ -24,7 +24,7 @@ from hexcontact.result.result import Result
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 from hexcontact.solve.events import Lines
-from hexcontact.solve.run import resume
+from hexcontact.solve.restart import resume
 from hexcontact.solve.window import FrictionWindow
 from hexcontact.text import Table
 

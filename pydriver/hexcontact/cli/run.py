@@ -35,7 +35,8 @@ def run(
     """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
     from ..solve import events
-    from ..solve.run import metadata_of, was_begun
+    from ..solve.restart import was_begun
+    from ..solve.run import metadata_of
     from .solving import Messages, overview, picture_beside, solved
 
     if again and overwrite:
@@ -85,7 +86,7 @@ def resume(
 
 def _resumed(file: Path, plot: bool, messages: Messages, **changes: Any) -> frame.Content:
     """Resume the run of an output, with the case or the overrides of `reopened`."""
-    from ..solve.run import output_of, reopened
+    from ..solve.restart import output_of, reopened
     from .solving import overview, picture_beside, solved, with_tables
 
     with signal_pipe() as pipe, reopened(file, **changes) as again:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..result.step import Step
     from ..solve.events import Listener
-    from ..solve.run import Restart
+    from ..solve.restart import Restart
 
 
 MOST_CASES = 100_000  # of a study
@@ -129,7 +129,7 @@ def holds(path: Path, name: str) -> bool:
 def _interrupted(job: Job, case: Problem, stack: contextlib.ExitStack) -> Restart | None:
     """Reopen the journal of an interrupted attempt to continue it; None if there is none."""
     from ..result.journal import journal_of
-    from ..solve.run import reopened
+    from ..solve.restart import reopened
 
     target = Path(job.path)
     attempts = target.parent.glob(f"{target.stem}.*.nc.d") if target.parent.is_dir() else ()

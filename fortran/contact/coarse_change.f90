@@ -210,20 +210,23 @@ contains
     type(friction_problem_t), intent(in) :: problem
     type(contact_state_t), intent(inout) :: state
     type(coarse_rows_t) :: below
-    real(wp), allocatable, target :: own(:, :), own_component(:, :)
-    real(wp), allocatable :: traction(:, :, :)
-    real(wp), pointer, contiguous :: pressure(:, :), component(:, :)
+    real(wp), allocatable, target :: own(:, :), own_component(:, :), own_traction(:, :, :)
+    real(wp), pointer, contiguous :: pressure(:, :), component(:, :), traction(:, :, :)
     integer :: m
 
     if (any(shape(coarse%pressure) /= coarse_problem%own_extent())) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
     below = coarse_problem%rows_below(problem)
     call coarse_problem%take_below(below, coarse%pressure, own, pressure)
-    allocate (traction(size(pressure, 1), size(pressure, 2), 2))
-    do m = 1, 2
-      call coarse_problem%take_below(below, coarse%traction(:, :, m), own_component, component)
-      traction(:, :, m) = component
-    end do
+    traction => coarse%traction
+    if (problem%space%ranks%size > 1) then
+      allocate (own_traction(size(pressure, 1), size(pressure, 2), 2))
+      do m = 1, 2
+        call coarse_problem%take_below(below, coarse%traction(:, :, m), own_component, component)
+        own_traction(:, :, m) = component
+      end do
+      traction => own_traction
+    end if
     call prolong_edge(below%rows, pressure, below%fine, state%pressure, problem%space)
     call prolong_shear(below%rows, pressure, traction, below%fine, state%pressure, state%traction, problem%space)
     state%motion = coarse%motion

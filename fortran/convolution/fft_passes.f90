@@ -199,7 +199,8 @@ contains
         case (0)
           total(start:last, o) = (0.0_wp, 0.0_wp)
         case (1)
-          call multiply_one(m, sign(1)*part(1)%spectrum, part(1)%value, total(start:last, o))
+          call multiply_one(m, part(1)%spectrum, part(1)%value, total(start:last, o))
+          if (sign(1) < 0.0_wp) total(start:last, o) = -total(start:last, o)
         case (2)
           call add_2(sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, total(start:last, o))
         case default

@@ -142,9 +142,11 @@ contains
       if (images%error <= good) exit
     end do
     self%error = images%error
-    self%depth = [z, images%depth]
-    self%weight = [1.0_wp, 0.0_wp*images%depth]
-    self%image = reshape([spread(0.0_wp, 1, n_wave), images%coefficient], [n_wave, size(images%depth) + 1])
+    if (allocated(images%depth)) then
+      self%depth = [z, images%depth]
+      self%weight = [1.0_wp, 0.0_wp*images%depth]
+      self%image = reshape([spread(0.0_wp, 1, n_wave), images%coefficient], [n_wave, size(images%depth) + 1])
+    end if
     if (self%error <= largest_error) return
     write (number, '(es8.1)') self%error
     call raise(error, status%invalid_input, 'the stress in a coated body: its sum of images has an error of '// &
@@ -174,7 +176,7 @@ contains
   end subroutine of_pyramid
 
   !> Compute displacement times the shear modulus, and stress, by the tractions of many nodes at a point for a history of steps.
-  pure subroutine of_nodes(self, pyramid, x, y, load, displacement, stress)
+  pure subroutine of_nodes(self, pyramid, x, y, load, sums, displacement, stress)
     class(depth_fields_t), intent(in) :: self
     !> Pyramid of one of them
     type(interior_pyramid_t), intent(in) :: pyramid
@@ -182,15 +184,15 @@ contains
     real(wp), intent(in) :: x(:), y(:)
     !> Tractions (node, component of the steps one after the other) [Pa]
     real(wp), intent(in) :: load(:, :)
+    !> Memory for derivatives of the potentials (derivative, load)
+    real(wp), intent(out), contiguous :: sums(:, :)
     !> Displacement (direction, step) [Pa m] and stress (component, step) [Pa]
     real(wp), intent(out) :: displacement(:, :), stress(:, :)
-    real(wp), allocatable :: sums(:, :)
     real(wp) :: u(1, 3, 3), s(1, 6, 3), d(1, n_derivative, 3)
     integer :: j, step
 
     displacement = 0.0_wp
     stress = 0.0_wp
-    allocate (sums(n_derivative, size(load, 2)))
     associate (spacing => pyramid%spacing)
       do j = 1, size(self%depth)
         call pyramid%sum_over_nodes(x, y, self%depth(j)/spacing, load, sums)

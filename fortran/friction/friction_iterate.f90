@@ -137,13 +137,18 @@ contains
     real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
     type(driven_motions_t) :: driven
     real(wp), pointer, contiguous :: pressure(:), traction(:)
+    integer :: i
 
     call set_problem(self, problem, operators, step)
     pressure(1:size(start%pressure)) => start%pressure
     traction(1:size(start%traction)) => start%traction
     call operators%space%copy(pressure, self%p)
     call operators%space%copy(traction, self%q)
-    self%contact = self%p > 0.0_wp .and. self%candidate
+    !$omp parallel do simd schedule(static) num_threads(operators%space%threads)
+    do i = 1, size(self%p)
+      self%contact(i) = self%p(i) > 0.0_wp .and. self%candidate(i)
+    end do
+    !$omp end parallel do simd
     deallocate (start%pressure, start%traction)
     self%motion = merge(start%motion, step%target%value, step%target%control == force_control)
     if (operators%space%count(self%contact) > 0) then

@@ -126,7 +126,8 @@ contains
     integer :: row, k, try
 
     call sum_active(now, now%z, mean, now%kd, along_kd)
-    mean = merge(mean/now%punch_sum, 0.0_wp, now%by_load)
+    if (now%by_load) mean = mean/now%punch_sum
+    if (.not. now%by_load) mean = 0.0_wp
     back = 0.0_sp
     if (curved > 0.0_wp) back = max(real(-along_kd/curved, sp), 0.0_sp)
     !$omp parallel do schedule(static) num_threads(now%level%space%threads)

@@ -13,10 +13,11 @@ module hc_interior_points
   use hc_lattice, only: lattice_t, check_lattice
   use hc_field_space, only: field_space_t, space_over
   use hc_layer_response, only: layered_body_t
-  use hc_interior_fields, only: check_interior, yz, xz
+  use hc_interior_fields, only: n_derivative, check_interior, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
   use hc_depth_fields, only: depth_fields_t, new_depth_fields, check_inside
   use hc_periodic_interior, only: periodic_interior_t, new_periodic_interior
+  !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
 
@@ -92,20 +93,29 @@ contains
     real(wp), intent(in) :: points(:, :)
     real(wp), intent(out) :: displacement(:, :, :), stress(:, :, :)
     type(field_space_t), intent(in) :: space
-    !> Allocated on failure: layers that images do not describe
+    !> Allocated on failure: layers that images do not describe, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
     type(depth_fields_t), allocatable :: fields(:)
+    real(wp), allocatable :: sums(:, :, :)
     integer, allocatable :: level(:)
-    integer :: i
+    integer :: i, thread, stat
 
     call find_levels(inside, points(3, :), level, fields, error)
     if (allocated(error)) return
-    !$omp parallel do num_threads(space%threads) schedule(dynamic) if (size(points, 2) > 1)
+    ! of each thread; no stack holds those of many steps
+    allocate (sums(n_derivative, size(loaded%traction, 2), space%threads), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
+      return
+    end if
+    !$omp parallel do num_threads(space%threads) schedule(dynamic) private(thread) if (size(points, 2) > 1)
     do i = 1, size(points, 2)
+      thread = 1
+      !$ thread = omp_get_thread_num() + 1
       associate (spacing => loaded%pyramid%spacing, node => loaded%position)
         call fields(level(i))%of_nodes(loaded%pyramid, (points(1, i) - node(:, 1))/spacing, (points(2, i) - node(:, 2))/spacing, &
-                                       loaded%traction, displacement(:, i, :), stress(:, i, :))
+                                       loaded%traction, sums(:, :, thread), displacement(:, i, :), stress(:, i, :))
       end associate
     end do
     !$omp end parallel do

@@ -23,7 +23,7 @@ module hc_periodic_interior
   use hc_layer_response, only: layer_t, layered_body_t, n_wave, ll_p, tt_p, zz_p, lz_p, ll_q, tt_q, zz_q, lz_q, tz_t, lt_t, &
                                uz_p, ul_p, uz_q, ul_q, ut_t
   use hc_depth_fields, only: depth_fields_t
-  use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
+  use hc_interior_fields, only: n_derivative, xx, yy, zz, xy, yz, xz
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
   use hc_periodic_symbol, only: sinc
   !$ use omp_lib, only: omp_get_thread_num
@@ -365,17 +365,17 @@ contains
     real(wp), intent(in) :: points(:, :)
     !> Sums (component, step, point)
     real(wp), intent(inout) :: total(:, :, :)
-    real(wp), allocatable :: load(:, :), x(:, :), u(:, :), s(:, :)
+    real(wp), allocatable :: load(:, :), x(:, :), u(:, :), s(:, :), sums(:, :)
     integer :: i
 
-    !$omp parallel do num_threads(self%space%threads) schedule(dynamic) private(load, x, u, s)
+    !$omp parallel do num_threads(self%space%threads) schedule(dynamic) private(load, x, u, s, sums)
     do i = 1, size(points, 2)
       call find_near(self, points(:2, i), x, load)
-      allocate (u(3, size(total, 2)), s(xz, size(total, 2)))
-      call at%near%of_nodes(self%pyramid, x(:, 1), x(:, 2), load, u, s)
+      allocate (u(3, size(total, 2)), s(xz, size(total, 2)), sums(n_derivative, size(load, 2)))
+      call at%near%of_nodes(self%pyramid, x(:, 1), x(:, 2), load, sums, u, s)
       total(:xz, :, i) = total(:xz, :, i) + s
       total(u_x:, :, i) = total(u_x:, :, i) + u
-      deallocate (u, s)
+      deallocate (u, s, sums)
     end do
     !$omp end parallel do
   end subroutine add_near

@@ -15,7 +15,7 @@ contains
   subroutine stress_invariants(stress, scalars)
     !> Stress (component xx, yy, zz, xy, yz, xz; point)
     real(wp), intent(in) :: stress(:, :)
-    !> Compute the principal stresses, the largest first, von Mises, Tresca (scalar, point)
+    !> Principal stresses, the largest first, von Mises, Tresca (scalar, point)
     real(wp), intent(out) :: scalars(:, :)
     integer :: i
 

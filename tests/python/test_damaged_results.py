@@ -193,6 +193,19 @@ def test_a_shorter_type_in_a_record_is_noticed(
         open_result(out)
 
 
+def test_damage_in_a_large_record_is_named_before_a_restart(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal, "LARGE", 0)
+    written(out, planned=4)
+    record = journal_of(out) / "000001.npz"
+    content = bytearray(record.read_bytes())
+    content[len(content) // 2] ^= 4
+    record.write_bytes(content)
+    with pytest.raises(DeckError, match=r"000001\.npz is damaged .*Bad CRC-32"):
+        journal.read_record(record, restart=True)
+
+
 def test_a_journal_without_its_header_is_refused(out: Path) -> None:
     written(out, planned=4)
     (journal_of(out) / "header.json").unlink()

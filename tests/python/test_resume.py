@@ -691,3 +691,13 @@ def test_tables_of_an_older_run_are_replaced_after_a_kill(tmp_path: Path) -> Non
     resume(tmp_path / "out.nc")
     with xarray.open_dataset(tmp_path / "out_axis.nc") as found:
         assert found.attrs["stress_of"] == open_result(tmp_path / "out.nc").dataset.attrs["run"]
+
+
+def test_missing_tables_are_those_of_the_finished_run(tmp_path: Path) -> None:
+    """The case that resumes it need not ask for them."""
+    table = TABLES.partition('[[stress]]\nname = "fine')[0]
+    out = tmp_path / "out.nc"
+    Case.from_text(DECK + table).run(out).close()
+    (tmp_path / "out_axis.nc").unlink()
+    resume(out, case=Case.from_text(DECK)).close()
+    assert (tmp_path / "out_axis.nc").exists()

@@ -323,7 +323,7 @@ def read_record(path: Path, restart: bool = False) -> tuple[dict[str, Any], Step
         if path.stat().st_size < LARGE:
             fields = {name: _array(file, name) for name in fields}
         elif restart and (name := file.testzip()):
-            raise zipfile.BadZipFile(f"Bad CRC-32 for file {name!r}")
+            raise ValueError(f"Bad CRC-32 for file {name!r}")
         lattice = made(Lattice, {**about["lattice"], "origin": tuple(about["lattice"]["origin"])})
         beside = {name.removeprefix(_COMPANION): _array(file, name) for name in others if restart}
         return about, Step(about["index"], lattice, fields, about["history"], beside, about["control"])

@@ -108,7 +108,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     """Solve a case into a store with its tables; arguments as of `solve_into`."""
     with listener.following(case.title, case.planned_steps):
         solve_into(case, store, listener, before)
-        if store.finished:
+        if store.finished and (case.deck.stress or case.deck.fatigue):
             write_stresses(store.path, case, listener)
 
 
@@ -159,8 +159,7 @@ def write_stresses(output: Path, case: Problem | None = None, listener: Listener
 
     The case, by default that of the deck, is solved on coarser lattices where a table asks for errors.
     """
-    missing = missing_stresses(output) if case is None or case.deck.stress or case.deck.fatigue else None
-    if not missing:
+    if not (missing := missing_stresses(output)):
         return []
     listener = listener or Log()
     from ..interior.files import tables_of, write_netcdf
